@@ -18,12 +18,12 @@ def aperture_terms(position: npt.ArrayLike, aperture: float, terms: int = 20) ->
     the third degree, 56 up to the fifth. On a planar array those with x vanish.
     """
     axes = np.moveaxis(np.asarray(position, float) / aperture, -1, 0)
-    found = [np.ones_like(axes[0])]
+    monomials = [np.ones_like(axes[0])]
     degree = list(enumerate(axes))  # the last axis of each monomial, and its value
-    while len(found) < terms:
-        found += [value for _, value in degree]
+    while len(monomials) < terms:
+        monomials += [value for _, value in degree]
         degree = [(axis, value * axes[axis]) for last, value in degree for axis in range(last, 3)]
-    return np.stack(found[:terms], axis=-1)
+    return np.stack(monomials[:terms], axis=-1)
 
 
 def kept_aperture_terms(position: Floats, aperture: float, terms: int) -> Floats:

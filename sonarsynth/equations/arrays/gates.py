@@ -79,7 +79,7 @@ def gated_spectra(
     taper = gate_taper(count, sampling_frequency)
     spectra = np.empty((len(pressure), highest + 1 - lowest), np.complex64)
     for low in range(0, len(pressure), SENSORS_AT_ONCE):
-        some = slice(low, low + SENSORS_AT_ONCE)
-        cut = pressure[some, first_sample : first_sample + count] * taper
-        spectra[some] = rfft(cut, length, axis=1)[:, lowest : highest + 1]
+        rows = slice(low, low + SENSORS_AT_ONCE)
+        cut = pressure[rows, first_sample : first_sample + count] * taper
+        spectra[rows] = rfft(cut, length, axis=1)[:, lowest : highest + 1]
     return np.arange(lowest, highest + 1, dtype=float) * (sampling_frequency / length), spectra

@@ -15,15 +15,15 @@ def grating_lobes(direction: Floats, frequency: Floats, pitch: float, sound_spee
     whole multiples of c/(f pitch) (Van Trees 2002, Optimum Array Processing, section 2.5).
     """
     step = sound_speed / (np.asarray(frequency, float) * pitch)
-    most = int(np.floor(2.0 / step.min()))
-    orders = np.stack(np.meshgrid(*2 * [np.arange(-most, most + 1)]), axis=-1).reshape(-1, 2)
+    highest_order = int(np.floor(2.0 / step.min()))
+    orders = np.stack(np.meshgrid(*2 * [np.arange(-highest_order, highest_order + 1)]), axis=-1).reshape(-1, 2)
     orders = orders[orders.any(axis=1)]
     along = direction[1:] + orders[:, None, :] * step[:, None]
     ahead = 1.0 - (along**2).sum(axis=-1)
-    there = ahead > 0.0
-    found = np.concatenate([np.sqrt(np.maximum(ahead, 0.0))[..., None], along], axis=-1)
-    found[~there] = np.nan
-    return np.asarray(found[there.any(axis=1)])
+    exists = ahead > 0.0
+    lobes = np.concatenate([np.sqrt(np.maximum(ahead, 0.0))[..., None], along], axis=-1)
+    lobes[~exists] = np.nan
+    return np.asarray(lobes[exists.any(axis=1)])
 
 
 def lattice_pitch(position: Floats) -> float:

@@ -52,13 +52,13 @@ def _focus_and_fold(
     for n in range(columns):
         for m in range(rows):
             c, s = phasors(delay[n, m], frequency + low * spacing, spacing)
-            for side in range(2):
-                up, down = places[n, m, side], places[n, m, 2 + side]
+            for half in range(2):
+                up, down = places[n, m, half], places[n, m, 2 + half]
                 x, y = weighted(pairs, 2 * (up * bins + low), weight[up])
                 p, q = weighted(pairs, 2 * (down * bins + low), weight[down])
                 x, y = turned(x, y, c, s)
                 p, q = turned(p, q, c, s)
-                _store_pair(terms, ((side * columns + n) * rows + m) * TERM, x, y, p, q)
+                _store_pair(terms, ((half * columns + n) * rows + m) * TERM, x, y, p, q)
 
 
 @nb.njit(cache=True, nogil=True)
@@ -71,19 +71,19 @@ def _lattice_sums(
     line = np.empty(columns * TERM, np.float32)
     first_row, first_column = (0.0 if odd_rows else 0.5), (0.0 if odd_columns else 0.5)
     for low in range(0, bins, LANES):
-        here = frequency + low * spacing
+        first_frequency = frequency + low * spacing
         _focus_and_fold(pairs, bins, low, places, weight, delay, frequency, spacing, terms)
         for i in range(len(rise)):
-            c, s = phasors(first_row * rise[i], here, spacing)
-            by_c, by_s = phasors(rise[i], here, spacing)
+            c, s = phasors(first_row * rise[i], first_frequency, spacing)
+            by_c, by_s = phasors(rise[i], first_frequency, spacing)
             for n in range(columns):
-                start, other = n * rows * TERM, (columns + n) * rows * TERM
+                start, mirrored = n * rows * TERM, (columns + n) * rows * TERM
                 x, y = _sum(terms, start, start + rows * TERM, c, s, by_c, by_s)
-                p, q = _sum(terms, other, other + rows * TERM, c, s, by_c, by_s)
+                p, q = _sum(terms, mirrored, mirrored + rows * TERM, c, s, by_c, by_s)
                 _store_pair(line, n * TERM, x, y, p, q)
             for beam in range(bounds[i], bounds[i + 1]):
-                c, s = phasors(first_column * across[beam], here, spacing)
-                by_c, by_s = phasors(across[beam], here, spacing)
+                c, s = phasors(first_column * across[beam], first_frequency, spacing)
+                by_c, by_s = phasors(across[beam], first_frequency, spacing)
                 x, y = _sum(line, 0, columns * TERM, c, s, by_c, by_s)
                 store_complex(beams, 2 * (beam * bins + low), x, y)
 

@@ -83,10 +83,10 @@ def plane_wave(
     u = component @ axes[:rank]
     if rank == 2:
         normal = np.cross(axes[0], axes[1])
-        rest = 1 - u @ u
-        if rest < 0:
+        normal_square = 1 - u @ u
+        if normal_square < 0:
             return nothing
-        u = u + np.sqrt(rest) * normal * (1.0 if normal[0] >= 0 else -1.0)
+        u = u + np.sqrt(normal_square) * normal * (1.0 if normal[0] >= 0 else -1.0)
     u = u / np.linalg.norm(u)
     return u, float(t0 + q0 @ u / sound_speed)
 

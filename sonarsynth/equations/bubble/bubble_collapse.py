@@ -190,23 +190,23 @@ def _fastest(n: Numbers, steps: Floats, state: OdeSolution) -> float:
     return float(v[best])
 
 
-def stretched(time: npt.ArrayLike, found: Collapse) -> Floats:
+def stretched(time: npt.ArrayLike, collapse: Collapse) -> Floats:
     """The stretched clock s at times (s from the first collapse), NaN outside of what was solved: Newton's method
     between bisections, for dt/ds > 0."""
     t = np.asarray(time, float)
-    if found.flag == SETTLED:
+    if collapse.flag == SETTLED:
         return np.full(t.shape, np.nan)
-    inside = (t >= found.clock[0]) & (t <= found.clock[-1])
-    n = numbers(found.cavity)
-    goal = np.where(inside, t, found.clock[0]).ravel()
-    piece = np.clip(np.searchsorted(found.clock, goal, side="right") - 1, 0, found.steps.size - 2)
-    low, high = found.steps[piece], found.steps[piece + 1]
-    start, width = found.clock[piece], np.diff(found.clock)[piece]
+    inside = (t >= collapse.clock[0]) & (t <= collapse.clock[-1])
+    n = numbers(collapse.cavity)
+    goal = np.where(inside, t, collapse.clock[0]).ravel()
+    piece = np.clip(np.searchsorted(collapse.clock, goal, side="right") - 1, 0, collapse.steps.size - 2)
+    low, high = collapse.steps[piece], collapse.steps[piece + 1]
+    start, width = collapse.clock[piece], np.diff(collapse.clock)[piece]
     width = np.maximum(width, np.finfo(float).tiny)  # steps near a point are shorter than time can tell
     s = low + (high - low) * (goal - start) / width
     for _ in range(60):
-        q, _, tau = found.state(s)
-        miss = (n.time * tau - found.collapse_time) - goal
+        q, _, tau = collapse.state(s)
+        miss = (n.time * tau - collapse.collapse_time) - goal
         low, high = np.where(miss <= 0, s, low), np.where(miss >= 0, s, high)
         newton = s - miss / (n.time * ratio(q, n) ** 2.5)
         new = np.where((newton > low) & (newton < high), newton, 0.5 * (low + high))
@@ -217,16 +217,16 @@ def stretched(time: npt.ArrayLike, found: Collapse) -> Floats:
     return np.where(inside, s.reshape(t.shape), np.nan)
 
 
-def moving(s: npt.ArrayLike, found: Collapse) -> Motion:
+def moving(s: npt.ArrayLike, collapse: Collapse) -> Motion:
     """The bubble at places s of the stretched clock; NaN where s is."""
-    where = np.asarray(s, float)
-    known = np.isfinite(where)
-    c, n = found.cavity, numbers(found.cavity)
-    state = found.state(np.where(known, where, 0.0).ravel()).reshape(3, *where.shape)
-    q, W, tau = np.where(known, state, np.nan)
+    clock = np.asarray(s, float)
+    solved = np.isfinite(clock)
+    c, n = collapse.cavity, numbers(collapse.cavity)
+    state = collapse.state(np.where(solved, clock, 0.0).ravel()).reshape(3, *clock.shape)
+    q, W, tau = np.where(solved, state, np.nan)
     x, F, _ = force(q, W, n)
     return Motion(
-        n.time * tau - found.collapse_time,
+        n.time * tau - collapse.collapse_time,
         n.time * x**2.5,
         Wall(c.radius * x, n.speed * W * x**-1.5, n.speed**2 / c.radius * (F - 1.5 * W * W) / x**4),
         n.drive * c.radius * (F + 0.5 * W * W) / x**2,
@@ -234,21 +234,21 @@ def moving(s: npt.ArrayLike, found: Collapse) -> Motion:
     )
 
 
-def wall(time: npt.ArrayLike, found: Collapse) -> Wall:
+def wall(time: npt.ArrayLike, collapse: Collapse) -> Wall:
     """Radius R and its derivatives R', R'' at times (s from the first collapse); NaN outside of what was solved."""
-    return moving(stretched(time, found), found).wall
+    return moving(stretched(time, collapse), collapse).wall
 
 
-def pressure(time: npt.ArrayLike, found: Collapse) -> Floats:
+def pressure(time: npt.ArrayLike, collapse: Collapse) -> Floats:
     """Pressure (Pa) at 1 m: rho (R^2 R'' + 2 R R'^2) with R'' of the equation; NaN outside of what was solved."""
-    return moving(stretched(time, found), found).pressure
+    return moving(stretched(time, collapse), collapse).pressure
 
 
-def energy(time: npt.ArrayLike, found: Collapse) -> Floats:
+def energy(time: npt.ArrayLike, collapse: Collapse) -> Floats:
     """Energy (J) of the water's flow, the drive, the surface and the gas: constant for Rayleigh-Plesset without
     viscosity."""
-    c, n = found.cavity, numbers(found.cavity)
-    q, W, _ = found.state(stretched(time, found))
+    c, n = collapse.cavity, numbers(collapse.cavity)
+    q, W, _ = collapse.state(stretched(time, collapse))
     R = c.radius * ratio(q, n)
     gas = c.gas_pressure * (c.radius**3 - c.core**3) * boxcox(np.exp(-3.0 * q), c.exponent - 1.0)
     flow = 1.5 * c.density * c.radius**3 * (n.speed * W) ** 2

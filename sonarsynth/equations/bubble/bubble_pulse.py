@@ -23,47 +23,48 @@ TRANSITION, ATTENUATION = 0.2, 80.0
 """Of the low pass of `peak_below`: width over its corner frequency, and dB."""
 
 
-def _pressure(s: float, found: Collapse) -> float:
-    return float(moving(s, found).pressure)
+def _pressure(s: float, collapse: Collapse) -> float:
+    return float(moving(s, collapse).pressure)
 
 
 @lru_cache(maxsize=64)
-def _peak(found: Collapse) -> tuple[float, float]:
+def _peak(collapse: Collapse) -> tuple[float, float]:
     """Place (of the stretched clock) and size (Pa) of the largest pressure at 1 m of the first collapse."""
-    s = np.unique(np.linspace(found.steps[:-1], found.steps[1:], 5))
-    p = moving(s, found).pressure
+    s = np.unique(np.linspace(collapse.steps[:-1], collapse.steps[1:], 5))
+    p = moving(s, collapse).pressure
     i = int(np.clip(np.argmax(p), 1, s.size - 2))
     best = minimize_scalar(
-        lambda u: -_pressure(u, found), bounds=(s[i - 1], s[i + 1]), method="bounded", options={"xatol": 1e-12}
+        lambda u: -_pressure(u, collapse), bounds=(s[i - 1], s[i + 1]), method="bounded", options={"xatol": 1e-12}
     )
     return float(best.x), -float(best.fun)
 
 
-def peak(found: Collapse) -> tuple[float, float]:
+def peak(collapse: Collapse) -> tuple[float, float]:
     """Time (s from the collapse) and size (Pa) of the largest pressure at 1 m: infinite for a bubble that becomes a
     point, NaN for one that settles."""
-    if found.flag in {SINGULAR, SETTLED}:
-        return (0.0, np.inf) if found.flag == SINGULAR else (np.nan, np.nan)
-    s, size = _peak(found)
-    return float(moving(s, found).time), size
+    if collapse.flag in {SINGULAR, SETTLED}:
+        return (0.0, np.inf) if collapse.flag == SINGULAR else (np.nan, np.nan)
+    s, size = _peak(collapse)
+    return float(moving(s, collapse).time), size
 
 
-def source_level(found: Collapse) -> float:
+def source_level(collapse: Collapse) -> float:
     """Peak source level (dB re 1 uPa at 1 m) before any filter."""
-    return float(20.0 * np.log10(peak(found)[1] / REFERENCE_PRESSURE))
+    return float(20.0 * np.log10(peak(collapse)[1] / REFERENCE_PRESSURE))
 
 
-def width(found: Collapse, part: float = 0.5) -> float:
-    """Time (s) for which the pressure is over a part of its peak, around it; 0 for a point, NaN for none."""
-    if found.flag in {SINGULAR, SETTLED}:
-        return 0.0 if found.flag == SINGULAR else np.nan
-    top, size = _peak(found)
-    s = np.unique(np.append(np.linspace(found.steps[:-1], found.steps[1:], 5), top))
-    under = moving(s, found).pressure < part * size
+def width(collapse: Collapse, fraction: float = 0.5) -> float:
+    """Time (s) for which the pressure is over a fraction of its peak, around it; 0 for a point, NaN for none."""
+    if collapse.flag in {SINGULAR, SETTLED}:
+        return 0.0 if collapse.flag == SINGULAR else np.nan
+    top, size = _peak(collapse)
+    s = np.unique(np.append(np.linspace(collapse.steps[:-1], collapse.steps[1:], 5), top))
+    under = moving(s, collapse).pressure < fraction * size
     i, j = s[under & (s < top)][-1], s[under & (s > top)][0]
-    ends = [brentq(lambda u: _pressure(u, found) - part * size, *sorted((u, top)), xtol=1e-14) for u in (i, j)]
+    ends = [brentq(lambda u: _pressure(u, collapse) - fraction * size, *sorted((u, top)), xtol=1e-14) for u in (i, j)]
     node, weight = np.polynomial.legendre.leggauss(64)
-    rate = moving(0.5 * (ends[0] + ends[1]) + 0.5 * (ends[1] - ends[0]) * node, found).rate  # finer than times can tell
+    clock = 0.5 * (ends[0] + ends[1]) + 0.5 * (ends[1] - ends[0]) * node  # finer than times can tell
+    rate = moving(clock, collapse).rate
     return float(0.5 * (ends[1] - ends[0]) * (rate @ weight))
 
 
@@ -80,7 +81,7 @@ def _gate(moved: Motion, begins: tuple[float, float], ends: tuple[float, float])
 
 
 @lru_cache(maxsize=64)
-def pulse(found: Collapse, highest: float, fade: float = 0.5) -> Pulse:
+def pulse(collapse: Collapse, highest: float, fade: float = 0.5) -> Pulse:
     """The bubble's pulse at 1 m for waves up to `highest` (Hz).
 
     The model begins at rest, with a step of pressure, and is cut at the top of its last rebound, with another: its flow
@@ -88,28 +89,28 @@ def pulse(found: Collapse, highest: float, fade: float = 0.5) -> Pulse:
     collapse; 0 keeps the steps. Spectra are good to 1e-8 of their peak at the default tolerance of the solver. Raises
     ValueError for a bubble that settles without a collapse.
     """
-    if found.flag == SETTLED:
-        raise ValueError(f"the bubble has no pulse: {found.reason}")
+    if collapse.flag == SETTLED:
+        raise ValueError(f"the bubble has no pulse: {collapse.reason}")
     if not 0.0 <= fade <= 1.0:
         raise ValueError(f"the part of a pulse that is faded must be between 0 and 1, not {fade}")
-    start, end = float(found.clock[0]), float(found.clock[-1])
-    begins = (start, start + fade * found.collapse_time)
-    ends = (end - fade * (end - found.smallest[-1].time), end)
-    corners = stretched(np.array([begins[1], ends[0]]), found)
-    edges = np.unique(np.concatenate([found.steps, corners]))
-    lasts = np.diff(moving(edges, found).time)
+    start, end = float(collapse.clock[0]), float(collapse.clock[-1])
+    begins = (start, start + fade * collapse.collapse_time)
+    ends = (end - fade * (end - collapse.smallest[-1].time), end)
+    corners = stretched(np.array([begins[1], ends[0]]), collapse)
+    edges = np.unique(np.concatenate([collapse.steps, corners]))
+    lasts = np.diff(moving(edges, collapse).time)
     count = np.maximum(np.ceil(lasts * highest / PERIODS), 1).astype(np.int64)
     half = np.repeat(0.5 * np.diff(edges) / count, count)
     within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     middle = np.repeat(edges[:-1], count) + half * (2 * within + 1)
     node, weight = np.polynomial.legendre.leggauss(NODES)
-    moved = moving((middle[:, None] + half[:, None] * node).ravel(), found)
+    moved = moving((middle[:, None] + half[:, None] * node).ravel(), collapse)
     strength = (half[:, None] * weight).ravel() * moved.rate * _gate(moved, begins, ends)
-    return Pulse(moved.time, strength, start, end, peak(found)[1])
+    return Pulse(moved.time, strength, start, end, peak(collapse)[1])
 
 
 @lru_cache(maxsize=256)
-def peak_below(found: Collapse, frequency: float, fade: float = 0.5) -> float:
+def peak_below(collapse: Collapse, frequency: float, fade: float = 0.5) -> float:
     """Largest pressure (Pa) at 1 m of the first collapse below a frequency (Hz): behind a low pass that is at half
     there, to 1e-4.
 
@@ -117,11 +118,11 @@ def peak_below(found: Collapse, frequency: float, fade: float = 0.5) -> float:
     that lasts nanoseconds. Raises ValueError for a bubble that settles.
     """
     low_pass = Fir(0.0, frequency, TRANSITION * frequency, ATTENUATION)
-    made = pulse(found, reach(low_pass), fade)
+    emitted = pulse(collapse, reach(low_pass), fade)
 
     def filtered_pressure(time: Floats) -> Floats:
-        return filtered(time, made, low_pass)
+        return filtered(time, emitted, low_pass)
 
-    time, step = peak(found)[0] + np.linspace(-1.0, 1.0, 33) / frequency, 1.0 / (16.0 * frequency)
+    time, step = peak(collapse)[0] + np.linspace(-1.0, 1.0, 33) / frequency, 1.0 / (16.0 * frequency)
     around = time[np.argmax(filtered_pressure(time))] + np.linspace(-step, step, 33)
     return float(filtered_pressure(around).max())

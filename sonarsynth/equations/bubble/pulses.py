@@ -98,10 +98,10 @@ def filtered(time: npt.ArrayLike, pulse: Pulse, fir: Fir) -> Floats:
     """
     t = np.asarray(time, float)
     flat, out = t.ravel(), np.zeros(t.size)
-    for part in _parts(flat, pulse.time.size):
-        now = flat[part]
+    for block in _parts(flat, pulse.time.size):
+        now = flat[block]
         near = (pulse.time >= now.min() - 0.5 * duration(fir)) & (pulse.time <= now.max() + 0.5 * duration(fir))
-        out[part] = impulse_response(now[:, None] - pulse.time[near], fir) @ pulse.strength[near]
+        out[block] = impulse_response(now[:, None] - pulse.time[near], fir) @ pulse.strength[near]
     return out.reshape(t.shape)
 
 
@@ -117,9 +117,9 @@ def _waveform(pulse: Pulse, fir: Fir, steps: int) -> tuple[Floats, Floats]:
     lag = np.linspace(-half, half, int(np.ceil(2.0 * half / step)) * 512 // steps + 1)  # a table of h, linear: 2e-5
     h = impulse_response(lag, fir)
     p = np.zeros(time.size)
-    for part in _parts(time, pulse.time.size):
-        near = slice(*np.searchsorted(pulse.time, [time[part][0] - half, time[part][-1] + half]))
-        p[part] = np.interp(time[part, None] - pulse.time[near], lag, h, left=0.0, right=0.0) @ pulse.strength[near]
+    for block in _parts(time, pulse.time.size):
+        near = slice(*np.searchsorted(pulse.time, [time[block][0] - half, time[block][-1] + half]))
+        p[block] = np.interp(time[block, None] - pulse.time[near], lag, h, left=0.0, right=0.0) @ pulse.strength[near]
     return time, p
 
 

@@ -43,8 +43,8 @@ class Wall(NamedTuple):
 def wall(time: npt.ArrayLike, bubble: Bubble) -> Wall:
     """Radius R and its derivatives R', R'' at times (s) before the collapse at 0; zero after it, the limit from below
     at 0."""
-    given = np.asarray(time, float)
-    t = np.minimum(given, 0.0)  # before the logarithm, which is singular at -1/q > 0
+    requested = np.asarray(time, float)
+    t = np.minimum(requested, 0.0)  # before the logarithm, which is singular at -1/q > 0
     a, k, m, q, _ = bubble
     z = k * (t - m) / np.sqrt(2.0)
     growth = erfc(-z)  # 1 + erf z without cancellation far before the growth
@@ -53,7 +53,7 @@ def wall(time: npt.ArrayLike, bubble: Bubble) -> Wall:
     collapse = np.log1p(q * t) + 0.0  # not -0
     collapse1 = q / (1.0 + q * t)
     collapse2 = -collapse1 * collapse1
-    alive = np.where(given <= 0.0, a, 0.0)
+    alive = np.where(requested <= 0.0, a, 0.0)
     return Wall(
         alive * growth * collapse,
         alive * (growth1 * collapse + growth * collapse1),
@@ -85,10 +85,10 @@ def peak(bubble: Bubble) -> tuple[float, float]:
 
     x = np.geomspace(1e-4 / abs(bubble.q), -onset(bubble), 4096)
     i = int(np.clip(np.argmax(pressure(-x, bubble)), 1, x.size - 2))
-    found = minimize_scalar(
+    minimum = minimize_scalar(
         lambda y: -float(pressure(-y, bubble)), bounds=(x[i - 1], x[i + 1]), method="bounded", options={"xatol": 1e-13}
     )
-    return -float(found.x), -float(found.fun)
+    return -float(minimum.x), -float(minimum.fun)
 
 
 def source_level(bubble: Bubble) -> float:

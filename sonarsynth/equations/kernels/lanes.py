@@ -70,8 +70,8 @@ def store(typing: Any, array: Any, index: Any, value: Any) -> Any:
     """Write lanes to array[index : index + 16]."""
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        where = _address(context, builder, signature.args[0], arguments[0], arguments[1])
-        builder.store(arguments[2], where).align = _ALIGNMENT
+        address = _address(context, builder, signature.args[0], arguments[0], arguments[1])
+        builder.store(arguments[2], address).align = _ALIGNMENT
         return context.get_dummy_value()
 
     return types.void(array, types.intp, _lanes), build
@@ -84,11 +84,11 @@ def load_complex(typing: Any, array: Any, index: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         halves = []
         for shift in (0, LANES):
-            where = builder.add(arguments[1], ir.Constant(arguments[1].type, shift))
-            halves.append(builder.load(_address(context, builder, signature.args[0], arguments[0], where)))
+            start = builder.add(arguments[1], ir.Constant(arguments[1].type, shift))
+            halves.append(builder.load(_address(context, builder, signature.args[0], arguments[0], start)))
             halves[-1].align = _ALIGNMENT
-        parts = [builder.shuffle_vector(*halves, _order(range(part, 2 * LANES, 2))) for part in (0, 1)]
-        return context.make_tuple(builder, signature.return_type, parts)
+        components = [builder.shuffle_vector(*halves, _order(range(first, 2 * LANES, 2))) for first in (0, 1)]
+        return context.make_tuple(builder, signature.return_type, components)
 
     return types.UniTuple(_lanes, 2)(array, types.intp), build
 
@@ -101,8 +101,8 @@ def store_complex(typing: Any, array: Any, index: Any, real: Any, imaginary: Any
         array, index, real, imaginary = arguments
         for shift in (0, LANES):
             pairs = _order([(shift + i) // 2 + LANES * (i % 2) for i in range(LANES)])
-            where = builder.add(index, ir.Constant(index.type, shift))
-            address = _address(context, builder, signature.args[0], array, where)
+            start = builder.add(index, ir.Constant(index.type, shift))
+            address = _address(context, builder, signature.args[0], array, start)
             builder.store(builder.shuffle_vector(real, imaginary, pairs), address).align = _ALIGNMENT
         return context.get_dummy_value()
 
@@ -115,8 +115,8 @@ def splat(typing: Any, scalar: Any) -> Any:
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         nothing = ir.Constant(_VECTOR, ir.Undefined)
-        one = builder.insert_element(nothing, arguments[0], ir.Constant(ir.IntType(32), 0))
-        return builder.shuffle_vector(one, nothing, _order([0] * LANES))
+        vector = builder.insert_element(nothing, arguments[0], ir.Constant(ir.IntType(32), 0))
+        return builder.shuffle_vector(vector, nothing, _order([0] * LANES))
 
     return _lanes(types.float32), build
 

@@ -82,16 +82,16 @@ def add_scaled(typingctx: Any, array: Any, index: Any, factor: Any, numbers: Any
 
 
 @intrinsic
-def add_two(typingctx: Any, array: Any, index: Any, table: Any, one: Any, v: Any, other: Any, w: Any) -> Any:
-    """array[index : index + 8] += v * table[one : one + 8] + w * table[other : other + 8]."""
+def add_two(typingctx: Any, array: Any, index: Any, table: Any, row: Any, v: Any, other_row: Any, w: Any) -> Any:
+    """array[index : index + 8] += v * table[row : row + 8] + w * table[other_row : other_row + 8]."""
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         target, i, rows, j, first, k, second = arguments
         pointer, vector, size = _pointer(context, builder, signature.args[0], target, i)
         new = builder.load(pointer)
         new.align = size
-        for row, factor in ((j, first), (k, second)):
-            values = _load(context, builder, signature.args[2], rows, row)
+        for begin, factor in ((j, first), (k, second)):
+            values = _load(context, builder, signature.args[2], rows, begin)
             new = builder.fadd(new, builder.fmul(_spread(builder, vector, factor), values, flags=FAST), flags=FAST)
         builder.store(new, pointer).align = size
         return context.get_dummy_value()

@@ -28,8 +28,8 @@ def wenz_components(frequency: npt.ArrayLike, shipping: float, wind_speed: float
 
 def wenz_level(frequency: npt.ArrayLike, shipping: float, wind_speed: float) -> Floats:
     """Spectral level (dB re 1 uPa2/Hz) of the four components together, at frequencies (Hz, positive)."""
-    parts = wenz_components(frequency, shipping, wind_speed).values()
-    return np.asarray(10.0 * np.log10(sum(10.0 ** (part / 10.0) for part in parts)))
+    levels = wenz_components(frequency, shipping, wind_speed).values()
+    return np.asarray(10.0 * np.log10(sum(10.0 ** (level / 10.0) for level in levels)))
 
 
 def knudsen_level(frequency: npt.ArrayLike, sea_state: float) -> Floats:

@@ -49,11 +49,11 @@ def path_counts(
     groups = np.ones(gain.shape)
     for paths in range(2, gain.shape[1] + 1):
         groups[:, paths - 1] += (np.diff(np.sort(late[:, :paths], axis=1), axis=1) > apart).sum(axis=1)
-    found = []
+    moments = []
     for level in levels.tolist():
         reached = ndtr((source[0] + louder - level) / max(source[1], 1e-9))  # (place, path): so many paths, or more
         exactly = reached - np.append(reached[:, 1:], np.zeros((len(gain), 1)), axis=1)
         first, second = (float(weight @ (exactly * groups**power).sum(axis=1)) for power in (1, 2))
         fano = second / first * max(1.0 - 2.0 * first * apart, 0.0) if first > 0.0 else 1.0
-        found.append(CountMoments(first * np.exp(-first * apart), fano))
-    return found
+        moments.append(CountMoments(first * np.exp(-first * apart), fano))
+    return moments

@@ -61,10 +61,10 @@ def ring_moments(low: float, high: float, heights: Floats, reflected: Reflected,
     area = np.pi * np.log(high / low) * weight * rho**2  # 2 pi rho drho
     length = np.hypot(rho, heights[:, None])
     share = reflected(rho, length) / length**2
-    left = np.exp(-np.multiply.outer(length, pulse.absorbed))  # (image, node, bin)
-    spectrum = np.einsum("n,kn,knb->b", area, share, left)
+    transmitted = np.exp(-np.multiply.outer(length, pulse.absorbed))  # (image, node, bin)
+    spectrum = np.einsum("n,kn,knb->b", area, share, transmitted)
     step = pulse.frequency[1] - pulse.frequency[0]
-    energy = 2.0 * step * (left @ pulse.power)
+    energy = 2.0 * step * (transmitted @ pulse.power)
     square = float(np.einsum("n,kn,kn->", area, share, energy))
     fourth = float(np.einsum("n,kn->", area, (share * energy) ** 2)) / pulse.duration
     return RingMoments(spectrum, square, fourth)

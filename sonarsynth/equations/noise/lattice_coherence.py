@@ -42,13 +42,13 @@ def lag_covariance(
     wide[:, :WIDTH] += wide[:, size[1] :]
     grid = wide[: size[0], : size[1]]
     beta = kaiser_bessel_beta(WIDTH, OVERSAMPLING)
-    found = ifft2(grid) * grid.size
+    covariance = ifft2(grid) * grid.size
     for axis, lag in enumerate(lags):
-        some = np.fft.fftfreq(2 * lag, 1.0 / (2 * lag)).astype(int)
-        shape = kaiser_bessel_transform(some / size[axis], WIDTH, beta)
-        back = np.exp(-1j * np.pi * WIDTH * some / size[axis]) / shape  # the grid is ahead
-        found = np.moveaxis(np.moveaxis(found, axis, -1)[..., some] * back, -1, axis)
-    return np.asarray(found)
+        lag_index = np.fft.fftfreq(2 * lag, 1.0 / (2 * lag)).astype(int)
+        shape = kaiser_bessel_transform(lag_index / size[axis], WIDTH, beta)
+        back = np.exp(-1j * np.pi * WIDTH * lag_index / size[axis]) / shape  # the grid is ahead
+        covariance = np.moveaxis(np.moveaxis(covariance, axis, -1)[..., lag_index] * back, -1, axis)
+    return np.asarray(covariance)
 
 
 @lru_cache(maxsize=1)
@@ -85,10 +85,10 @@ def _sinc(x: float) -> float:
 @njit(cache=True, error_model="numpy", nogil=True, inline="always")
 def _spread(values: Floats, cycles: float, count: int, kernel: Floats) -> int:
     """Values of the kernel about a phase, and the point of the grid that is the first of them."""
-    place = (cycles - math.floor(cycles)) * count
-    first = math.ceil(place - 0.5 * WIDTH)
+    position = (cycles - math.floor(cycles)) * count
+    first = math.ceil(position - 0.5 * WIDTH)
     for j in range(WIDTH):
-        far = abs(first + j - place) * TABLE
+        far = abs(first + j - position) * TABLE
         cell = int(far)
         values[j] = kernel[cell] + (far - cell) * (kernel[cell + 1] - kernel[cell])
     return first + WIDTH // 2

@@ -51,13 +51,13 @@ def coherent_sums(
     power = np.zeros(amplitude.size)
     x, y, room = np.empty(bins), np.empty(bins), np.empty((4, max(bins, ROOM)))
     omega = 2.0 * math.pi * frequency
-    square, most = omega * omega, np.abs(relative).max()
+    square, largest = omega * omega, np.abs(relative).max()
     for e in range(amplitude.size):
         _facet_mean(x, y, corners[e], omega, square, room)
         for k in range(bins):
             power[e] += weight[snap[e], k] * (x[k] * x[k] + y[k] * y[k])
         _turn(x, y, phase[e], delay[e], omega, room)
-        _fade(x, y, amplitude[e], math.log(10.0) / 20.0 * loss[e], 0.5 * variance[e], relative, square, most)
+        _fade(x, y, amplitude[e], math.log(10.0) / 20.0 * loss[e], 0.5 * variance[e], relative, square, largest)
         for j in range(PARTS):
             _add(real[group[e], j], direction[e, j - 1] if j else 1.0, x)
             _add(imaginary[group[e], j], direction[e, j - 1] if j else 1.0, y)
@@ -81,18 +81,18 @@ def _turn(x: Floats, y: Floats, phase: float, delay: float, omega: Floats, room:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _fade(
-    x: Floats, y: Floats, amplitude: float, decay: float, half: float, relative: Floats, square: Floats, most: float
+    x: Floats, y: Floats, amplitude: float, decay: float, half: float, relative: Floats, square: Floats, largest: float
 ) -> None:
     """Multiplies x + iy (bin,) by amplitude exp(-decay relative - half square); most: of |relative|."""
-    if abs(decay) * most + half * square[-1] < SMALL:
+    if abs(decay) * largest + half * square[-1] < SMALL:
         for k in range(x.size):
-            lost = -decay * relative[k] - half * square[k]
-            left = amplitude * (1.0 + lost * (1.0 + 0.5 * lost * (1.0 + lost / 3.0)))
-            x[k], y[k] = x[k] * left, y[k] * left
+            exponent = -decay * relative[k] - half * square[k]
+            factor = amplitude * (1.0 + exponent * (1.0 + 0.5 * exponent * (1.0 + exponent / 3.0)))
+            x[k], y[k] = x[k] * factor, y[k] * factor
     else:
         for k in range(x.size):
-            left = amplitude * math.exp(-decay * relative[k] - half * square[k])
-            x[k], y[k] = x[k] * left, y[k] * left
+            factor = amplitude * math.exp(-decay * relative[k] - half * square[k])
+            x[k], y[k] = x[k] * factor, y[k] * factor
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -18,10 +18,10 @@ def heard_share(toward: Floats, frequency: float, face: float, sound_speed: floa
     toward (wave, xyz): unit vectors to where they come from, x the axis of the face; behind: what is left of the
     pressure of those from behind.
     """
-    left = np.where(toward[:, 0] < 0.0, behind**2, 1.0)
+    share = np.where(toward[:, 0] < 0.0, behind**2, 1.0)
     if face > 0.0:
-        left = left * element_directivity(np.array([frequency]), toward[:, None, :], face, sound_speed)[:, 0] ** 2
-    return np.asarray(left)
+        share = share * element_directivity(np.array([frequency]), toward[:, None, :], face, sound_speed)[:, 0] ** 2
+    return np.asarray(share)
 
 
 def cross_power(toward: Floats, power: Floats, offset: Floats, wavenumber: float) -> npt.NDArray[np.complex128]:
@@ -30,6 +30,6 @@ def cross_power(toward: Floats, power: Floats, offset: Floats, wavenumber: float
     total = np.zeros(len(offset), complex)
     many = max(TOGETHER // max(len(offset), 1), 1)
     for first in range(0, len(toward), many):
-        some = slice(first, first + many)
-        total += np.exp(1j * wavenumber * (toward[some] @ offset.T)).T @ power[some]
+        block = slice(first, first + many)
+        total += np.exp(1j * wavenumber * (toward[block] @ offset.T)).T @ power[block]
     return total

@@ -79,10 +79,10 @@ def exceedance(x: Floats, alpha: float) -> Floats:
 
 def _near(x: Floats, alpha: float) -> Floats:
     """`exceedance` by its integral; alpha is not 2."""
-    if abs(part := (alpha - 1.0) / BESIDE_CAUCHY) < 1.0:
+    if abs(offset := (alpha - 1.0) / BESIDE_CAUCHY) < 1.0:
         cauchy = 1.0 - 2.0 / np.pi * np.arctan(x)
         below, above = _near(x, 1.0 - BESIDE_CAUCHY), _near(x, 1.0 + BESIDE_CAUCHY)
-        return np.asarray(cauchy + 0.5 * part * (above - below) + 0.5 * part**2 * (above - 2.0 * cauchy + below))
+        return np.asarray(cauchy + 0.5 * offset * (above - below) + 0.5 * offset**2 * (above - 2.0 * cauchy + below))
     power = alpha / (alpha - 1.0)
     u = (np.arange(NODES) + 0.5) / NODES
     angle, weight = 0.5 * np.pi * u**2 * (3.0 - 2.0 * u), 3.0 * np.pi * u * (1.0 - u) / NODES  # fine at both ends
@@ -115,10 +115,10 @@ def fit_quantiles(values: Floats) -> StableFit:
     if not upper > lower:
         raise ValueError("no stable law fits: half of the samples are alike")
     alphas, ratio, middle = _quantiles()
-    found = (high - low) / (upper - lower)
-    if found > ratio[0]:
+    spread = (high - low) / (upper - lower)
+    if spread > ratio[0]:
         raise ValueError(f"no stable law fits: alpha is at most {alphas[0]:g}")
-    alpha = float(np.interp(-found, -ratio, alphas))
+    alpha = float(np.interp(-spread, -ratio, alphas))
     return _fit(alpha, 0.5 * (upper - lower) / float(np.interp(alpha, alphas, middle)))
 
 
@@ -129,15 +129,15 @@ def fit_characteristic_function(values: Floats) -> StableFit:
     squares from the fit by quantiles on.
     """
     alpha, scale = fit_quantiles(values)
-    known, points = np.transpose(CHARACTERISTIC_POINTS)
+    alphas, points = np.transpose(CHARACTERISTIC_POINTS)
     for _ in range(ROUNDS):
-        t = np.pi / 25.0 * np.arange(1, 1 + round(float(np.interp(alpha, known, points))))
+        t = np.pi / 25.0 * np.arange(1, 1 + round(float(np.interp(alpha, alphas, points))))
         turn = np.exp(1j * t[0] * values / scale)
         power = np.abs([np.mean(phase) for phase in accumulate(repeat(turn, len(t)), np.multiply)]) ** 2
-        some = (power > 4.0 / len(values)) & (power < 1.0)
-        if some.sum() < 2:
+        usable = (power > 4.0 / len(values)) & (power < 1.0)
+        if usable.sum() < 2:
             raise ValueError("no stable law fits the characteristic function")
-        slope, start = np.polyfit(np.log(t[some]), np.log(-np.log(power[some])), 1)
+        slope, start = np.polyfit(np.log(t[usable]), np.log(-np.log(power[usable])), 1)
         alpha, scale = _fit(slope, scale * float(np.exp((start - np.log(2.0)) / slope)))
     return StableFit(alpha, scale)
 

@@ -36,12 +36,12 @@ def quadrature(
     sine, power = np.concatenate(sines), np.concatenate(powers)
     cosine = np.sqrt(np.maximum(1.0 - sine**2, 0.0))
     around = np.ceil(0.5 * degree * cosine + 3.0 * (degree * cosine) ** 0.33).astype(int) + 4
-    whole = around if half else 2 * around
-    ring = np.repeat(np.arange(sine.size), whole)
-    first = np.cumsum(whole) - whole
+    azimuths = around if half else 2 * around
+    ring = np.repeat(np.arange(sine.size), azimuths)
+    first = np.cumsum(azimuths) - azimuths
     azimuth = np.pi * (np.arange(ring.size) - first[ring] + 0.5) / around[ring]
     toward = np.stack([cosine[ring] * np.cos(azimuth), cosine[ring] * np.sin(azimuth), sine[ring]], axis=1)
-    return toward, (power / whole)[ring] / power.sum()
+    return toward, (power / azimuths)[ring] / power.sum()
 
 
 def drawn(intensity: Intensity, edges: Sequence[float], even: Floats) -> Floats:

@@ -74,11 +74,11 @@ def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: bool,
     """
     sums = np.zeros(2)
     for r in range(len(start)):
-        z, other, n = start[r], end[r], vertices[r]
+        z, z_end, n = start[r], end[r], vertices[r]
         sums[:] = 0.0
         p = np.sqrt(max(1.0 - climb[r] ** 2, 0.0)) / at(z, water[0], water[1])
         if n == 0:
-            leg(z, other, p, bent, water, table, 1.0, sums)
+            leg(z, z_end, p, bent, water, table, 1.0, sums)
         else:
             fastest = 1.0 / max(p, 1e-300) if bent else np.inf
             upper = vertex(z, False, fastest, bottom, water[0], water[1])
@@ -87,5 +87,5 @@ def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: bool,
             last_down = first_down == (n % 2 == 1)
             leg(z, lower if first_down else upper, p, bent, water, table, 1.0, sums)
             leg(upper, lower, p, bent, water, table, n - 1.0, sums)
-            leg(lower if last_down else upper, other, p, bent, water, table, 1.0, sums)
+            leg(lower if last_down else upper, z_end, p, bent, water, table, 1.0, sums)
         out[r] = sums[1] / sums[0] if sums[0] > 0.0 else at(z, table[0], table[1])

@@ -53,13 +53,13 @@ def across(depth: Floats, layer: int, sense: float) -> tuple[int, int]:
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def length_to_edge(sine: float, p: float, c: float, c_edge: float, rest: float) -> tuple[float, float]:
-    """Arc length to the edge of the layer `rest` (m) away, and the sine there; NaN where the ray turns before it."""
+def length_to_edge(sine: float, p: float, c: float, c_edge: float, dz: float) -> tuple[float, float]:
+    """Arc length to the edge of the layer `dz` (m) away, and the sine there; NaN where the ray turns before it."""
     square = sine * sine - p * p * (c_edge - c) * (c_edge + c)
     if square < 0.0:
         return math.nan, math.nan
     total = sine + math.sqrt(square)
-    return 2.0 * rest / total * atanc(p * (c_edge - c) / total) if rest > 0.0 else 0.0, math.sqrt(square)
+    return 2.0 * dz / total * atanc(p * (c_edge - c) / total) if dz > 0.0 else 0.0, math.sqrt(square)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -103,8 +103,8 @@ def step(
     s = min(limit, math.sqrt(8.0 * sagitta / abs(bend))) if bend != 0.0 else limit
     why, after, z_after, phi_after = ON, layer, math.nan, math.nan
     if sense != 0.0:
-        rest = abs(depth[edge] - z)
-        to_edge, sine = length_to_edge(abs(math.sin(phi)), p, c, speed[edge], rest)
+        to_depth = abs(depth[edge] - z)
+        to_edge, sine = length_to_edge(abs(math.sin(phi)), p, c, speed[edge], to_depth)
         if to_edge <= s:
             s, z_after, phi_after = to_edge, depth[edge], sense * math.atan2(sine, p * speed[edge])
             after, why = across(depth, layer, sense)
@@ -159,24 +159,24 @@ def chords(
     """
     count = 0
     for i in range(len(z)):
-        layer, x, at, angle, left = min(node_above(depth, z[i]), len(depth) - 2), 0.0, z[i], phi[i], length[i]
+        layer, x, at, angle, ahead = min(node_above(depth, z[i]), len(depth) - 2), 0.0, z[i], phi[i], length[i]
         run, low, high = 0.0, angle, angle
         if count == len(nodes):
             return -1
         nodes[count, 0], nodes[count, 1], nodes[count, 2] = i, x, at
         count += 1
         for _ in range(1_000_000):
-            if not left > 0.0:
+            if not ahead > 0.0:
                 break
             was_x, was_z, was_angle, was_run = x, at, angle, run
-            why, layer, dx, at, angle, done, _ = step(depth, speed, layer, at, angle, p[i], left, sagitta, math.inf)
-            x, left, run = x + dx, left - done, run + done
+            why, layer, dx, at, angle, done, _ = step(depth, speed, layer, at, angle, p[i], ahead, sagitta, math.inf)
+            x, ahead, run = x + dx, ahead - done, run + done
             low, high = min(low, angle), max(high, angle)
             bounced = why in (SURFACE, BOTTOM)
-            kept = run * (high - low) > 4.0 * sagitta and was_run > 0.0
+            add_node = run * (high - low) > 4.0 * sagitta and was_run > 0.0
             if count + 2 > len(nodes):
                 return -1
-            if kept:  # the chord would be too long: a node before this arc
+            if add_node:  # the chord would be too long: a node before this arc
                 nodes[count, 0], nodes[count, 1], nodes[count, 2] = i, was_x, was_z
                 count += 1
                 run, low, high = done, min(was_angle, angle), max(was_angle, angle)

@@ -69,8 +69,8 @@ def straight_of_pair(
         chain.k[i] = dz[i] * (c[i] + c[i + 1])
         fastest = max(fastest, c[i + 1])
     offsets(c, 0, n, fastest, chain.d)
-    found, s_m, p = straight(distance, fastest, chain.d, chain.k, 0, n, False)
-    if not found:
+    exists, s_m, p = straight(distance, fastest, chain.d, chain.k, 0, n, False)
+    if not exists:
         return 0
     first, last = (0, n) if start < end else (n, 0)
     emit(out, row, s_m, p, distance, c, chain.d, chain.k, dz, chain.crossings, 0, n, 0.0, 0.0, first, last, 0)
@@ -82,24 +82,24 @@ def straight_of_pair(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def level_of_pair(
-    depth: Floats, speed: Floats, z: float, distance: float, reflections: int, found: int, out: Floats, row: int
+    depth: Floats, speed: Floats, z: float, distance: float, reflections: int, known: int, out: Floats, row: int
 ) -> int:
     """Rays between two points of one depth that leave it by less than rounding, into rows of out: their number.
 
     Those along a boundary that are reflected all the way, where there is a level one; those that turn so near that the
     speed there is, rounded, that of the next node: an arc over R rises by R^2 |g|/(8 c).
     """
-    if found and (z == 0.0 or z == depth[-1]) and reflections > 0:
+    if known and (z == 0.0 or z == depth[-1]) and reflections > 0:
         emit_level(out, row, distance, out[row - 1, START_SPEED])
-        side = UPPER if z == 0.0 else LOWER
-        out[row, side], out[row, SURFACE if z == 0.0 else BOTTOM] = z, 1.0
+        extreme = UPPER if z == 0.0 else LOWER
+        out[row, extreme], out[row, SURFACE if z == 0.0 else BOTTOM] = z, 1.0
         return 1
     count, j = 0, node_above(depth, z)
     c = speed_at(depth, speed, j, z)
     for sense in (-1, 1):
         near = j + 1 if sense > 0 else (j if depth[j] < z else j - 1)  # the next node that way
         back = near - sense
-        if found or not 0 <= near < len(depth) or not 0 <= back < len(depth) or depth[near] == depth[back]:
+        if known or not 0 <= near < len(depth) or not 0 <= back < len(depth) or depth[near] == depth[back]:
             continue
         gradient = (speed[near] - speed[back]) / abs(depth[near] - depth[back])
         rise = distance * distance * gradient / (8.0 * c)
@@ -136,21 +136,21 @@ def rays_of_pairs(
         z1, z2, r = start[i], end[i], distance[i]
         if abs(z2 - z1) < SAME_DEPTH:
             z2 = z1
-        found = straight_of_pair(depth, speed, z1, z2, r, chain, out, count)
-        if count + found + 2 > len(out):
+        ray_count = straight_of_pair(depth, speed, z1, z2, r, chain, out, count)
+        if count + ray_count + 2 > len(out):
             return count, i
         if z1 == z2 and r > 0.0 and vertices > 0:
-            found += level_of_pair(depth, speed, z1, r, reflections, found, out, count + found)
+            ray_count += level_of_pair(depth, speed, z1, r, reflections, ray_count, out, count + ray_count)
         if vertices > 0 and (reflections > 0 or (r > 0.0 and fastest > slowest and abs(z2 - z1) <= r * steepest)):
             more = families_of_pair(
-                depth, speed, z1, z2, r, reflections, steepest, family, chain, out, count + found
+                depth, speed, z1, z2, r, reflections, steepest, family, chain, out, count + ray_count
             )  # fmt: skip
             if more < 0:
                 return count, i
-            found += more
-            sort_by_time(out, count, found)
-        pair[count : count + found] = i
-        count += found
+            ray_count += more
+            sort_by_time(out, count, ray_count)
+        pair[count : count + ray_count] = i
+        count += ray_count
     return count, len(start)
 
 

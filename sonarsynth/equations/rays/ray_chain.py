@@ -40,8 +40,8 @@ def speed_at(depth: Floats, speed: Floats, node: int, z: float) -> float:
     """Sound speed at z in the layer below a node (the node's own speed at the last one)."""
     if node >= len(depth) - 1 or z <= depth[node]:
         return float(speed[node])
-    part = (z - depth[node]) / (depth[node + 1] - depth[node])
-    return float(speed[node] + part * (speed[node + 1] - speed[node]))
+    fraction = (z - depth[node]) / (depth[node + 1] - depth[node])
+    return float(speed[node] + fraction * (speed[node + 1] - speed[node]))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -75,10 +75,10 @@ def approach(
         p = 1.0 / math.sqrt(v * v + fastest * fastest)
         s_m = max(v * p, GRAZING)
         over_p, slope = sweep(s_m, p, chain.d, chain.k, first, last, turn_up, turn_down)
-        left = p * over_p - distance
-        if settled(left, distance, p * abs(slope)):
+        misfit = p * over_p - distance
+        if settled(misfit, distance, p * abs(slope)):
             return s_m, p, over_p, slope
-        v += left / (slope * s_m * p * p)
+        v += misfit / (slope * s_m * p * p)
         if not 0.0 < v <= extent:
             break
     return math.nan, math.nan, math.nan, math.nan
@@ -87,21 +87,21 @@ def approach(
 @njit(cache=True, error_model="numpy", nogil=True)
 def rays_nearby(
     depth: Floats, speed: Floats,
-    start: Floats, slowness: Floats, up: Ints, vertices: Ints, place: Ints, end: Floats, distance: Floats,
+    start: Floats, slowness: Floats, up: Ints, vertices: Ints, depth_of_end: Ints, end: Floats, distance: Floats,
     time: Floats, sine: Floats, amplitude: Floats,
 ) -> None:  # fmt: skip
     """Times, sines at the start (up positive) and amplitudes (ray, end) of rays of known families; NaN given up.
 
-    start, slowness, up, vertices (ray,): of the known rays; end (depth,): depths of the ends, place (end,): which of
-    them each end has, equal ones next to each other; distance (ray, end).
+    start, slowness, up, vertices (ray,): of the known rays; end (depth,): depths of the ends, depth_of_end
+    (end,): which of them each end has, equal ones next to each other; distance (ray, end).
     """
     chain = new_chain(len(depth))
     family = np.zeros((1, COLUMNS), np.int64)
     for i in range(len(start)):
         near, was, first, last, turn_up, turn_down = slowness[i], -1, 0, 0, 0.0, 0.0
-        for j in range(len(place)):
-            if place[j] != was:
-                was = place[j]
+        for j in range(len(depth_of_end)):
+            if depth_of_end[j] != was:
+                was = depth_of_end[j]
                 first, last, turn_up, turn_down = lay_for(
                     depth, speed, start[i], end[was], near, up[i], vertices[i], chain, family
                 )
@@ -111,17 +111,17 @@ def rays_nearby(
             s_m, p, over_p, slope = approach(near, distance[i, j], chain, first, last, turn_up, turn_down)
             if math.isnan(p):
                 continue
-            left = distance[i, j] - p * over_p
+            misfit = distance[i, j] - p * over_p
             c, d, descends = chain.c, chain.d, chain.at[DESCENDS] == 1
-            here, there = chain.at[UPPER_END], chain.at[LOWER_END]
+            start_node, end_node = chain.at[UPPER_END], chain.at[LOWER_END]
             if not descends:
-                here, there = there, here
-            leaves, arrives = math.sqrt(s_m * s_m + p * p * d[here]), math.sqrt(s_m * s_m + p * p * d[there])
-            time[i, j] = time_of(s_m, p, c, d, chain.dz, chain.crossings, first, last, turn_up, turn_down) + p * left
-            amplitude[i, j] = math.sqrt(c[here] * c[there] / (over_p * abs(slope) * leaves * arrives))
+                start_node, end_node = end_node, start_node
+            leaves, arrives = math.sqrt(s_m * s_m + p * p * d[start_node]), math.sqrt(s_m * s_m + p * p * d[end_node])
+            time[i, j] = time_of(s_m, p, c, d, chain.dz, chain.crossings, first, last, turn_up, turn_down) + p * misfit
+            amplitude[i, j] = math.sqrt(c[start_node] * c[end_node] / (over_p * abs(slope) * leaves * arrives))
             upward = up[i] == 1 if vertices[i] > 0 else not descends
-            near = p + left / slope  # ds/dp = -p c^2/s
-            leaves -= p * c[here] * c[here] / leaves * left / slope
+            near = p + misfit / slope  # ds/dp = -p c^2/s
+            leaves -= p * c[start_node] * c[start_node] / leaves * misfit / slope
             sine[i, j] = leaves if upward else -leaves
-            if j + 1 < len(place):
+            if j + 1 < len(depth_of_end):
                 near += (distance[i, j + 1] - distance[i, j]) / slope

@@ -76,14 +76,14 @@ def families_of_pair(
     while True:
         of[AFTER] = math.inf
         joined_up, joined_down = extend_up(depth, speed, chain) <= 1, extend_down(depth, speed, chain) <= 1
-        some = 0
+        ray_count = 0
         if possible(distance, reflections, steepest, family, chain):
-            some = search(
+            ray_count = search(
                 distance, joined_up and not fresh, joined_down and not fresh, fresh, family, chain, out, row + count
             )
-        if some < 0:
+        if ray_count < 0:
             return -1
-        count += some
+        count += ray_count
         if of[AFTER] == math.inf or family[:, ALIVE].sum() == 0:
             return count
         of[FASTEST], fresh = of[AFTER], False
@@ -95,7 +95,7 @@ def possible(distance: float, reflections: int, steepest: float, family: Ints, c
     at, of = chain.at, chain.of
     after, slowest = of[AFTER], of[SLOWEST]
     farthest = distance * math.sqrt((after - slowest) * (after + slowest)) / slowest if after < math.inf else math.inf
-    found = False
+    any_possible = False
     for f in range(len(family)):
         if family[f, ALIVE] == 0:
             continue
@@ -108,8 +108,8 @@ def possible(distance: float, reflections: int, steepest: float, family: Ints, c
         elif height > farthest:
             family[f, SHORT] = 0  # even the steepest ray comes farther
         else:
-            found = found or height > 0.0 or after < math.inf
-    return found
+            any_possible = any_possible or height > 0.0 or after < math.inf
+    return any_possible
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -164,10 +164,10 @@ def search(
             if rises or falls or full2 + turn1 > distance or full1 + turn2 < distance:
                 continue
         if bounded or not short:
-            some = roots_of(f, distance, short, extent, bounded, family, chain, out, row + count)
-            if some < 0:
+            root_count = roots_of(f, distance, short, extent, bounded, family, chain, out, row + count)
+            if root_count < 0:
                 return -1
-            count += some
+            count += root_count
     return count
 
 
@@ -199,21 +199,21 @@ def roots_of(
     first = at[FIRST] if above else at[UPPER_END]
     last = at[LAST] if below else at[LOWER_END]
     weigh(above, family[f, BETWEEN], below, first, last, chain)
-    found = 1
+    root_count = 1
     if bounded:
         turn_up, turn_down = above * of[GRADIENT_UP], below * of[GRADIENT_DOWN]
-        found = turns(
+        root_count = turns(
             short, of[FASTEST], extent, distance, chain.d, chain.k, first, last, turn_up, turn_down, chain.stack, roots
         )
     elif first == last:
         return 0  # from a boundary to itself
     else:
         _, roots[0, 0], roots[0, 1] = straight(distance, of[FASTEST], chain.d, chain.k, first, last, True)
-    if row + found > len(out):
+    if row + root_count > len(out):
         return -1
-    for i in range(found):
+    for i in range(root_count):
         keep(family, f, chain, first, last, distance, roots[i, 0], roots[i, 1], out, row + i)
-    return found
+    return root_count
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

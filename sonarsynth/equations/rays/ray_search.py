@@ -20,9 +20,9 @@ ENOUGH = 2e-17  # relative error of the travel time at which Newton stops: it is
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def settled(left: float, distance: float, slope: float) -> bool:
+def settled(misfit: float, distance: float, slope: float) -> bool:
     """Whether one more Newton step ends the search: X - R is small for the travel time, and for angle and amplitude."""
-    return left * left <= ENOUGH * distance * slope and abs(left) <= CLOSE * distance
+    return misfit * misfit <= ENOUGH * distance * slope and abs(misfit) <= CLOSE * distance
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -46,13 +46,13 @@ def refine(
         p = 1.0 / math.sqrt(v * v + fastest * fastest)
         s_m = max(v * p, GRAZING)
         over_p, slope = sweep(s_m, p, d, k, first, last, turn_up, turn_down)
-        left = p * over_p - distance
-        if (left > 0.0) == rising:
+        misfit = p * over_p - distance
+        if (misfit > 0.0) == rising:
             high = v
         else:
             low = v
-        step = left / (slope * s_m * p * p)
-        done = settled(left, distance, p * abs(slope))
+        step = misfit / (slope * s_m * p * p)
+        done = settled(misfit, distance, p * abs(slope))
         if low < v + step < high:
             v += step
         elif not done:
@@ -82,18 +82,18 @@ def straight(
         total += k[i]
         reach += k[i] * (d[i] + d[i + 1])
     least = 2.0 * distance / total  # X(q) <= q total/2
-    part = distance / total
-    rest = 1.0 - part * part * reach / total  # one layer: q = least/rest; no ray where it is negative
+    half_least = distance / total
+    margin = 1.0 - half_least * half_least * reach / total  # one layer: q = least/margin; no ray where it is negative
     q, s_m, p = least, 0.0, 0.0
-    if rest > 0.05:
-        q = least / rest
+    if margin > 0.05:
+        q = least / margin
         for _ in range(40):
             s_m = 1.0 / math.sqrt(1.0 + (q * fastest) ** 2)
             p = q * s_m
             over_p, slope = sweep(s_m, p, d, k, first, last, 0.0, 0.0)
-            left = p * over_p - distance
-            q = max(least, q - left / (slope * s_m * s_m * s_m))
-            if s_m < 0.01 or settled(left, distance, p * slope):
+            misfit = p * over_p - distance
+            q = max(least, q - misfit / (slope * s_m * s_m * s_m))
+            if s_m < 0.01 or settled(misfit, distance, p * slope):
                 break
     if s_m < 0.01:  # near the limit, where the largest range of all decides whether there is a ray
         if not reached and flattest(d, k, first, last) < distance:
@@ -142,10 +142,10 @@ def turns(
     if distance == 0.0:
         return 0  # a ray that turns goes somewhere
     stack[0] = extent
-    held = 1
+    pending = 1
     low, below, count = GRAZING, below_start, 0
-    while held > 0:
-        high = stack[held - 1]
+    while pending > 0:
+        high = stack[pending - 1]
         x_low, x_high, least, largest, slope_least, slope_largest = bounds(
             low, high, d, k, first, last, turn_up, turn_down
         )
@@ -153,7 +153,7 @@ def turns(
         done = slope_least > 0.0 or slope_largest < 0.0
         if below == below_high:
             done = done or least > distance or largest < distance
-        if done or held == len(stack) or high - low <= 1e-14 * high:
+        if done or pending == len(stack) or high - low <= 1e-14 * high:
             if below != below_high and count < len(roots):
                 guess = first_guess(low, high, x_low, x_high, distance, d, first, last, turn_up, turn_down)
                 roots[count, 0], roots[count, 1] = refine(
@@ -161,8 +161,8 @@ def turns(
                 )
                 count += 1
             low, below = high, below_high
-            held -= 1
+            pending -= 1
         else:
-            stack[held] = 0.5 * (low + high)
-            held += 1
+            stack[pending] = 0.5 * (low + high)
+            pending += 1
     return count

@@ -91,7 +91,7 @@ def _water(depth: bytes, speed: bytes, bottom_depth: float) -> Water:
     )
 
 
-def within(water: Water, depth: Floats, what: str) -> Floats:
+def within(water: Water, depth: Floats, name: str) -> Floats:
     """Depths, those within rounding of surface or bottom put on it; raises ValueError naming the first one outside."""
     z = np.asarray(depth, float)
     bottom_depth = water.depth[-1]
@@ -100,7 +100,7 @@ def within(water: Water, depth: Floats, what: str) -> Floats:
     wrong = ~((z >= -TOLERANCE) & (z <= bottom_depth + TOLERANCE))
     if wrong.any():
         i = int(np.argmax(wrong))
-        raise ValueError(f"{what} {i} at depth {z.flat[i]:g} m is not in the water, which is {bottom_depth:g} m deep")
+        raise ValueError(f"{name} {i} at depth {z.flat[i]:g} m is not in the water, which is {bottom_depth:g} m deep")
     return np.asarray(np.clip(z, 0.0, bottom_depth))
 
 

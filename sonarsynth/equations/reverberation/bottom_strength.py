@@ -124,10 +124,10 @@ def _kirchhoff(level: Floats, upright: Floats, k: float, strength: float, bottom
     b = wide ** (0.5 + 0.5 / a) * gamma(1.0 / a) / (2.0 * a)
     structure = 2.0 * np.pi * strength * gamma(2.0 - a) * 2.0 ** (-2.0 * a) / (a * (1.0 - a) * gamma(1.0 + a))
     q = structure * 2.0 ** (1.0 - 2.0 * a) * k ** (2.0 * (1.0 - a))
-    whole = level + upright**2
-    mirrored = np.abs(rayleigh(np.arcsin(np.sqrt(np.minimum(whole, 1.0))), *bottom)) ** 2
+    total = level + upright**2
+    mirrored = np.abs(rayleigh(np.arcsin(np.sqrt(np.minimum(total, 1.0))), *bottom)) ** 2
     below = (level ** (2.0 * a) + wide * q**2 * upright**4) ** ((1.0 + a) / (2.0 * a))
-    shape = np.divide(whole**2 * (1.0 + 100.0 * level**2), below, out=np.zeros_like(whole), where=below > 0.0)
+    shape = np.divide(total**2 * (1.0 + 100.0 * level**2), below, out=np.zeros_like(total), where=below > 0.0)
     return np.asarray(mirrored / (8.0 * np.pi) * b * q * shape)
 
 

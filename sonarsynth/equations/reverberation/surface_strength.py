@@ -65,5 +65,5 @@ def bubbles(angles: Angles, frequency: float, wind_speed: float) -> Floats:
     deep *= (frequency / 25e3) ** 0.85
     beta = deep / np.maximum(sine, 1e-9)
     single = deep * 0.0136 / (4.0 * np.pi * 0.0255 * (frequency / 1e3) ** (1.0 / 3.0))
-    seen = (1.0 + 8.0 * beta * np.exp(-2.0 * beta) - np.exp(-4.0 * beta)) / (2.0 * beta)
-    return np.asarray(np.where(sine > 0.0, single * seen, 0.0))
+    attenuation = (1.0 + 8.0 * beta * np.exp(-2.0 * beta) - np.exp(-4.0 * beta)) / (2.0 * beta)
+    return np.asarray(np.where(sine > 0.0, single * attenuation, 0.0))

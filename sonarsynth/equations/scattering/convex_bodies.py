@@ -86,8 +86,8 @@ def shape_operators(vertices: npt.ArrayLike, faces: Ints) -> Floats:
     corners = points[faces]
     onward, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     lengths = np.sum(onward**2, axis=2) * np.sum(back**2, axis=2)
-    parts = np.cross(onward, back) / np.where(lengths > 0.0, lengths, np.inf)[..., None]
-    sums = [np.bincount(faces.ravel(), parts[..., i].ravel(), len(points)) for i in range(3)]
+    contributions = np.cross(onward, back) / np.where(lengths > 0.0, lengths, np.inf)[..., None]
+    sums = [np.bincount(faces.ravel(), contributions[..., i].ravel(), len(points)) for i in range(3)]
     normal = np.stack(sums, axis=-1)
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     turned = (normal / np.where(size > 0.0, size, 1.0))[faces]

@@ -107,9 +107,9 @@ def _field(cosine: float, m: float, table: Complexes, soft: bool) -> complex:
         xi, late = m * theta, 2.0 * m**3 * (theta + cosine)  # k rho (theta - sin theta)
         if xi >= DARK:
             return 0.0j
-    place = (xi - LIT) / STEP
-    j = int(place)
-    p = place - j
+    position = (xi - LIT) / STEP
+    j = int(position)
+    p = position - j
     w0, w1 = -p * (p - 1.0) * (p - 2.0) / 6.0, (p * p - 1.0) * (p - 2.0) / 2.0
     w2, w3 = -p * (p + 1.0) * (p - 2.0) / 2.0, p * (p * p - 1.0) / 6.0
     value: complex = w0 * table[j] + w1 * table[j + 1] + w2 * table[j + 2] + w3 * table[j + 3]

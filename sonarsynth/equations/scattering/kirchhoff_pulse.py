@@ -71,14 +71,14 @@ def divided_impulse(times: npt.ArrayLike, pulse: Waveform) -> Floats:
     more than a quarter of the pulse's scale by differences, (S[t1, t2] - S[t0, t1])/(t2 - t0); others by Gauss
     quadrature of the derivatives from corner to corner of the pulse. Error under 2e-14 of the largest slope.
     """
-    given = np.asarray(times, float)
-    t = np.sort(given.reshape(-1, 3), axis=1)
+    corner_times = np.asarray(times, float)
+    t = np.sort(corner_times.reshape(-1, 3), axis=1)
     close = t[:, 2] - t[:, 0] < CLOSE * pulse.scale
     out = np.empty(len(t))
     out[close] = _by_slope(t[close], pulse)
     a, b, c = t[~close].T
     out[~close] = (_mean(b, c, pulse) - _mean(a, b, pulse)) / (c - a)
-    return out.reshape(given.shape[:-1])
+    return out.reshape(corner_times.shape[:-1])
 
 
 def _mean(start: Floats, end: Floats, pulse: Waveform) -> Floats:
@@ -118,9 +118,9 @@ def _integral(
     return out
 
 
-def _share(part: Floats, whole: Floats) -> Floats:
+def _share(numerator: Floats, denominator: Floats) -> Floats:
     """part/whole; of nothing a half, which is as good as any other share."""
-    return np.where(whole > 0.0, part / np.where(whole > 0.0, whole, 1.0), 0.5)
+    return np.where(denominator > 0.0, numerator / np.where(denominator > 0.0, denominator, 1.0), 0.5)
 
 
 def snap_waveform(bubble: snap_pressure.Bubble) -> Waveform:

@@ -60,8 +60,8 @@ def lobe_amplitude(
     """
     from sonarsynth.equations.scattering import lobes_kernels
 
-    parts = np.broadcast_shapes(np.shape(incident), np.shape(scattered), np.shape(normal), (*np.shape(area), 1))
-    (a, b, n), shape = _rows(incident, scattered, np.broadcast_to(normal, (*parts[:-1], 3)))
+    vector_shape = np.broadcast_shapes(np.shape(incident), np.shape(scattered), np.shape(normal), (*np.shape(area), 1))
+    (a, b, n), shape = _rows(incident, scattered, np.broadcast_to(normal, (*vector_shape[:-1], 3)))
     size = np.broadcast_to(area, shape).reshape(a.shape[:2])
     out = np.empty(a.shape[:2])
     lobes_kernels.amplitudes(a, b, n, size, slope, share, albedo, beyond, out)

@@ -84,8 +84,8 @@ def sphere_coefficients(ka: npt.ArrayLike, boundary: Boundary = "rigid") -> Comp
     with Q = 1/(density ratio x speed ratio) and B = j_n'/j_n inside. |1 + 2 A_n| = 1: no mode loses energy. Orders go
     up to x + 4.05 x^(1/3) + 12 for the largest x = ka, after Wiscombe (1980), Applied Optics 19, 1505.
     """
-    given = np.asarray(ka, float)
-    x = np.maximum(given.ravel(), TINY)
+    products = np.asarray(ka, float)
+    x = np.maximum(products.ravel(), TINY)
     count = _terms(x)
     j, j1, y, y1 = _spherical(count, x)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -96,7 +96,7 @@ def sphere_coefficients(ka: npt.ArrayLike, boundary: Boundary = "rigid") -> Comp
             u, w = (j1, y1) if boundary == "rigid" else (j, y)
         else:
             raise ValueError(f"boundary of a sphere is 'rigid', 'soft' or Fluid(...), not {boundary!r}")
-    return _coefficient(u, w).reshape(count, *given.shape)
+    return _coefficient(u, w).reshape(count, *products.shape)
 
 
 def cylinder_amplitude(

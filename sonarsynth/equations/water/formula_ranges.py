@@ -66,8 +66,8 @@ class Range:
             farthest = value.flat[np.argmax(np.where(outside, np.maximum(low - value, value - high), -np.inf))]
             quantity = name.replace("_", " ") if name != "ph" else "pH"
             within = f"{_shown(low, unit)} to {_shown(high, unit)}"
-            said = f"{self.formula}: {quantity} {_said(farthest, unit)} is outside {within} {_unit(unit)}"
-            say(said.rstrip(), 3)
+            message = f"{self.formula}: {quantity} {_said(farthest, unit)} is outside {within} {_unit(unit)}"
+            say(message.rstrip(), 3)
 
 
 def _shown(value: float, unit: str) -> str:

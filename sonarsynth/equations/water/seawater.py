@@ -122,9 +122,9 @@ def teos10(
     conservative = gsw.CT_from_t(absolute, t, p)
     outside = np.asarray(gsw.infunnel(absolute, conservative, p)) == 0.0
     if np.any(outside):
-        one = np.flatnonzero(outside)[0]
+        i = np.flatnonzero(outside)[0]
         formula_ranges.say(
-            f"TEOS-10: {t.flat[one]:g} degC with {s.flat[one]:g} psu at {z.flat[one]:g} m is outside the oceanographic "
+            f"TEOS-10: {t.flat[i]:g} degC with {s.flat[i]:g} psu at {z.flat[i]:g} m is outside the oceanographic "
             "funnel (McDougall et al. 2003)"
         )
     return np.asarray(gsw.sound_speed(absolute, conservative, p))
