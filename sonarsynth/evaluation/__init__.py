@@ -81,11 +81,11 @@ def nothing_outside(tree: xr.DataTree, frames: np.ndarray) -> Check:
     of_frames = [every(tree, f"signals/{name}")[frames].reshape(len(frames), -1) for name in ("outside", "clipped")]
     outside, clipped = (int(counts.sum()) for counts in of_frames)
     spoiled = frames[sum(counts.sum(axis=1) for counts in of_frames) > 0]
-    got = f"{outside} arrivals outside, {clipped} samples clipped"
+    result = f"{outside} arrivals outside, {clipped} samples clipped"
     return Check(
         "signals whole",
         "none outside, none clipped",
-        got,
+        result,
         outside + clipped == 0,
         {"outside": outside, "clipped": clipped},
         numbered(spoiled),
@@ -98,9 +98,9 @@ def expansions_hold(tree: xr.DataTree, frames: np.ndarray) -> Check:
     amplitudes = every(tree, "link_budget/amplitude_error")[frames]
     phase, amplitude = float(phases.max()), float(amplitudes.max())
     good_frames = (phases <= EXPANSION_PHASE) & (amplitudes <= EXPANSION_AMPLITUDE)
-    got = f"{phase:.2g} rad at the top of the band, {100 * amplitude:.2g} % of the strongest echo"
+    result = f"{phase:.2g} rad at the top of the band, {100 * amplitude:.2g} % of the strongest echo"
     good = phase <= EXPANSION_PHASE and amplitude <= EXPANSION_AMPLITUDE
     expected = f"under {EXPANSION_PHASE} rad and {100 * EXPANSION_AMPLITUDE:g} %"
     numbers = {"phase_rad": phase, "amplitude": amplitude}
     bad = numbered(frames[~good_frames.reshape(len(frames), -1).all(axis=1)])
-    return Check("wavefronts over the aperture", expected, got, good, numbers, bad)
+    return Check("wavefronts over the aperture", expected, result, good, numbers, bad)

@@ -26,12 +26,12 @@ def near_target(truth: np.ndarray, row: int, column: int, reach: int) -> bool:
     return bool(((rows - row) ** 2 + (columns - column) ** 2 <= reach**2).any())
 
 
-def refused(some: SmallVariables, frame: int) -> bool:
+def refused(block: SmallVariables, frame: int) -> bool:
     """Whether the snap that would be the clock was refused, and says why."""
-    if not some.has("source_estimates/reason"):
+    if not block.has("source_estimates/reason"):
         return False
-    time = some.of("source_estimates/time", frame)[0]
-    return bool(some.of("source_estimates/reason", frame)[0] > 0) and not np.isfinite(time)
+    time = block.of("source_estimates/time", frame)[0]
+    return bool(block.of("source_estimates/reason", frame)[0] > 0) and not np.isfinite(time)
 
 
 GLINT = 10.0
@@ -44,37 +44,37 @@ STANDS_OUT = 2.0
 """Energy of the brightest beam over the median of all, under which it is that of noise."""
 
 
-def on_ghost(some: SmallVariables, frame: int, azimuth: float, elevation: float) -> bool:
+def on_ghost(block: SmallVariables, frame: int, azimuth: float, elevation: float) -> bool:
     """Whether a direction (rad) is where the truth has a ghost of a target, by surface or bottom, no fainter than the
     target's own echoes by more than `GLINT`.
 
     Ghosts are as wide as their target; the truth has the middle of their energy, so they reach that far either way.
     """
-    if not some.has("truth/targets/echo_azimuth"):
+    if not block.has("truth/targets/echo_azimuth"):
         return False
-    at = (np.deg2rad(some.of(f"truth/targets/echo_{axis}", frame)[:, 1:]) for axis in ("azimuth", "elevation"))
-    box = np.deg2rad(some.of("truth/targets/image_box", frame))[:, None]
-    reach = np.nan_to_num(np.stack([box[..., 1] - box[..., 0], box[..., 3] - box[..., 2]])) + beam_width(some.tree)
+    at = (np.deg2rad(block.of(f"truth/targets/echo_{axis}", frame)[:, 1:]) for axis in ("azimuth", "elevation"))
+    box = np.deg2rad(block.of("truth/targets/image_box", frame))[:, None]
+    reach = np.nan_to_num(np.stack([box[..., 1] - box[..., 0], box[..., 3] - box[..., 2]])) + beam_width(block.tree)
     off = np.abs(np.stack([middle - angle for middle, angle in zip(at, (azimuth, elevation), strict=True)]))
-    level = some.of("truth/targets/echo_level", frame)
+    level = block.of("truth/targets/echo_level", frame)
     loud = level[:, 1:] >= np.nan_to_num(level[:, :1], nan=-np.inf) - GLINT
     return bool(((off <= reach).all(axis=0) & loud).any())  # NaN where no echo comes that way
 
 
-def louder_outside(some: SmallVariables, frame: int) -> bool:
+def louder_outside(block: SmallVariables, frame: int) -> bool:
     """Whether a target out of the view of the beams, which lobes show, echoes as loud as any in view, by `GLINT`."""
-    if not some.has("truth/targets/echo_level"):
+    if not block.has("truth/targets/echo_level"):
         return False
-    level = np.nan_to_num(some.of("truth/targets/echo_level", frame)[:, 0], nan=-np.inf)
-    within = np.isin(some.of("truth/targets/view", frame), (View.IN_VIEW, View.PARTLY_IN_VIEW))
+    level = np.nan_to_num(block.of("truth/targets/echo_level", frame)[:, 0], nan=-np.inf)
+    within = np.isin(block.of("truth/targets/view", frame), (View.IN_VIEW, View.PARTLY_IN_VIEW))
     return bool(level[~within].max(initial=-np.inf) > level[within].max(initial=-np.inf) - GLINT)
 
 
-def in_box(some: SmallVariables, frame: int, azimuth: float, elevation: float) -> bool:
+def in_box(block: SmallVariables, frame: int, azimuth: float, elevation: float) -> bool:
     """Whether a direction (rad) is in the image box of a target, or within a beam width of it: no beam may point at
     what little of a target is in view."""
-    box = np.deg2rad(some.of("truth/targets/image_box", frame))
-    width, at = beam_width(some.tree), np.array([azimuth, azimuth, elevation, elevation])
+    box = np.deg2rad(block.of("truth/targets/image_box", frame))
+    width, at = beam_width(block.tree), np.array([azimuth, azimuth, elevation, elevation])
     return bool(((at[[0, 2]] >= box[:, [0, 2]] - width) & (at[[1, 3]] <= box[:, [1, 3]] + width)).all(axis=1).any())
 
 
@@ -89,38 +89,38 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
     azimuth, elevation = (np.deg2rad(every(tree, f"truth/beams/{axis}")) for axis in ("azimuth", "elevation"))
     reach = max(1, round(min(beam_width(tree) / _grid_step(tree), max(len(azimuth), len(elevation)))))
-    hits, ghosts, seen, missed = 0, 0, 0, []
-    for some, i in ((block, i) for block in blocks(tree, frames) for i in block.frames):
+    hits, ghosts, judged, missed = 0, 0, 0, []
+    for block, i in ((b, i) for b in blocks(tree, frames) for i in b.frames):
         energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/beams/target", i)
-        if not ((truth >= 0).any() and echoes_heard(some, i)) or louder_outside(some, i):
+        if not ((truth >= 0).any() and echoes_heard(block, i)) or louder_outside(block, i):
             continue
-        lost = some.has("source_estimates/usable") and not some.of("source_estimates/usable", i)
+        lost = block.has("source_estimates/usable") and not block.of("source_estimates/usable", i)
         if lost or not np.isfinite(energy).any():  # no clock: a miss, unless no snap could be heard or made out
             hit = ghost = False
-            counts = bool(snaps_heard(some, i).any()) and not refused(some, i)
+            counts = bool(snaps_heard(block, i).any()) and not refused(block, i)
         else:
             row, column = map(int, np.unravel_index(np.nanargmax(energy), energy.shape))
-            hit = near_target(truth, row, column, reach) or in_box(some, i, azimuth[column], elevation[row])
+            hit = near_target(truth, row, column, reach) or in_box(block, i, azimuth[column], elevation[row])
             counts = hit or bool(energy[row, column] > STANDS_OUT * np.nanmedian(energy))
-            ghost = not hit and on_ghost(some, i, azimuth[column], elevation[row])
-        seen += counts
+            ghost = not hit and on_ghost(block, i, azimuth[column], elevation[row])
+        judged += counts
         hits += hit
         ghosts += ghost
         if counts and not (hit or ghost):
             missed.append(i)
-    if not seen:
+    if not judged:
         return Check(name, expected, "no target is in view and audible", None, {})
     also, besides = f", on a ghost in {ghosts}" if ghosts else "", " and ".join(other_sounds(tree))
-    warning = f"in {ghosts} of {seen} frames the brightest beam is on a ghost by surface or bottom" if ghosts else ""
+    warning = f"in {ghosts} of {judged} frames the brightest beam is on a ghost by surface or bottom" if ghosts else ""
     if missed and besides:
         also += f", elsewhere in {len(missed)}"
-        warning = f"in {len(missed)} of {seen} frames the brightest beam is on no target; also heard: {besides}"
+        warning = f"in {len(missed)} of {judged} frames the brightest beam is on no target; also heard: {besides}"
     return Check(
         name,
         expected,
-        f"{hits} of {seen} frames{also}",
-        None if missed and besides else hits + ghosts == seen,
-        {"hits": hits, "frames": seen, "ghosts": ghosts},
+        f"{hits} of {judged} frames{also}",
+        None if missed and besides else hits + ghosts == judged,
+        {"hits": hits, "frames": judged, "ghosts": ghosts},
         numbered(missed),
         warning=warning,
     )

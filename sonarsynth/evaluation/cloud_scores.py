@@ -24,9 +24,9 @@ def figures_of(to_surface: Floats, to_point: Floats) -> dict[str, Any]:
     m, of samples of the surface to the nearest point; recall is their share. Chamfer: the mean of one and of the other,
     added. NaN where there is no point, or no surface. Source: Knapitsch et al. (2017), Tanks and Temples, section 4.
     """
-    found: dict[str, Any] = {"points": len(to_surface), "samples": len(to_point)}
+    figures: dict[str, Any] = {"points": len(to_surface), "samples": len(to_point)}
     if not len(to_surface) or not len(to_point):
-        return found | {"chamfer": float("nan"), "by_tolerance": {}}
+        return figures | {"chamfer": float("nan"), "by_tolerance": {}}
     by: dict[str, dict[str, float]] = {}
     for limit in TOLERANCES:
         precision, recall = (float(np.mean(values <= limit)) for values in (to_surface, to_point))
@@ -38,7 +38,7 @@ def figures_of(to_surface: Floats, to_point: Floats) -> dict[str, Any]:
         }
     forth, back = (values[np.isfinite(values)] for values in (to_surface, to_point))  # a frame may lack one of both
     chamfer = float(np.mean(forth) + np.mean(back)) if len(forth) and len(back) else float("nan")
-    return found | {"chamfer": chamfer, "by_tolerance": by}
+    return figures | {"chamfer": chamfer, "by_tolerance": by}
 
 
 def cloud_scores(tree: xr.DataTree, frames: np.ndarray) -> dict[str, Any]:
@@ -50,19 +50,19 @@ def cloud_scores(tree: xr.DataTree, frames: np.ndarray) -> dict[str, Any]:
     """
     to_surface, to_point = [np.zeros(0)], [np.zeros(0)]
     for start in range(0, len(frames), BLOCK):
-        some = frames[start : start + BLOCK]
-        cloud, beams = (tree[name].dataset.isel(frame=some) for name in ("cloud", "truth/beams"))
+        block = frames[start : start + BLOCK]
+        cloud, beams = (tree[name].dataset.isel(frame=block) for name in ("cloud", "truth/beams"))
         azimuth, elevation = np.meshgrid(np.deg2rad(beams["azimuth"].values), np.deg2rad(beams["elevation"].values))
         ahead = direction(azimuth, elevation)
         count = np.maximum(cloud["count"].values, 0)
-        place = np.stack([cloud[axis].values for axis in "xyz"], axis=-1).astype(float)
+        position = np.stack([cloud[axis].values for axis in "xyz"], axis=-1).astype(float)
         own, away, whose = cloud["distance"].values, beams["range"].values, beams["target"].values
-        for row in range(len(some)):
+        for row in range(len(block)):
             met = whose[row] >= 0
             surface = ahead[met] * away[row][met][:, None].astype(float)
-            forth, back = _nearest(place[row, : count[row]], surface)
-            known = own[row, : count[row]]
-            to_surface.append(np.where(np.isfinite(known), known, forth))
+            forth, back = _nearest(position[row, : count[row]], surface)
+            from_mesh = own[row, : count[row]]
+            to_surface.append(np.where(np.isfinite(from_mesh), from_mesh, forth))
             to_point.append(back)
     return figures_of(np.concatenate(to_surface), np.concatenate(to_point))
 

@@ -25,26 +25,26 @@ def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
     They do not where half of them are further off than the target is large and a beam is wide there.
     """
     name, expected = "ranges useful", "reported"
-    found = points(tree, frames)
-    if not found.judged.any():
+    cloud = points(tree, frames)
+    if not cloud.judged.any():
         return Check(name, expected, "no points on a target", None, {})
-    frame, target = found.frame[found.judged], found.target[found.judged].astype(int)
-    each, row = np.unique(frame, return_inverse=True)
-    corners = np.asarray(tree["truth/targets/box"].isel(frame=each).values)
+    frame, target = cloud.frame[cloud.judged], cloud.target[cloud.judged].astype(int)
+    distinct, row = np.unique(frame, return_inverse=True)
+    corners = np.asarray(tree["truth/targets/box"].isel(frame=distinct).values)
     apart = np.linalg.norm(corners[:, :, :, None] - corners[:, :, None, :], axis=-1).max(axis=(2, 3))
     size = apart[row, target]
-    limit = np.fmax(size, beam_width(tree) * found.true_range[found.judged])
-    error, predicted = (np.abs(x[found.judged]) for x in (found.error, found.range_error))
+    limit = np.fmax(size, beam_width(tree) * cloud.true_range[cloud.judged])
+    error, predicted = (np.abs(x[cloud.judged]) for x in (cloud.error, cloud.range_error))
     middle = [float(np.median(x)) for x in (error, predicted, limit)]
     over = error > limit, predicted > limit
     numbers = {"median_m": middle[0], "predicted_m": middle[1], "limit_m": middle[2]}
-    got = (
+    result = (
         f"median error {middle[0]:.2g} m, median predicted {middle[1]:.2g} m; size of target or beam {middle[2]:.2g} m"
     )
     if not any(np.mean(x) > 0.5 for x in over):
-        return Check(name, expected, got, None, numbers)
-    warning = f"ranges carry no information: {got}"
-    return Check(name, expected, got, None, numbers, numbered(np.unique(frame[over[0] | over[1]])), warning)
+        return Check(name, expected, result, None, numbers)
+    warning = f"ranges carry no information: {result}"
+    return Check(name, expected, result, None, numbers, numbered(np.unique(frame[over[0] | over[1]])), warning)
 
 
 def bounds(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
@@ -67,8 +67,8 @@ def warnings(store: Folder | str) -> list[str]:
         with xr.open_datatree(opens(path), engine="zarr", chunks=None) as tree:
             built = np.flatnonzero(np.isfinite(every(tree, "truth/sonar_position")[:, 0]))
             room = tree["cloud"].sizes["point"] if "cloud" in tree.children else 1
-            most = min(FRAMES_REMOTE if isinstance(path, Remote) else FRAMES, max(ROWS // max(room, 1), 1), len(built))
-            frames = built[np.linspace(0, len(built) - 1, most).round().astype(int)]
+            count = min(FRAMES_REMOTE if isinstance(path, Remote) else FRAMES, max(ROWS // max(room, 1), 1), len(built))
+            frames = built[np.linspace(0, len(built) - 1, count).round().astype(int)]
             checks = bounds(tree, frames) + (range_errors(tree, frames) if has_labels(tree) else [])
     except (OSError, KeyError, ValueError):
         return []

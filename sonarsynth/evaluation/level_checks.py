@@ -48,31 +48,31 @@ def link_budget_measured(tree: xr.DataTree, frames: np.ndarray) -> Check:
         every(tree, f"link_budget/{level}")[frames] for level in ("isolated_level", "measured_level")
     )
     predicted = np.where(predicted > FAINTEST, predicted, np.nan)
-    made = np.isfinite(measured).any() or bool(tree.attrs.get("products"))
+    has_signals = np.isfinite(measured).any() or bool(tree.attrs.get("products"))
     count = int(np.isfinite(predicted).sum())
-    if not (made and count):
+    if not (has_signals and count):
         return Check(name, expected, "not measured: no signals were made" if count else "no paths", None, {})
     apart = np.abs(measured - predicted)[np.isfinite(predicted)]
     missing = int((~np.isfinite(apart)).sum())
     worst = float(np.max(apart, initial=0.0, where=np.isfinite(apart)))
-    got = f"{worst:.2g} dB over {count - missing} paths" + (f", {missing} without a level" if missing else "")
+    result = f"{worst:.2g} dB over {count - missing} paths" + (f", {missing} without a level" if missing else "")
     good = worst <= LINK_BUDGET_TOLERANCE and not missing
     bad = np.isfinite(predicted) & ~(np.abs(measured - predicted) <= LINK_BUDGET_TOLERANCE)
     spoiled = numbered(frames[bad.reshape(len(frames), -1).any(axis=1)])
-    return Check(name, expected, got, good, {"worst_db": worst, "paths": count, "missing": missing}, spoiled)
+    return Check(name, expected, result, good, {"worst_db": worst, "paths": count, "missing": missing}, spoiled)
 
 
-def echoes_heard(some: SmallVariables, frame: int) -> bool:
+def echoes_heard(block: SmallVariables, frame: int) -> bool:
     """Whether the link budget, where there is one, has an echo less than INAUDIBLE below the direct snap."""
-    if not some.has("link_budget"):
+    if not block.has("link_budget"):
         return True
-    level = some.of("link_budget/received_level", frame)  # (snap, echo, family), the direct path last
-    echo, direct = (np.max(part, initial=-np.inf, where=np.isfinite(part)) for part in (level[:, :-1], level[:, -1:]))
+    level = block.of("link_budget/received_level", frame)  # (snap, echo, family), the direct path last
+    echo, direct = (np.max(path, initial=-np.inf, where=np.isfinite(path)) for path in (level[:, :-1], level[:, -1:]))
     return bool(echo > direct - INAUDIBLE)
 
 
-def snaps_heard(some: SmallVariables, frame: int) -> np.ndarray:
+def snaps_heard(block: SmallVariables, frame: int) -> np.ndarray:
     """(snap,) whether the snap reaches the array directly, by the link budget where there is one."""
-    if not some.has("link_budget"):
+    if not block.has("link_budget"):
         return np.zeros(0, bool)
-    return np.asarray(some.of("link_budget/paths", frame)[:, -1].sum(axis=1) > 0)
+    return np.asarray(block.of("link_budget/paths", frame)[:, -1].sum(axis=1) > 0)

@@ -45,9 +45,9 @@ class Points:
     @property
     def judged(self) -> np.ndarray:
         """(point,) of a target, directly, in the main lobe, by the right snap: their ranges are claimed to be right."""
-        there = (self.target >= 0) & (self.family == 0) & (self.lit_by == 0)
-        there &= self.origin == ORIGINS.index("main lobe")
-        return np.asarray(there & ~self.strange)
+        direct = (self.target >= 0) & (self.family == 0) & (self.lit_by == 0)
+        direct &= self.origin == ORIGINS.index("main lobe")
+        return np.asarray(direct & ~self.strange)
 
     @property
     def error(self) -> np.ndarray:
@@ -65,16 +65,16 @@ def points(tree: xr.DataTree, frames: Sequence[int] | np.ndarray) -> Points:
     cloud, at = tree["cloud"].dataset, np.asarray(frames)
     names = ("range", "range_error", "true_range", "target", "emission", "family", "lit_by", "origin")
     count = max(MOST_ROWS // max(cloud.sizes["point"], 1), 1)
-    found: dict[str, list[np.ndarray]] = {name: [] for name in ("frame", "row", *names)}
+    chunks: dict[str, list[np.ndarray]] = {name: [] for name in ("frame", "row", *names)}
     for start in range(0, len(at), count):
-        some = at[start : start + count]
-        lists = {name: np.asarray(cloud[name].isel(frame=some).values) for name in names}
+        block = at[start : start + count]
+        lists = {name: np.asarray(cloud[name].isel(frame=block).values) for name in names}
         frame, row = np.nonzero(np.isfinite(lists["range"]))
-        found["frame"].append(some[frame])
-        found["row"].append(row)
+        chunks["frame"].append(block[frame])
+        chunks["row"].append(row)
         for name in names:
-            found[name].append(lists[name][frame, row])
-    columns = {name: np.concatenate(parts) if parts else np.zeros(0) for name, parts in found.items()}
+            chunks[name].append(lists[name][frame, row])
+    columns = {name: np.concatenate(arrays) if arrays else np.zeros(0) for name, arrays in chunks.items()}
     return Points(**columns, clock=_clocks(tree, columns["frame"].astype(int)))
 
 
@@ -82,10 +82,10 @@ def _clocks(tree: xr.DataTree, frames: np.ndarray) -> np.ndarray:
     """The emission (row,) of the first source estimate in frames (row,)."""
     if "source_estimates" not in tree.children or "emission" not in tree["source_estimates"].dataset or not len(frames):
         return np.full(len(frames), UNKNOWN)
-    each, row = np.unique(frames, return_inverse=True)
-    emission = np.asarray(tree["source_estimates"].dataset["emission"].isel(frame=each, estimate=0).values)
-    other = STRANGER if STRANGERS & set(other_sounds(tree)) else UNKNOWN
-    return np.where(emission < 0, other, emission.astype(int))[row]
+    distinct, row = np.unique(frames, return_inverse=True)
+    emission = np.asarray(tree["source_estimates"].dataset["emission"].isel(frame=distinct, estimate=0).values)
+    no_emission = STRANGER if STRANGERS & set(other_sounds(tree)) else UNKNOWN
+    return np.where(emission < 0, no_emission, emission.astype(int))[row]
 
 
 def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
@@ -96,13 +96,13 @@ def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
     name, reported = "range of points on target", "reported"
     if not has_labels(tree):
         return [Check(name, reported, "the points of this store have no labels", None, {})]
-    found = points(tree, frames)
-    numbers: dict[str, float] = {word: int(mask.sum()) for word, mask in kinds(found).items()}
-    numbers |= {"points": int(found.judged.sum()), "off_target": int((~found.judged).sum())}
+    cloud = points(tree, frames)
+    numbers: dict[str, float] = {word: int(mask.sum()) for word, mask in kinds(cloud).items()}
+    numbers |= {"points": int(cloud.judged.sum()), "off_target": int((~cloud.judged).sum())}
     whose = Check("origin of points", reported, _said(numbers), None, numbers, warning=_few(numbers))
-    if not found.judged.any():
+    if not cloud.judged.any():
         return [Check(name, reported, "no points on a target", None, numbers), whose]
-    error, ratio = found.error[found.judged], _ratio(found)[found.judged]
+    error, ratio = cloud.error[cloud.judged], _ratio(cloud)[cloud.judged]
     missed = ~(np.abs(ratio) <= 3.0)
     finite = ratio[np.isfinite(ratio)]
     numbers |= {
@@ -121,39 +121,39 @@ def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
             within + f"{numbers['pull_std']:.2g}",
             bool(missed.sum() <= max(1, OUTLIERS * len(missed))),
             numbers,
-            numbered(np.unique(found.frame[found.judged][missed])),
+            numbered(np.unique(cloud.frame[cloud.judged][missed])),
         ),
         whose,
     ]
 
 
-def _ratio(found: Points) -> np.ndarray:
+def _ratio(cloud: Points) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(found.error / found.range_error)
+        return np.asarray(cloud.error / cloud.range_error)
 
 
-def kinds(found: Points) -> dict[str, np.ndarray]:
+def kinds(cloud: Points) -> dict[str, np.ndarray]:
     """What points are that are not judged: each (point,) in the first that it belongs to."""
-    of = {word: found.origin == number for number, word in enumerate(ORIGINS)}
+    of = {word: cloud.origin == number for number, word in enumerate(ORIGINS)}
     rows = {
         "the snap itself": of["snap itself"],
         "unexplained": of["unexplained"],
-        "lit by another snap": found.strange,
+        "lit by another snap": cloud.strange,
     }
     rows |= {"mirror images": of["mirror image"]}
-    rows |= {f"ghosts by {word}": found.family == n for n, word in enumerate(FAMILIES) if n}
-    rows |= {f"lit by way of {word}": found.lit_by == n for n, word in enumerate(FAMILIES) if n}
+    rows |= {f"ghosts by {word}": cloud.family == n for n, word in enumerate(FAMILIES) if n}
+    rows |= {f"lit by way of {word}": cloud.lit_by == n for n, word in enumerate(FAMILIES) if n}
     rows |= {"in side lobes": of["side lobe"], "in grating lobes": of["grating lobe"]}
-    left = ~found.judged
+    uncounted = ~cloud.judged
     for word, mask in rows.items():
-        rows[word] = mask & left
-        left = left & ~mask
+        rows[word] = mask & uncounted
+        uncounted = uncounted & ~mask
     return rows
 
 
 def _said(numbers: dict[str, float]) -> str:
-    rest = [f"{count:.0f} {word}" for word, count in numbers.items() if count and word not in ("points", "off_target")]
-    off = f", {numbers['off_target']:.0f} off" + (f" ({', '.join(rest)})" if rest else "")
+    why = [f"{count:.0f} {word}" for word, count in numbers.items() if count and word not in ("points", "off_target")]
+    off = f", {numbers['off_target']:.0f} off" + (f" ({', '.join(why)})" if why else "")
     return f"{numbers['points']:.0f} points on target{off if numbers['off_target'] else ''}"
 
 

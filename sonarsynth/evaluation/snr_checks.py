@@ -27,42 +27,42 @@ def signal_to_noise(tree: xr.DataTree, frames: np.ndarray) -> Check:
     name, expected = "signal to noise", f"its parts within {ROUNDING} dB, and the images of what is loud"
     apart, compared, bad = 0.0, 0, list[int]()
     summed = str(dict(tree.attrs.get("choices") or {}).get("beamforming", {}).get("kind", "")) in BY_SUMS
-    for some, i in ((block, i) for block in blocks(tree, frames) for i in block.frames):
-        snr, echo = some.of("truth/targets/snr", i), _pascals(some, i, "echo")
-        rest = [_pascals(some, i, part) for part in PARTS if some.has(f"truth/targets/{part}_energy")]
-        known = 10.0 * np.log10(echo / np.sum(rest, axis=0))
-        worst = float(np.nanmax(np.abs(known - snr), initial=0.0))
+    for block, i in ((b, i) for b in blocks(tree, frames) for i in b.frames):
+        snr, echo = block.of("truth/targets/snr", i), _pascals(block, i, "echo")
+        noises = [_pascals(block, i, part) for part in PARTS if block.has(f"truth/targets/{part}_energy")]
+        ratio = 10.0 * np.log10(echo / np.sum(noises, axis=0))
+        worst = float(np.nanmax(np.abs(ratio - snr), initial=0.0))
         apart = max(apart, worst)
-        whole = not (np.isnan(known) ^ np.isnan(snr)).any()
+        consistent = not (np.isnan(ratio) ^ np.isnan(snr)).any()
         loud = np.flatnonzero(snr > LOUD)
-        if summed and len(loud) == 1 and _alone(some, i) and "image" in tree.children:
+        if summed and len(loud) == 1 and _alone(block, i) and "image" in tree.children:
             n = int(loud[0])
-            whole &= _in_image(tree, i, n, echo[n], [part[n] for part in rest])
+            consistent &= _in_image(tree, i, n, echo[n], [part[n] for part in noises])
             compared += 1
-        if worst > ROUNDING or not whole:
+        if worst > ROUNDING or not consistent:
             bad.append(int(i))
-    got = f"within {apart:.2g} dB" + (f", {compared} images compared" if compared else "")
-    got += f", not in {len(bad)} frames" if bad else ""
-    return Check(name, expected, got, not bad, {"worst_db": apart, "images": compared}, numbered(bad))
+    result = f"within {apart:.2g} dB" + (f", {compared} images compared" if compared else "")
+    result += f", not in {len(bad)} frames" if bad else ""
+    return Check(name, expected, result, not bad, {"worst_db": apart, "images": compared}, numbered(bad))
 
 
-def _pascals(some: SmallVariables, frame: int, part: str) -> Floats:
-    return np.asarray(10.0 ** (some.of(f"truth/targets/{part}_energy", frame) / 10.0 - 12.0))
+def _pascals(block: SmallVariables, frame: int, part: str) -> Floats:
+    return np.asarray(10.0 ** (block.of(f"truth/targets/{part}_energy", frame) / 10.0 - 12.0))
 
 
-def _alone(some: SmallVariables, frame: int) -> bool:
+def _alone(block: SmallVariables, frame: int) -> bool:
     """Whether a frame has one target, and its clock is right."""
-    there = int((some.of("truth/targets/present", frame) == 1).sum())
-    return there == 1 and bool(some.of("source_estimates/usable", frame) == 1)
+    present = int((block.of("truth/targets/present", frame) == 1).sum())
+    return present == 1 and bool(block.of("source_estimates/usable", frame) == 1)
 
 
-def _in_image(tree: xr.DataTree, frame: int, target: int, echo: float, rest: list[float]) -> bool:
+def _in_image(tree: xr.DataTree, frame: int, target: int, echo: float, noises: list[float]) -> bool:
     """Whether the energy of an image in the beams of a target may be that of its parts, whatever their phases."""
-    mine = of_frame(tree, "truth/beams/target", frame) == target
-    energy = of_frame(tree, "image/energy", frame)[mine]
-    if not mine.any() or not np.isfinite(energy).all():
+    on_target = of_frame(tree, "truth/beams/target", frame) == target
+    energy = of_frame(tree, "image/energy", frame)[on_target]
+    if not on_target.any() or not np.isfinite(energy).all():
         return True
-    beside = float(np.sqrt(rest).sum())
+    beside = float(np.sqrt(noises).sum())
     low, high = max(np.sqrt(echo) - beside, 0.0) ** 2, (np.sqrt(echo) + beside) ** 2
     margin = 10.0 ** (MARGIN / 10.0)
     return bool(low / margin <= energy.sum() <= high * margin)

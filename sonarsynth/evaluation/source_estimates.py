@@ -65,83 +65,83 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     if "emission" not in tree["source_estimates"].dataset:
         return Check(NAME, EXPECTED, "not in this store", None, {})
     tally = _Tally()
-    for some in blocks(tree, frames):
-        for i in some.frames:
-            _frame(some, int(i), tally)
+    for block in blocks(tree, frames):
+        for i in block.frames:
+            _frame(block, int(i), tally)
     if not tally.rows:
-        got = f"none of {tally.unheard} found" if tally.unheard else "no snap reaches the array"
-        return Check(NAME, EXPECTED, got, None, {"found": 0}, numbered(sorted(tally.frames)), _warning(tally))
+        result = f"none of {tally.unheard} found" if tally.unheard else "no snap reaches the array"
+        return Check(NAME, EXPECTED, result, None, {"found": 0}, numbered(sorted(tally.frames)), _warning(tally))
     if not (tally.strays or any(tally.within.values())):
-        got = f"none of {tally.unheard} found, {tally.strangers} of other snaps"
-        return Check(NAME, EXPECTED, got, None, {"found": tally.rows}, (), _warning(tally))
+        result = f"none of {tally.unheard} found, {tally.strangers} of other snaps"
+        return Check(NAME, EXPECTED, result, None, {"found": tally.rows}, (), _warning(tally))
     shares = {name: float(np.mean(good + [False] * tally.strays)) for name, good in tally.within.items() if good}
     worst = min(shares, key=lambda name: shares[name]) if shares else "position"
     good = bool(shares) and shares[worst] >= SHARE
     places, numbers = tally.within["position"], {f"{name}_share": share for name, share in shares.items()}
     median = float(np.median(tally.misses)) if tally.misses else float("nan")
-    got = f"{sum(places)} of {len(places) + tally.strays}, median error {median:.3g} m"
+    result = f"{sum(places)} of {len(places) + tally.strays}, median error {median:.3g} m"
     if not good and worst != "position":
-        got += f"; {worst} in {100 * shares.get(worst, 0.0):.3g} %"
+        result += f"; {worst} in {100 * shares.get(worst, 0.0):.3g} %"
     if tally.strangers:
-        got += f"; {tally.strangers} of other snaps"
+        result += f"; {tally.strangers} of other snaps"
     if tally.strays:
-        got += f"; {tally.strays} match no snap"
+        result += f"; {tally.strays} match no snap"
     numbers |= {"good": sum(places), "found": tally.rows, "median_m": median, "strays": tally.strays}
-    return Check(NAME, EXPECTED, got, good, numbers, numbered(sorted(tally.frames)), _warning(tally))
+    return Check(NAME, EXPECTED, result, good, numbers, numbered(sorted(tally.frames)), _warning(tally))
 
 
-def _frame(some: SmallVariables, i: int, tally: _Tally) -> None:
-    rows = some.tree["source_estimates"].dataset.data_vars.items()
+def _frame(block: SmallVariables, i: int, tally: _Tally) -> None:
+    rows = block.tree["source_estimates"].dataset.data_vars.items()
     names = [str(name) for name, variable in rows if "estimate" in variable.dims]
-    column = {name: some.of(f"source_estimates/{name}", i) for name in names}
-    found = np.flatnonzero(np.isfinite(column["time"]))
-    reached = int(snaps_heard(some, i).sum())
-    tally.rows += len(found)
-    missing = max(reached - len(set(column["emission"][found]) - {-1}), 0)
+    column = {name: block.of(f"source_estimates/{name}", i) for name in names}
+    estimates = np.flatnonzero(np.isfinite(column["time"]))
+    reached = int(snaps_heard(block, i).sum())
+    tally.rows += len(estimates)
+    missing = max(reached - len(set(column["emission"][estimates]) - {-1}), 0)
     if missing:
         tally.unheard += missing
         tally.frames.add(i)
         refused = [REASONS[n] for n in column["reason"] if n not in (ACCEPTED, PLACELESS)]
         tally.reasons.update(refused[:missing])
-    truth = {name: some.of(f"truth/emissions/{name}", i) for name in ("arrival", "azimuth", "elevation", "position")}
-    pose = Pose(some.of("truth/sonar_position", i), some.of("truth/sonar_orientation", i))
+    truth = {name: block.of(f"truth/emissions/{name}", i) for name in ("arrival", "azimuth", "elevation", "position")}
+    pose = Pose(block.of("truth/sonar_position", i), block.of("truth/sonar_orientation", i))
     true = pose.to_body(truth["position"])
-    for row in found:
+    for row in estimates:
         emission = int(column["emission"][row])
         if emission < 0:
-            tally.add_stray(i, bool(STRANGERS & set(other_sounds(some.tree))))
+            tally.add_stray(i, bool(STRANGERS & set(other_sounds(block.tree))))
             continue
-        one = {name: values[row] for name, values in column.items()}
-        turned = (one["azimuth"] - truth["azimuth"][emission] + 180.0) % 360.0 - 180.0
-        raised = one["elevation"] - truth["elevation"][emission]
+        estimate = {name: values[row] for name, values in column.items()}
+        turned = (estimate["azimuth"] - truth["azimuth"][emission] + 180.0) % 360.0 - 180.0
+        raised = estimate["elevation"] - truth["elevation"][emission]
         within = {
-            "azimuth": bool(abs(turned) <= 3 * one["azimuth_error"]),
-            "elevation": bool(abs(raised) <= 3 * one["elevation_error"]),
-            "time": bool(abs(one["time"] - truth["arrival"][emission]) <= 3 * one["time_error"]),
+            "azimuth": bool(abs(turned) <= 3 * estimate["azimuth_error"]),
+            "elevation": bool(abs(raised) <= 3 * estimate["elevation_error"]),
+            "time": bool(abs(estimate["time"] - truth["arrival"][emission]) <= 3 * estimate["time_error"]),
         }
-        if np.isfinite(one["position"]).all():
-            error = one["position"] - true[emission]
+        if np.isfinite(estimate["position"]).all():
+            error = estimate["position"] - true[emission]
             tally.misses.append(float(np.linalg.norm(error)))
-            within["position"] = bool(error @ np.linalg.solve(one["position_covariance"], error) <= NEAR)
+            within["position"] = bool(error @ np.linalg.solve(estimate["position_covariance"], error) <= NEAR)
         tally.add(i, within)
-        tally.useless += _useless(some.tree, one)
+        tally.useless += _useless(block.tree, estimate)
 
 
-def _useless(tree: xr.DataTree, one: dict[str, np.ndarray]) -> bool:
+def _useless(tree: xr.DataTree, row: dict[str, np.ndarray]) -> bool:
     """Whether the predicted errors of an estimate are as large as what it says."""
     bandwidth = float(tree.attrs["band_high"] - tree.attrs["band_low"])
-    spread = float(np.sqrt(max(np.trace(one["position_covariance"]), 0.0)))
-    turned = np.deg2rad(np.hypot(one["azimuth_error"] * np.cos(np.deg2rad(one["elevation"])), one["elevation_error"]))
-    placed = spread <= USELESS_RANGE * float(np.linalg.norm(one["position"]))  # not where there is none
-    return not (placed and turned <= beam_width(tree) and one["time_error"] <= 1.0 / bandwidth)
+    spread = float(np.sqrt(max(np.trace(row["position_covariance"]), 0.0)))
+    turned = np.deg2rad(np.hypot(row["azimuth_error"] * np.cos(np.deg2rad(row["elevation"])), row["elevation_error"]))
+    placed = spread <= USELESS_RANGE * float(np.linalg.norm(row["position"]))  # not where there is none
+    return not (placed and turned <= beam_width(tree) and row["time_error"] <= 1.0 / bandwidth)
 
 
 def _warning(tally: _Tally) -> str:
     """What is honest, and of no use."""
-    said = []
+    warnings = []
     if tally.unheard:
         why = ", ".join(f"{name} {count}" for name, count in tally.reasons.most_common(3))
-        said.append(f"{tally.unheard} snaps that reach the array were not located" + (f" ({why})" if why else ""))
+        warnings.append(f"{tally.unheard} snaps that reach the array were not located" + (f" ({why})" if why else ""))
     if tally.useless:
-        said.append(f"{tally.useless} of {tally.rows} estimates are useless: their predicted errors are too large")
-    return "; ".join(said)
+        warnings.append(f"{tally.useless} of {tally.rows} estimates are useless: their predicted errors are too large")
+    return "; ".join(warnings)

@@ -22,23 +22,23 @@ def labels_of_targets(tree: xr.DataTree, frames: np.ndarray) -> Check:
     wrong: dict[str, list[int]] = {"oriented boxes": [], "boxes in view": [], "numbers of points": []}
     counted = "points" in tree["truth/targets"].dataset
     azimuth, elevation = (np.asarray(tree[f"truth/beams/{axis}"].values) for axis in ("azimuth", "elevation"))
-    for some in blocks(tree, frames):
-        for i in some.frames:
-            of = {str(v): some.of(f"truth/targets/{v}", i) for v in _READ}
-            there = of["view"] >= 0
-            if not _boxes_agree({v: values[there] for v, values in of.items()}):
+    for block in blocks(tree, frames):
+        for i in block.frames:
+            of = {str(v): block.of(f"truth/targets/{v}", i) for v in _READ}
+            present = of["view"] >= 0
+            if not _boxes_agree({v: values[present] for v, values in of.items()}):
                 wrong["oriented boxes"].append(i)
-            if not _views_agree({v: values[there] for v, values in of.items()}, azimuth, elevation):
+            if not _views_agree({v: values[present] for v, values in of.items()}, azimuth, elevation):
                 wrong["boxes in view"].append(i)
             if counted:
-                points, whose = some.of("truth/targets/points", i), some.of("cloud/target", i)
-                each = [int((whose == target).sum()) for target in range(len(points))]
-                if (whose >= len(points)).any() or (each != np.maximum(points, 0)).any():
+                points, whose = block.of("truth/targets/points", i), block.of("cloud/target", i)
+                counts = [int((whose == target).sum()) for target in range(len(points))]
+                if (whose >= len(points)).any() or (counts != np.maximum(points, 0)).any():
                     wrong["numbers of points"].append(i)
-    bad = {what: len(which) for what, which in wrong.items() if which}
-    got = "all agree" if not bad else ", ".join(f"{what} in {n} frames do not" for what, n in bad.items())
+    bad = {kind: len(which) for kind, which in wrong.items() if which}
+    result = "all agree" if not bad else ", ".join(f"{kind} in {n} frames do not" for kind, n in bad.items())
     missed = np.unique(np.concatenate([np.zeros(0, int), *map(np.asarray, wrong.values())]).astype(int))
-    return Check(name, expected, got, not bad, {what: len(which) for what, which in wrong.items()}, numbered(missed))
+    return Check(name, expected, result, not bad, {kind: len(which) for kind, which in wrong.items()}, numbered(missed))
 
 
 _READ = (
@@ -57,17 +57,17 @@ def _boxes_agree(of: dict[str, np.ndarray]) -> bool:
 
 def _views_agree(of: dict[str, np.ndarray], azimuth: np.ndarray, elevation: np.ndarray) -> bool:
     box, pixels, view, cut = of["image_box"], of["pixel_box"], of["view"], of["truncation"]
-    seen = view <= 1  # in view, or partly
-    if not ((np.isnan(box).any(axis=1) == ~seen).all() and (of["in_view"][seen] == 1).all()):
+    in_view = view <= 1  # in view, or partly
+    if not ((np.isnan(box).any(axis=1) == ~in_view).all() and (of["in_view"][in_view] == 1).all()):
         return False
     if not ((cut[view == 0] == 0.0).all() and (cut[(view == 2) | (view == 3)] == 1.0).all()):
         return False
-    whole, outward = of["full_box"][seen], np.array([-1.0, 1.0, -1.0, 1.0])
-    if not (outward * (whole - box[seen]) >= -ROUNDING).all():
+    full_box, outward = of["full_box"][in_view], np.array([-1.0, 1.0, -1.0, 1.0])
+    if not (outward * (full_box - box[in_view]) >= -ROUNDING).all():
         return False
     for angles, columns, sides in ((azimuth, [0, 1], [0, 2]), (elevation, [2, 3], [1, 3])):
         if len(angles) > 1:
-            at = np.interp(box[seen][:, columns], angles, np.arange(len(angles)) + 0.5)
-            if not (np.abs(at - pixels[seen][:, sides]) <= 1e-6).all():
+            at = np.interp(box[in_view][:, columns], angles, np.arange(len(angles)) + 0.5)
+            if not (np.abs(at - pixels[in_view][:, sides]) <= 1e-6).all():
                 return False
     return True

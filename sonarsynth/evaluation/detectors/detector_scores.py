@@ -72,11 +72,11 @@ class DetectorReport:
         that names categories, the mean over them."""
         if not self.classifies:
             return self._precision(matched, wanted, np.ones(len(self.detections), bool))
-        each = [
+        precisions = [
             self._precision(matched, wanted & (self.objects.category == n), self.detections.category == n)
             for n in np.unique(self.objects.category[wanted])
         ]
-        return float(np.mean(each)) if each else float("nan")
+        return float(np.mean(precisions)) if precisions else float("nan")
 
     def _precision(self, matched: Ints, wanted: np.ndarray, own: np.ndarray) -> float:
         judged = own & ((matched < 0) | np.append(wanted, False)[matched])
@@ -129,9 +129,9 @@ class DetectorReport:
         for name, (unit, edges) in EDGES.items():
             values = getattr(of, name)
             last = len(edges) - 2  # its upper limit belongs to it
-            place = np.minimum(np.searchsorted(edges, values, "right") - 1, last)
-            place = np.where(np.isfinite(values), place, -1)
-            yield name, _held((_said(low, high, unit), place == n) for n, (low, high) in enumerate(pairwise(edges)))
+            interval = np.minimum(np.searchsorted(edges, values, "right") - 1, last)
+            interval = np.where(np.isfinite(values), interval, -1)
+            yield name, _held((_said(low, high, unit), interval == n) for n, (low, high) in enumerate(pairwise(edges)))
 
 
 def _held(groups: Iterator[tuple[str, np.ndarray]]) -> list[tuple[str, np.ndarray]]:
@@ -180,18 +180,18 @@ def evaluate(
         raise FieldError(("detections",), f"frame {unbuilt[0]} was not built")
     names = tuple(category_names(tree))
     if len(unknown := detections.category[detections.category >= len(names)]):
-        known = ", ".join(f"{number} {name}" for number, name in enumerate(names, 1))
-        raise FieldError(("detections",), f"category_id {unknown[0] + 1} is not in the store, which has {known}")
-    found = _with_angles(tree, detections.take(np.isin(detections.frame, frames)))
-    return DetectorReport(len(frames), names, found, objects)
+        listed = ", ".join(f"{number} {name}" for number, name in enumerate(names, 1))
+        raise FieldError(("detections",), f"category_id {unknown[0] + 1} is not in the store, which has {listed}")
+    judged = _with_angles(tree, detections.take(np.isin(detections.frame, frames)))
+    return DetectorReport(len(frames), names, judged, objects)
 
 
 def _with_angles(tree: xr.DataTree, detections: Detections) -> Detections:
     """Directions of those that say none: of the middle of the box."""
     grid = tree["truth/beams"].dataset
-    found = {}
+    directions = {}
     for n, name in enumerate(("azimuth", "elevation")):
         own = getattr(detections, name)
         middle = angle_at(0.5 * (detections.box[:, n] + detections.box[:, n + 2]), np.asarray(grid[name].values))
-        found[name] = np.where(np.isfinite(own), own, middle)
-    return replace(detections, **found)
+        directions[name] = np.where(np.isfinite(own), own, middle)
+    return replace(detections, **directions)

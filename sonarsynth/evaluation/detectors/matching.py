@@ -14,9 +14,9 @@ Closeness = Callable[[Detections, TrueObjects, Ints, Ints], Floats]
 """(detection, object) of some rows of one frame: the higher, the closer."""
 
 
-def overlap(detections: Detections, objects: TrueObjects, some: Ints, others: Ints) -> Floats:
+def overlap(detections: Detections, objects: TrueObjects, rows: Ints, others: Ints) -> Floats:
     """Intersection over union of boxes; 0 where a detection has none."""
-    a, b = detections.box[some][:, None], objects.box[others][None]
+    a, b = detections.box[rows][:, None], objects.box[others][None]
     sides = np.minimum(a[..., 2:], b[..., 2:]) - np.maximum(a[..., :2], b[..., :2])
     both = np.maximum(sides, 0.0).prod(axis=-1)
     area = [(box[..., 2:] - box[..., :2]).prod(axis=-1) for box in (a, b)]
@@ -24,12 +24,12 @@ def overlap(detections: Detections, objects: TrueObjects, some: Ints, others: In
     return np.asarray(np.nan_to_num(np.divide(both, union, out=np.zeros_like(both), where=union > 0.0)))
 
 
-def nearness(detections: Detections, objects: TrueObjects, some: Ints, others: Ints) -> Floats:
+def nearness(detections: Detections, objects: TrueObjects, rows: Ints, others: Ints) -> Floats:
     """Minus the distance (m) of the middles; of a detection without a range, across the line of sight at the range of
     the object."""
     far = objects.range[others][None]
-    away = np.where(np.isfinite(detections.range[some])[:, None], detections.range[some][:, None], far)
-    ours = away[..., None] * _directions(detections.azimuth[some], detections.elevation[some])[:, None]
+    away = np.where(np.isfinite(detections.range[rows])[:, None], detections.range[rows][:, None], far)
+    ours = away[..., None] * _directions(detections.azimuth[rows], detections.elevation[rows])[:, None]
     true = far[..., None] * _directions(objects.azimuth[others], objects.elevation[others])[None]
     return np.asarray(np.nan_to_num(-np.linalg.norm(ours - true, axis=-1), nan=-np.inf))
 
@@ -47,19 +47,19 @@ def match(detections: Detections, objects: TrueObjects, closeness: Closeness, le
     names a category takes objects of that category alone. Source: Lin et al. (2014), Microsoft COCO, and its
     evaluation code.
     """
-    found = np.full((len(least), len(detections)), -1)
-    for some, others in _frames(detections, objects):
-        close = closeness(detections, objects, some, others)
-        said, true = detections.category[some][:, None], objects.category[others][None]
-        close = np.where((said < 0) | (said == true), close, -np.inf)
+    matched = np.full((len(least), len(detections)), -1)
+    for rows, others in _frames(detections, objects):
+        close = closeness(detections, objects, rows, others)
+        named, true = detections.category[rows][:, None], objects.category[others][None]
+        close = np.where((named < 0) | (named == true), close, -np.inf)
         for n, limit in enumerate(least):
             free = close.copy()
-            for row in range(len(some)):
+            for row in range(len(rows)):
                 best = int(free[row].argmax())
                 if free[row, best] >= limit:
-                    found[n, some[row]] = others[best]
+                    matched[n, rows[row]] = others[best]
                     free[:, best] = -np.inf
-    return found
+    return matched
 
 
 def _frames(detections: Detections, objects: TrueObjects) -> Iterator[tuple[Ints, Ints]]:

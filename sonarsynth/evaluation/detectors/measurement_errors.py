@@ -21,16 +21,16 @@ def measurement_errors(detections: Detections, objects: TrueObjects, matched: In
     matched: (detection,) the object of each, -1 for none.
     """
     rows = np.flatnonzero(matched >= 0)
-    found: dict[str, Any] = {}
+    errors: dict[str, Any] = {}
     for name, unit in QUANTITIES.items():
         error = getattr(detections, name)[rows] - getattr(objects, name)[matched[rows]]
         if name == "azimuth":
             error = (error + 180.0) % 360.0 - 180.0  # 359 deg is 1 deg from 0
-        found[name] = _figures(error, unit) | _calibration(error, getattr(detections, f"{name}_error")[rows])
+        errors[name] = _figures(error, unit) | _calibration(error, getattr(detections, f"{name}_error")[rows])
     ranged = rows[np.isfinite(detections.range[rows])]
     apart = np.array([-nearness(detections, objects, rows[None], matched[rows][None]).item() for rows in ranged])
-    found["position"] = _figures(apart, "m")
-    return found
+    errors["position"] = _figures(apart, "m")
+    return errors
 
 
 def _figures(error: Floats, unit: str) -> dict[str, Any]:
@@ -48,12 +48,12 @@ def _figures(error: Floats, unit: str) -> dict[str, Any]:
 
 def _calibration(error: Floats, predicted: Floats) -> dict[str, Any]:
     """Errors over those predicted; nothing where none are."""
-    there = np.isfinite(error) & (predicted > 0.0)
-    if not there.any():
+    has_both = np.isfinite(error) & (predicted > 0.0)
+    if not has_both.any():
         return {}
-    ratio = error[there] / predicted[there]
+    ratio = error[has_both] / predicted[has_both]
     return {
-        "predicted": int(there.sum()),
+        "predicted": int(has_both.sum()),
         "share_within_1": float(np.mean(np.abs(ratio) <= 1.0)),
         "share_within_3": float(np.mean(np.abs(ratio) <= 3.0)),
         "pull_std": float(ratio.std()),

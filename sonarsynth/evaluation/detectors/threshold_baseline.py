@@ -22,18 +22,18 @@ MOST: Final = 200
 def threshold_lines(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     """What a threshold reaches in frames that were built, in words, with a warning where that is all there is to find;
     nothing without images or objects."""
-    some = frames[np.linspace(0, len(frames) - 1, min(len(frames), MOST)).astype(int)]
-    objects = true_objects(tree, some)
+    used = frames[np.linspace(0, len(frames) - 1, min(len(frames), MOST)).astype(int)]
+    objects = true_objects(tree, used)
     if "image" not in tree.children or not len(objects):
         return []
     peaks = by_kind("peaks")
     rows = [
-        {"frame": frame, **one} for frame, view in views(tree, some) for one in detections_of(view, peaks.regions(view))
+        {"frame": frame, **row} for frame, view in views(tree, used) for row in detections_of(view, peaks.regions(view))
     ]
-    report = DetectorReport(len(some), tuple(category_names(tree)), from_rows(rows), objects)
+    report = DetectorReport(len(used), tuple(category_names(tree)), from_rows(rows), objects)
     reached = float(report.as_json()["ap_2m"])
-    said = f"a threshold reaches an average precision of {reached:.2f} (at 2 m, {len(objects)} objects"
+    precision = f"a threshold reaches an average precision of {reached:.2f} (at 2 m, {len(objects)} objects"
     snr = objects.snr[np.isfinite(objects.snr)]
-    known = f", snr {snr.min():.0f} to {snr.max():.0f} dB" if len(snr) else ""
-    lines = [f"{said} in {len(some)} frames{known})"]
+    ratios = f", snr {snr.min():.0f} to {snr.max():.0f} dB" if len(snr) else ""
+    lines = [f"{precision} in {len(used)} frames{ratios})"]
     return [*lines, "warning: there is little to learn from this dataset"] if reached > TRIVIAL else lines

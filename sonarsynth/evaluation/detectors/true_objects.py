@@ -59,17 +59,17 @@ def category_names(tree: xr.DataTree) -> list[str]:
 
 def true_objects(tree: xr.DataTree, frames: np.ndarray) -> TrueObjects:
     """The objects of some frames."""
-    parts = [_some(tree, frames[start : start + BLOCK]) for start in range(0, max(len(frames), 1), BLOCK)]
+    blocks = [_some(tree, frames[start : start + BLOCK]) for start in range(0, max(len(frames), 1), BLOCK)]
     names = [field.name for field in fields(TrueObjects)]
-    return TrueObjects(**{name: np.concatenate([part[name] for part in parts]) for name in names})
+    return TrueObjects(**{name: np.concatenate([block[name] for block in blocks]) for name in names})
 
 
 def _some(tree: xr.DataTree, frames: np.ndarray) -> dict[str, np.ndarray]:
     targets = tree["truth/targets"].dataset.isel(frame=frames)
     of = {name: np.asarray(targets[name].values) for name in _OF_TARGETS}
-    there = (of["present"] == 1) & (of["clutter"] == 0)
-    there &= np.isin(of["view"], (View.IN_VIEW, View.PARTLY_IN_VIEW)) & np.isfinite(of["pixel_box"]).all(axis=-1)
-    row, slot = np.nonzero(there)
+    wanted = (of["present"] == 1) & (of["clutter"] == 0)
+    wanted &= np.isin(of["view"], (View.IN_VIEW, View.PARTLY_IN_VIEW)) & np.isfinite(of["pixel_box"]).all(axis=-1)
+    row, slot = np.nonzero(wanted)
     of = {name: values[row, slot] for name, values in of.items()}
     centre, away = of["box_centre"], np.linalg.norm(of["box_centre"], axis=1)
     ahead = np.array([[1.0, 0.0, 0.0]])
@@ -93,17 +93,17 @@ def _some(tree: xr.DataTree, frames: np.ndarray) -> dict[str, np.ndarray]:
 
 def _over_median(tree: xr.DataTree, frames: np.ndarray, row: Ints, box: Floats) -> Floats:
     """dB of the brightest beam in each box over the median of its image; NaN without an image."""
-    found = np.full(len(row), np.nan)
+    contrast = np.full(len(row), np.nan)
     if "image" not in tree.children or not len(row):
-        return found
+        return contrast
     energy = np.asarray(tree["image"].dataset["energy"].isel(frame=frames).values)
     first = np.floor(box[:, :2]).astype(int)
     stop = np.maximum(np.ceil(box[:, 2:]).astype(int), first + 1)
     for n, (at, (x0, y0), (x1, y1)) in enumerate(zip(row, first, stop, strict=True)):
-        own, every = (some[np.isfinite(some)] for some in (energy[at, y0:y1, x0:x1], energy[at]))
+        own, every = (pixels[np.isfinite(pixels)] for pixels in (energy[at, y0:y1, x0:x1], energy[at]))
         if own.size and np.median(every) > 0.0:
-            found[n] = 10.0 * np.log10(own.max() / np.median(every))
-    return found
+            contrast[n] = 10.0 * np.log10(own.max() / np.median(every))
+    return contrast
 
 
 def as_detections(objects: TrueObjects) -> Detections:

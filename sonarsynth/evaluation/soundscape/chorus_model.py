@@ -71,9 +71,9 @@ class ChorusModel:
         flat, away = np.asarray(sine, float).ravel(), np.maximum(np.abs(np.asarray(sine, float)).ravel(), 1e-12)
         length = self.climb[:, None] / away
         far = length * np.sqrt(1.0 - np.minimum(away, 1.0) ** 2)
-        there = (far <= self.reach.reach * (1.0 + 1e-9)) & (np.sign(flat) == -self.heights.turns[:, None])
-        left = self.share(far[0], length) * 10.0 ** (-absorption * length / 10.0)
-        return np.asarray(2.0 * np.pi * np.where(there, left, 0.0).sum(axis=0) / away).reshape(np.shape(sine))
+        arrives = (far <= self.reach.reach * (1.0 + 1e-9)) & (np.sign(flat) == -self.heights.turns[:, None])
+        intensity = self.share(far[0], length) * 10.0 ** (-absorption * length / 10.0)
+        return np.asarray(2.0 * np.pi * np.where(arrives, intensity, 0.0).sum(axis=0) / away).reshape(np.shape(sine))
 
     def in_front(self, sine: Floats) -> Floats:
         """Share (...) of the azimuths, at sines (...) of the elevation, from which sound comes before the array."""
@@ -99,12 +99,12 @@ class ChorusModel:
         """|S|^2 (bin,) in s^2 of snaps of 1 Pa behind the filter, the mean over their widths."""
         sonar, model = self.receiver.sonar, self.model
         samples = self.samples
-        found = []
+        spectra = []
         for width in self.chorus.widths.tolist():
             f, spectrum = pulse_spectrum(waveform(model, width), sonar.antialias, sonar.sampling_frequency, samples)
-            found.append(np.abs(spectrum) ** 2)
+            spectra.append(np.abs(spectrum) ** 2)
         peak = model.pulse(0.0, 0.0).peak
-        return np.asarray(np.interp(frequency, f, np.mean(found, axis=0)) / peak**2)
+        return np.asarray(np.interp(frequency, f, np.mean(spectra, axis=0)) / peak**2)
 
     @property
     def pulse_duration(self) -> float:
@@ -156,9 +156,9 @@ class ChorusModel:
         x, w = np.polynomial.legendre.leggauss(DISTANCES)
         rho, area = [], []
         for low, high in pairwise(self.reach.edges.tolist()):
-            some = np.exp(0.5 * np.log(low * high) + 0.5 * np.log(high / low) * x)
-            rho.append(some)
-            area.append(np.pi * np.log(high / low) * w * some**2)
+            nodes = np.exp(0.5 * np.log(low * high) + 0.5 * np.log(high / low) * x)
+            rho.append(nodes)
+            area.append(np.pi * np.log(high / low) * w * nodes**2)
         away = np.concatenate(rho)
         length = np.maximum(np.hypot(away, self.climb[:, None]), CAVITY)
         share = self.share(away, length)
@@ -201,8 +201,8 @@ class ChorusModel:
         """Energy (bin,) of paths by the sine of the elevation, over that of a snap at 1 m, between edges (bin + 1,),
         behind the baffle."""
         absorption = float(self.plan.absorption(self.receiver.centre))
-        each = partial(self.power, absorption, behind=self.receiver.sonar.behind**2)
-        return np.array([seconds * self.chorus.rate * each(a, b) for a, b in pairwise(edges.tolist())])
+        energy = partial(self.power, absorption, behind=self.receiver.sonar.behind**2)
+        return np.array([seconds * self.chorus.rate * energy(a, b) for a, b in pairwise(edges.tolist())])
 
     def counts(self, edges: Floats, seconds: float, level: float) -> Floats:
         """Number (bin,) of paths whose peak at the centre, behind the baffle and before any filter, is above a level

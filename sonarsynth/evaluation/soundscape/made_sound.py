@@ -46,12 +46,12 @@ def listening_plan(recipe: Recipe, seconds: float = 1.0) -> Plan:
             "the recipe has neither scene.world.chorus nor scene.world.environment.noise: there is no soundscape"
         )
     array = elements(sonar.array)
-    some = listeners(array, np.ones(array.count, bool))
-    if (whole := seconds * sonar.sampling_frequency * len(some)) > MOST_SAMPLES:
+    used = listeners(array, np.ones(array.count, bool))
+    if (total := seconds * sonar.sampling_frequency * len(used)) > MOST_SAMPLES:
         raise NothingHeard(
-            f"{seconds:g} s at {len(some)} hydrophones are {whole:.3g} samples, more than {MOST_SAMPLES:.3g}: make less"
+            f"{seconds:g} s at {len(used)} hydrophones are {total:.3g} samples, more than {MOST_SAMPLES:.3g}: make less"
         )
-    table = PositionTable(positions=tuple(map(tuple, array.position[some].tolist())), face=array.face)
+    table = PositionTable(positions=tuple(map(tuple, array.position[used].tolist())), face=array.face)
     scene = replace(scene, sonar=replace(sonar, array=table, sensor_errors=None), world=replace(world, targets=()))
     alone = Recipe(seed=recipe.seed, accuracy=recipe.accuracy, scene=scene)
     profile = read_inputs(scene)
@@ -83,21 +83,21 @@ def made_sound(plan: Plan, first: Frame, seconds: float) -> Sound:
             inside = arrivals.select((arrivals.delay >= 0.0) & (arrivals.delay < long))
             sines.append(first.sonar_pose.turn_to_world(inside.direction)[:, 2])
             energies.append(inside.gain**2 * 10.0 ** (-inside.absorption / 10.0))
-    known = ArrivalElevations(np.concatenate(sines), np.concatenate(energies), None, count * long) if sines else None
+    angles = ArrivalElevations(np.concatenate(sines), np.concatenate(energies), None, count * long) if sines else None
     return Sound(
         pressure=pressure,
         sampling_frequency=sonar.sampling_frequency,
         position=plan.elements.position,
         running=True,
         band=(sonar.band.low, sonar.band.high),
-        arrivals=known,
+        arrivals=angles,
         notes=_notes(plan),
     )
 
 
 def _notes(plan: Plan) -> tuple[str, ...]:
-    where = (
+    description = (
         f"{plan.elements.count} hydrophones at rest at {depth(plan.recipe.frame(0)[1].sonar_pose.position):.3g} m, "
         "without targets, listed snaps and errors of sensors"
     )
-    return (where, *model_notes(plan.scene))
+    return (description, *model_notes(plan.scene))

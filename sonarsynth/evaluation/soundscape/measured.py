@@ -90,25 +90,25 @@ def measure(sound: Sound) -> MeasuredFigures:
     frequency, at, pairs = _grids(sound)
     bins = (frequency >= sound.band[0]) & (frequency <= sound.band[1])
     centres, edges = octave_bands(*sound.band)
-    there = np.isfinite(band_means(frequency, frequency, edges))
+    used = np.isfinite(band_means(frequency, frequency, edges))
     loud, gaps = _loud(sound, levels)
     grid = np.linspace(root - 30.0, peak, TAIL)
     nothing = Figures(*(np.zeros(0) for _ in fields(Figures)))
-    made = MeasuredFigures(
-        sound, frequency[bins], centres[there], edges[there], levels, grid, at, pairs, loud, gaps, nothing, nothing
+    grids = MeasuredFigures(
+        sound, frequency[bins], centres[used], edges[used], levels, grid, at, pairs, loud, gaps, nothing, nothing
     )
-    blocks = [_block(made, pressure, bins) for pressure in sound.pressure]
+    blocks = [_block(grids, pressure, bins) for pressure in sound.pressure]
     random, count = np.random.default_rng(0), len(blocks)
-    again = [_figures(made, [blocks[n] for n in random.integers(0, count, count)]) for _ in range(RESAMPLINGS)]
-    spread = {f.name: _deviation([getattr(one, f.name) for one in again]) for f in fields(Figures)}
-    return replace(made, figures=_figures(made, blocks), spread=Figures(**spread))
+    again = [_figures(grids, [blocks[n] for n in random.integers(0, count, count)]) for _ in range(RESAMPLINGS)]
+    spread = {f.name: _deviation([getattr(figures, f.name) for figures in again]) for f in fields(Figures)}
+    return replace(grids, figures=_figures(grids, blocks), spread=Figures(**spread))
 
 
 def _deviation(values: list[Floats]) -> Floats:
     """Standard deviation of values (...) that are numbers; NaN of fewer than half of them."""
-    known = np.isfinite(values)
-    enough = known.sum(axis=0) > 0.5 * len(values)
-    return np.where(enough, np.std(np.where(known, values, 0.0), axis=0, where=known | ~enough), np.nan)
+    finite = np.isfinite(values)
+    enough = finite.sum(axis=0) > 0.5 * len(values)
+    return np.where(enough, np.std(np.where(finite, values, 0.0), axis=0, where=finite | ~enough), np.nan)
 
 
 def _segment(sound: Sound) -> int:
@@ -130,27 +130,27 @@ def _loud(sound: Sound, levels: Floats) -> tuple[float, Floats]:
     """The lowest level whose arrivals at the first hydrophone are few enough to be told apart, and enough to count; and
     the gaps between them (s)."""
     if sound.running:
-        rate, whole = sound.sampling_frequency, np.concatenate([block[0] for block in sound.pressure])
+        rate, signal = sound.sampling_frequency, np.concatenate([block[0] for block in sound.pressure])
         for level in levels.tolist():
-            first = loud_arrivals(whole, 10.0 ** (level / 20.0), rate)
+            first = loud_arrivals(signal, 10.0 ** (level / 20.0), rate)
             if FEWEST <= len(first) < CROWDED / APART * sound.seconds:
                 return level, np.diff(first) / rate
     return float("nan"), np.zeros(0)
 
 
-def _block(made: MeasuredFigures, pressure: Floats, bins: Bools) -> _Block:
-    sound, rate = made.sound, made.sound.sampling_frequency
+def _block(grids: MeasuredFigures, pressure: Floats, bins: Bools) -> _Block:
+    sound, rate = grids.sound, grids.sound.sampling_frequency
     size = _segment(sound)
     density = welch(pressure, rate, nperseg=size, axis=-1)[1]
-    at = [int(np.argmin(np.abs(np.fft.rfftfreq(size, 1.0 / rate) - f))) for f in made.at]
-    cross = [csd(pressure[n], pressure[0], rate, nperseg=size)[1][at] for n in made.pairs.tolist()]
-    counts = [sum(len(loud_arrivals(row, 10.0 ** (level / 20.0), rate)) for row in pressure) for level in made.levels]
-    loud = 0 if np.isnan(made.loud) else len(loud_arrivals(pressure[0], 10.0 ** (made.loud / 20.0), rate))
+    at = [int(np.argmin(np.abs(np.fft.rfftfreq(size, 1.0 / rate) - f))) for f in grids.at]
+    cross = [csd(pressure[n], pressure[0], rate, nperseg=size)[1][at] for n in grids.pairs.tolist()]
+    counts = [sum(len(loud_arrivals(row, 10.0 ** (level / 20.0), rate)) for row in pressure) for level in grids.levels]
+    loud = 0 if np.isnan(grids.loud) else len(loud_arrivals(pressure[0], 10.0 ** (grids.loud / 20.0), rate))
     ordered = np.sort(np.abs(pressure.ravel()))
-    above = 1.0 - np.searchsorted(ordered, 10.0 ** (made.tail / 20.0), side="right") / ordered.size
+    above = 1.0 - np.searchsorted(ordered, 10.0 ** (grids.tail / 20.0), side="right") / ordered.size
     square = pressure.astype(float) ** 2
     window = max(min(round(1e-3 * rate), pressure.shape[1]), 1)
-    whole = pressure.shape[1] // window * window
+    windowed = pressure.shape[1] // window * window
     step = int(np.ceil(sound.pressure.shape[0] * pressure.shape[1] / FITTED))
     return _Block(
         density=density[:, bins].mean(axis=0),
@@ -160,30 +160,30 @@ def _block(made: MeasuredFigures, pressure: Floats, bins: Bools) -> _Block:
         loud=loud,
         above=above,
         sums=np.array([square.mean(), (square**2).mean()]),
-        windows=square[:, :whole].reshape(-1, window).mean(axis=1),
+        windows=square[:, :windowed].reshape(-1, window).mean(axis=1),
         samples=pressure[0, ::step].astype(float),
     )
 
 
-def _figures(made: MeasuredFigures, blocks: list[_Block]) -> Figures:
+def _figures(grids: MeasuredFigures, blocks: list[_Block]) -> Figures:
     """The figures of some blocks."""
     density = np.mean([b.density for b in blocks], axis=0)
     square, fourth = np.mean([b.sums for b in blocks], axis=0)
-    sensors, seconds = len(made.sound.position), made.sound.seconds
+    sensors, seconds = len(grids.sound.position), grids.sound.seconds
     cross, auto = (np.sum([getattr(b, name) for b in blocks], axis=0) for name in ("cross", "auto"))
     fits = [_fit(fit, np.concatenate([b.samples for b in blocks])) for fit in ESTIMATORS.values()]
     with np.errstate(divide="ignore", invalid="ignore"):
         return Figures(
             density=density,
-            octaves=10.0 * np.log10(band_means(made.frequency, density, made.edges)),
+            octaves=10.0 * np.log10(band_means(grids.frequency, density, grids.edges)),
             rates=np.sum([b.counts for b in blocks], axis=0) / (sensors * seconds),
             exceedance=np.mean([b.above for b in blocks], axis=0),
             alpha=np.array([alpha for alpha, _ in fits]),
             scale=np.array([20.0 * np.log10(scale) for _, scale in fits]),
             moments=np.array([10.0 * np.log10(square), fourth / square**2 - 3.0]),
             percentiles=10.0 * np.log10(np.percentile(np.concatenate([b.windows for b in blocks]), PERCENT)),
-            coherence=cross.real / np.sqrt(auto[:, :1] * auto[:, made.pairs]),
-            fano=np.array([np.nan if np.isnan(made.loud) else fano_factor(np.array([b.loud for b in blocks]))]),
+            coherence=cross.real / np.sqrt(auto[:, :1] * auto[:, grids.pairs]),
+            fano=np.array([np.nan if np.isnan(grids.loud) else fano_factor(np.array([b.loud for b in blocks]))]),
         )
 
 

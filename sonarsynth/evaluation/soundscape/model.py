@@ -39,36 +39,36 @@ class SoundModel:
         """Power spectral density (bin,) of each part at a hydrophone, by name."""
         environment, sonar = self.plan.scene.world.environment, self.plan.scene.sonar
         passed = response(frequency, fir(sonar.antialias)) ** 2
-        known = np.maximum(frequency, 1.0)  # no model is of 0 Hz
-        found = {
-            name: passed * noise.density(known) * self._over_band(frequency, partial(self._face, noise))
+        above_zero = np.maximum(frequency, 1.0)  # no model is of 0 Hz
+        densities = {
+            name: passed * noise.density(above_zero) * self._over_band(frequency, partial(self._face, noise))
             for name, noise in zip(part_names(environment.noises), environment.noises, strict=True)
         }
         if (chorus := self.chorus) is not None:
             spread = self._over_band(frequency, self._chorus_sum)
-            found["chorus"] = 2.0 * chorus.energy * chorus.pulse_energy(frequency) * spread
+            densities["chorus"] = 2.0 * chorus.energy * chorus.pulse_energy(frequency) * spread
         if (distant := self.plan.distant_chorus) is not None:
             face = self._over_band(frequency, partial(self._face, distant))
-            found[DISTANT_CHORUS] = passed * distant.density(known) * face
+            densities[DISTANT_CHORUS] = passed * distant.density(above_zero) * face
         if sonar.electronics is not None:
-            found["electronics"] = passed * ElectronicNoise(sonar.electronics).density(known)
+            densities["electronics"] = passed * ElectronicNoise(sonar.electronics).density(above_zero)
         if sonar.converter is not None:
             rounding = quantisation_density(sonar.converter.quantum, sonar.sampling_frequency)
-            found["rounding"] = np.full(frequency.shape, rounding)
-        return found
+            densities["rounding"] = np.full(frequency.shape, rounding)
+        return densities
 
     def coherence(self, frequency: float, offset: Floats) -> Floats:
         """Coherence (pair,), the real part, of hydrophones at offsets (pair, xyz) m, sonar frame, with another."""
         at = np.array([frequency])
         total, alone = np.zeros(len(offset), complex), 0.0
-        whole = np.concatenate([np.zeros((1, 3)), offset])
+        offsets = np.concatenate([np.zeros((1, 3)), offset])
         for name, density in self.parts(at).items():
-            waves = self._waves(name, frequency, float(np.linalg.norm(whole, axis=1).max()))
+            waves = self._waves(name, frequency, float(np.linalg.norm(offsets, axis=1).max()))
             alone += float(density[0])
             if waves is not None:
                 toward, weight = waves
                 received = weight * self._share(toward, frequency)
-                cross = cross_power(toward, received, whole, 2.0 * np.pi * frequency / self._speed)
+                cross = cross_power(toward, received, offsets, 2.0 * np.pi * frequency / self._speed)
                 total += float(density[0]) * cross[1:] / cross[0].real
         return np.asarray((total / alone).real)
 

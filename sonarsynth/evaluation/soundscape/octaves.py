@@ -25,5 +25,5 @@ def octave_bands(low: float, high: float) -> tuple[Floats, Floats]:
 
 def band_means(frequency: Floats, density: Floats, edges: Floats) -> Floats:
     """Mean densities (band,) of bins (bin,) whose frequencies lie within edges (band, 2); NaN without a bin."""
-    some = [(frequency >= low) & (frequency < high) for low, high in edges.tolist()]
-    return np.array([float(density[inside].mean()) if inside.any() else np.nan for inside in some])
+    masks = [(frequency >= low) & (frequency < high) for low, high in edges.tolist()]
+    return np.array([float(density[inside].mean()) if inside.any() else np.nan for inside in masks])

@@ -59,11 +59,11 @@ def predict(model: SoundModel, measured: MeasuredFigures) -> PredictedFigures:
         share = float(np.trapezoid(parts["chorus"], measured.frequency)) / square
         kurtosis = chorus.reach.kurtosis * share**2
         scatter = 10.0 / np.log(10.0) * float(np.sqrt(kurtosis * chorus.pulse_duration / sound.seconds))
-        if (known := sound.arrivals) is not None:
+        if (listed := sound.arrivals) is not None:
             edges = elevation_edges()
-            above = known.above
+            above = listed.above
             elevation = (
-                chorus.energies(edges, known.seconds) if above is None else chorus.counts(edges, known.seconds, above)
+                chorus.energies(edges, listed.seconds) if above is None else chorus.counts(edges, listed.seconds, above)
             )
     return PredictedFigures(
         parts=parts,
@@ -80,49 +80,49 @@ def predict(model: SoundModel, measured: MeasuredFigures) -> PredictedFigures:
 
 def as_json(measured: MeasuredFigures, predicted: PredictedFigures | None = None) -> dict[str, Any]:
     """Numbers for programs; null where there is none. Levels in dB re 1 uPa, or re full scale without calibration."""
-    sound, got, spread = measured.sound, measured.figures, measured.spread
+    sound, figures, spread = measured.sound, measured.figures, measured.spread
     zero = PASCAL if sound.calibrated else 0.0
     model = predicted or PredictedFigures({}, np.zeros(0), np.zeros((0, 0)), None, np.nan, np.nan, np.nan, np.nan, None)
-    found: dict[str, Any] = {
+    report: dict[str, Any] = {
         "seconds": sound.seconds,
         "hydrophones": len(sound.position),
         "levels": sound.unit,
         "notes": list(sound.notes),
         "spectrum": {
             "frequency_hz": measured.frequency,
-            "level_db": decibels(got.density) + zero,
-            "spread_db": 10.0 / np.log(10.0) * spread.density / np.maximum(got.density, 1e-300),
+            "level_db": decibels(figures.density) + zero,
+            "spread_db": 10.0 / np.log(10.0) * spread.density / np.maximum(figures.density, 1e-300),
             "model_db": decibels(model.density) + zero if model.parts else None,
             "parts_db": {name: decibels(part) + zero for name, part in model.parts.items()},
         },
         "third_octaves": {
             "centre_hz": measured.centres,
-            "level_db": got.octaves + zero,
+            "level_db": figures.octaves + zero,
             "spread_db": spread.octaves,
             "model_db": model.octaves + zero if predicted else None,
         },
         "peak_rates": {
             "level_db": measured.levels + zero,
-            "per_second": got.rates,
+            "per_second": figures.rates,
             "spread": spread.rates,
             "model": model.rates,
         },
         "amplitude": {
             "level_db": measured.tail + zero,
-            "exceedance": got.exceedance,
+            "exceedance": figures.exceedance,
             "spread": spread.exceedance,
-            "rms_db": got.moments[0] + zero,
+            "rms_db": figures.moments[0] + zero,
             "rms_spread_db": spread.moments[0],
             "rms_model_db": model.root + zero,
             "rms_model_scatter_db": model.scatter,
-            "excess_kurtosis": got.moments[1],
+            "excess_kurtosis": figures.moments[1],
             "excess_kurtosis_spread": spread.moments[1],
             "excess_kurtosis_model_at_most": model.kurtosis,
             "stable_fits": {
                 name: {
-                    "alpha": got.alpha[n],
+                    "alpha": figures.alpha[n],
                     "alpha_spread": spread.alpha[n],
-                    "scale_db": got.scale[n] + zero,
+                    "scale_db": figures.scale[n] + zero,
                     "scale_spread_db": spread.scale[n],
                 }
                 for n, name in enumerate(ESTIMATORS)
@@ -130,35 +130,35 @@ def as_json(measured: MeasuredFigures, predicted: PredictedFigures | None = None
         },
         "millisecond_levels": {
             "percent": list(PERCENT),
-            "level_db": got.percentiles + zero,
+            "level_db": figures.percentiles + zero,
             "spread_db": spread.percentiles,
         },
         "coherence": {
             "frequency_hz": measured.at,
             "offset_m": sound.position[measured.pairs] - sound.position[0],
-            "value": got.coherence,
+            "value": figures.coherence,
             "spread": spread.coherence,
             "model": model.coherence if predicted else None,
         },
         "loud_arrivals": {
             "above_db": measured.loud + zero,
             "gaps_s": np.sort(measured.gaps),
-            "fano_factor": got.fano[0],
+            "fano_factor": figures.fano[0],
             "fano_spread": spread.fano[0],
             "fano_model": model.fano,
         },
     }
-    if (known := sound.arrivals) is not None:
+    if (listed := sound.arrivals) is not None:
         edges = elevation_edges()
-        value, chance = known.by_elevation(edges)
-        found["elevation"] = {
+        value, chance = listed.by_elevation(edges)
+        report["elevation"] = {
             "edges_deg": np.rad2deg(np.arcsin(edges)),
-            "of": "energy" if known.above is None else f"paths over {known.above:.1f} dB re 1 uPa",
+            "of": "energy" if listed.above is None else f"paths over {listed.above:.1f} dB re 1 uPa",
             "value": value,
             "spread": chance,
             "model": model.elevation,
         }
-    plain: dict[str, Any] = _plain(found)
+    plain: dict[str, Any] = _plain(report)
     return plain
 
 

@@ -71,6 +71,6 @@ def recorded_sound(recording: SeaRecording, sonar: Sonar) -> Sound:
 def _filtered(values: Floats, rate: float, sonar: Sonar) -> Floats:
     """Samples (sample,) behind the filter of the sonar."""
     length = next_fast_len(len(values) + int(0.01 * rate), real=True)
-    known = np.linspace(0.0, 0.5 * rate, 8193)
-    gain = np.interp(rfftfreq(length, 1.0 / rate), known, response(known, fir(sonar.antialias)))
+    grid = np.linspace(0.0, 0.5 * rate, 8193)
+    gain = np.interp(rfftfreq(length, 1.0 / rate), grid, response(grid, fir(sonar.antialias)))
     return np.asarray(irfft(rfft(values - values.mean(), length) * gain, length)[: len(values)])

@@ -84,11 +84,11 @@ def listeners(elements: Elements, works: npt.NDArray[np.bool_]) -> Ints:
     alive = np.flatnonzero(works & (elements.gain != 0.0))
     if not alive.size:
         raise NothingHeard("every hydrophone is dead: there is no sound to measure")
-    place = elements.position[alive]
-    first = int(np.argmin(np.linalg.norm(place, axis=1)))
+    position = elements.position[alive]
+    first = int(np.argmin(np.linalg.norm(position, axis=1)))
     if alive.size <= HYDROPHONES:
         return np.asarray(np.append(alive[first], np.delete(alive, first)))
-    apart = place - place[first]
+    apart = position - position[first]
     away = np.linalg.norm(apart, axis=1)
     chosen = [first]
     for axis in (1, 2):
@@ -99,9 +99,9 @@ def listeners(elements: Elements, works: npt.NDArray[np.bool_]) -> Ints:
     return np.asarray(alive[np.array(chosen)])
 
 
-def _spaced(some: Ints, away: Floats) -> list[int]:
-    """At most four of some places, whose distances grow by a factor."""
-    if not some.size:
+def _spaced(candidates: Ints, away: Floats) -> list[int]:
+    """At most four of the candidates, whose distances grow by a factor."""
+    if not candidates.size:
         return []
-    wanted = np.geomspace(away[some].min(), away[some].max(), HYDROPHONES // 2)
-    return list(dict.fromkeys(int(some[np.argmin(np.abs(away[some] - far))]) for far in wanted))
+    wanted = np.geomspace(away[candidates].min(), away[candidates].max(), HYDROPHONES // 2)
+    return list(dict.fromkeys(int(candidates[np.argmin(np.abs(away[candidates] - far))]) for far in wanted))

@@ -62,7 +62,7 @@ def stored_sound(tree: xr.DataTree, recipe: Recipe) -> Sound:
     if not frames.size:
         raise NothingHeard("no frame of the first sequence of the store has been built yet")
     array = _elements(signals)
-    some = listeners(array, _working(tree, frames, array.count))
+    chosen = listeners(array, _working(tree, frames, array.count))
     rate = float(signals["sampling_frequency"])
     spare = spare_time(array, scene.sonar, float(scene.sonar.assumed_sound_speed))
     quiet = _quiet_seconds(tree, frames, start[frames], signals.sizes["sample"] / rate) - spare
@@ -73,8 +73,8 @@ def stored_sound(tree: xr.DataTree, recipe: Recipe) -> Sound:
             f"frames hold {max(1e3 * float(np.median(quiet)), 0.0):.2g} ms before the listed snaps are heard, and what "
             "follows is their sound and its echoes: too little to measure; draw the recipe instead"
         )
-    used = used[: max(MOST_SAMPLES // (some.size * size), 2)]
-    pressure = signals["pressure"].isel(frame=used, sensor=some, sample=slice(0, size)).values
+    used = used[: max(MOST_SAMPLES // (chosen.size * size), 2)]
+    pressure = signals["pressure"].isel(frame=used, sensor=chosen, sample=slice(0, size)).values
     if not np.isfinite(pressure).all():
         raise NothingHeard("the signals of the store hold numbers that are not finite")
     if not np.abs(pressure).max() > 0.0:
@@ -82,7 +82,7 @@ def stored_sound(tree: xr.DataTree, recipe: Recipe) -> Sound:
     return Sound(
         pressure=np.asarray(pressure, np.float32),
         sampling_frequency=rate,
-        position=array.position[some],
+        position=array.position[chosen],
         running=False,
         band=(scene.sonar.band.low, scene.sonar.band.high),
         arrivals=_arrivals(tree, frames, signals.sizes["sample"] / rate),
@@ -121,9 +121,9 @@ def _arrivals(tree: xr.DataTree, frames: npt.NDArray[np.int64], long: float) -> 
     """Paths of the chorus above a level at which the loudest of each frame, which the store lists, are all."""
     if "soundscape" not in tree["truth"].children:
         return None
-    found = tree["truth/soundscape"].dataset
+    listed = tree["truth/soundscape"].dataset
     names = ("level", "azimuth", "elevation")
-    level, azimuth, elevation = (np.asarray(found[name].values, float)[frames] for name in names)
+    level, azimuth, elevation = (np.asarray(listed[name].values, float)[frames] for name in names)
     turned = np.asarray(tree["truth"]["sonar_orientation"].values, float)[frames]
     toward = direction(np.deg2rad(azimuth), np.deg2rad(elevation))
     up = np.einsum("fpx,fx->fp", toward, np.stack([rotation_matrix(q)[2] for q in turned]))
@@ -131,5 +131,5 @@ def _arrivals(tree: xr.DataTree, frames: npt.NDArray[np.int64], long: float) -> 
     above = float(np.nanmax(last)) if np.isfinite(last).any() else -np.inf
     if not np.isfinite(above):
         above = float(np.nanmin(level)) if np.isfinite(level).any() else 0.0
-    some = level > above
-    return ArrivalElevations(up[some], np.ones(int(some.sum())), above, len(frames) * long)
+    complete = level > above
+    return ArrivalElevations(up[complete], np.ones(int(complete.sum())), above, len(frames) * long)
