@@ -124,11 +124,11 @@ def _cut(shape: Shape, stamp: tuple[int, int] | None, longest: float) -> Mesh:
     if was <= edge:
         return plain
     mesh = refined_mesh(shape, edge)
-    said = (
+    note = (
         f"{len(plain.faces)} facets up to {_said(was, 2)} long are cut into {len(mesh.faces)} up to {_said(edge, 2)}, "
         "for each echoes from its middle: `shape.edge` says how far"
     )
-    return replace(mesh, notes=(*mesh.notes, said))
+    return replace(mesh, notes=(*mesh.notes, note))
 
 
 @byte_bounded_cache(16)
@@ -161,8 +161,8 @@ def _fine(
         )
     if in_frame:
         judged = mesh if _refinable(shape) else coarse  # cut in their planes, facets are as far from a curve as before
-        said = (rows, mesh_report(judged, wavelength, max(FIVE_PERCENT, 1.1 * error)))
-        mesh = replace(mesh, notes=(*mesh.notes, *(line for line in said if line)))
+        notes = (rows, mesh_report(judged, wavelength, max(FIVE_PERCENT, 1.1 * error)))
+        mesh = replace(mesh, notes=(*mesh.notes, *(line for line in notes if line)))
     return mesh, rows
 
 
@@ -173,7 +173,7 @@ def _refinable(shape: Shape) -> bool:
     return not (isinstance(shape, (Box, LShape)) or (isinstance(shape, Remus100) and shape.coarse))
 
 
-def _limits(mesh: Mesh, shape: Shape, edge: float, sagitta: float, most: int) -> tuple[float, float]:
+def _limits(mesh: Mesh, shape: Shape, edge: float, sagitta: float, max_facets: int) -> tuple[float, float]:
     """Longest edge and mean sagitta (m) for the mesh of a shape, so long that about so many facets serve.
 
     Facets of the coarse mesh are cut in as many as their area asks, and as the distance of their plane from the curve
@@ -184,7 +184,7 @@ def _limits(mesh: Mesh, shape: Shape, edge: float, sagitta: float, most: int) ->
     halved = isinstance(shape, MeshFile) or (isinstance(shape, Remus100) and shape.coarse)
     by_length = mesh.area / ((HALVED_AREA if halved else FACET_AREA) * edge**2)
     needed = float(np.sum(np.maximum(1.0, np.maximum(by_length, bend(mesh).sagitta / sagitta))))
-    excess = max(1.0, needed / most)
+    excess = max(1.0, needed / max_facets)
     return edge * np.sqrt(excess), sagitta * excess
 
 

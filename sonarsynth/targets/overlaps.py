@@ -20,26 +20,26 @@ MOST: Final = 4096
 """Facets of each by which it is found how they overlap."""
 
 
-def overlap(one: PlacedTarget, other: PlacedTarget) -> str | None:
+def overlap(a: PlacedTarget, b: PlacedTarget) -> str | None:
     """How two closed bodies overlap, as a verb with its object left out, or None: they are apart, or only touch.
 
     "coincide", "overlap", or "overlap (the second is inside the first)" and the like. Facets are taken a little under
     the surface: bodies overlap where one such is inside the other body, or where one crosses its surface.
     """
-    if not (len(one.mesh.faces) and len(other.mesh.faces)):
+    if not (len(a.mesh.faces) and len(b.mesh.faces)):
         return None
-    (a, r), (b, s) = sphere_round(one), sphere_round(other)
-    if np.linalg.norm(a - b) >= r + s:
+    (c, r), (d, s) = sphere_round(a), sphere_round(b)
+    if np.linalg.norm(c - d) >= r + s:
         return None
     inset = INSET * min(r, s)
-    near = _near(one, other, inset), _near(other, one, inset)
-    within = _within(one, near[0], other, inset), _within(other, near[1], one, inset)
-    every = [len(n) == len(body.mesh.faces) and w.all() for n, w, body in zip(near, within, (one, other), strict=True)]
+    near = _near(a, b, inset), _near(b, a, inset)
+    within = _within(a, near[0], b, inset), _within(b, near[1], a, inset)
+    every = [len(n) == len(body.mesh.faces) and w.all() for n, w, body in zip(near, within, (a, b), strict=True)]
     if all(every):
         return "coincide"
     if any(every):
         return f"overlap (the {'first' if every[0] else 'second'} is inside the {'second' if every[0] else 'first'})"
-    if any(w.any() for w in within) or _crosses(one, near[0], other, inset) or _crosses(other, near[1], one, inset):
+    if any(w.any() for w in within) or _crosses(a, near[0], b, inset) or _crosses(b, near[1], a, inset):
         return "overlap"
     return None
 
@@ -54,12 +54,12 @@ def _near(body: PlacedTarget, other: PlacedTarget, inset: float) -> Ints:
     """Facets of a body whose boxes, in the frame of the other body, meet the box round it."""
     vertices = other.pose.to_body(body.pose.to_world(body.mesh.vertices))
     low, high = other.mesh.box
-    found = []
-    for some in in_blocks(len(body.mesh.faces)):
-        corners = vertices[body.mesh.faces[some]]
+    facets = []
+    for block in in_blocks(len(body.mesh.faces)):
+        corners = vertices[body.mesh.faces[block]]
         apart = (corners.min(axis=1) > high + inset) | (corners.max(axis=1) < low - inset)
-        found.append(np.flatnonzero(~apart.any(axis=1)) + some.start)
-    return np.concatenate(found)
+        facets.append(np.flatnonzero(~apart.any(axis=1)) + block.start)
+    return np.concatenate(facets)
 
 
 def _corners(body: PlacedTarget, facets: Ints, inset: float) -> Floats:
@@ -72,8 +72,8 @@ def _corners(body: PlacedTarget, facets: Ints, inset: float) -> Floats:
 
 def _within(body: PlacedTarget, facets: Ints, other: PlacedTarget, inset: float) -> Bools:
     """Which of facets, `MOST` of them at most, have their middles inside another body."""
-    some = facets[:: max(-(-len(facets) // MOST), 1)]
-    return insides(other.mesh, other.pose, _corners(body, some, inset).mean(axis=1))
+    sampled = facets[:: max(-(-len(facets) // MOST), 1)]
+    return insides(other.mesh, other.pose, _corners(body, sampled, inset).mean(axis=1))
 
 
 def insides(mesh: Mesh, pose: Pose, points: Floats) -> Bools:
@@ -85,8 +85,8 @@ def insides(mesh: Mesh, pose: Pose, points: Floats) -> Bools:
 
 def _crosses(body: PlacedTarget, facets: Ints, other: PlacedTarget, inset: float) -> bool:
     """Whether any edge of facets goes through the surface of another body."""
-    for some in in_blocks(len(facets)):
-        corners = _corners(body, facets[some], inset)
+    for block in in_blocks(len(facets)):
+        corners = _corners(body, facets[block], inset)
         if occluded((other,), corners.reshape(-1, 3), np.roll(corners, 1, axis=1).reshape(-1, 3)).any():
             return True
     return False

@@ -177,16 +177,16 @@ class Myring(BodyShape):
     def _no_bulge(cls, angle: float, info: ValidationInfo) -> float:
         tail, diameter = info.data.get("tail"), info.data.get("diameter")
         if tail is not None and diameter is not None and np.tan(angle) > 1.5 * diameter / tail:
-            most = float(np.arctan(1.5 * diameter / tail))
-            raise ValueError(f"would make the tail thicker than the diameter; use {most:.3g} rad at most for this tail")
+            top = float(np.arctan(1.5 * diameter / tail))
+            raise ValueError(f"would make the tail thicker than the diameter; use {top:.3g} rad at most for this tail")
         return angle
 
     @field_validator("nose_offset", "tail_offset")
     @classmethod
     def _not_all(cls, offset: float, info: ValidationInfo) -> float:
-        whole = info.data.get(str(info.field_name).removesuffix("_offset"))
-        if whole is not None and offset > 0.99 * whole:
-            raise ValueError(f"leaves nothing of the {whole:g} m of the {str(info.field_name).removesuffix('_offset')}")
+        size = info.data.get(str(info.field_name).removesuffix("_offset"))
+        if size is not None and offset > 0.99 * size:
+            raise ValueError(f"leaves nothing of the {size:g} m of the {str(info.field_name).removesuffix('_offset')}")
         return offset
 
 

@@ -73,9 +73,9 @@ def target_strength(
     both = np.concatenate([np.broadcast_to(v, (*shape, 3)).reshape(-1, 3) for v in (going, away)], axis=1) + 0.0
     pairs, pair = np.unique(both, axis=0, return_inverse=True)
     order = np.argsort(pair.ravel(), kind="stable")
-    parts = np.split(order, np.cumsum(np.bincount(pair.ravel()))[:-1])
+    rows_of_pairs = np.split(order, np.cumsum(np.bincount(pair.ravel()))[:-1])
     power = np.empty(wave.size)
-    for row, at in zip(pairs, parts, strict=True):
+    for row, at in zip(pairs, rows_of_pairs, strict=True):
         values, index = np.unique(wave[at], return_inverse=True)
         power[at] = body.cross_section(row[:3], row[3:], values)[index.ravel()]
     with np.errstate(divide="ignore"):
@@ -117,12 +117,12 @@ class _Body:
         """|f|^2 (frequency,) in m2 for one pair of directions."""
         mesh = self.mesh
         if isinstance(self.law, Kirchhoff) and self.shape is not None:
-            parts = mesh.corners, mesh.normal, mesh.area, self.curved
-            return self.law.cross_section(*parts, incident, scattered, wavenumber, self.shape)
+            facets = mesh.corners, mesh.normal, mesh.area, self.curved
+            return self.law.cross_section(*facets, incident, scattered, wavenumber, self.shape)
         on = np.flatnonzero(self.seen_from(-incident) & self.seen_from(scattered))
         if isinstance(self.law, Kirchhoff):
-            parts = mesh.corners_of(on), mesh.normal[on], mesh.area[on], self.curved[on]
-            return self.law.cross_section(*parts, incident, scattered, wavenumber)
+            facets = mesh.corners_of(on), mesh.normal[on], mesh.area[on], self.curved[on]
+            return self.law.cross_section(*facets, incident, scattered, wavenumber)
         amplitude = self.law.amplitude(incident, scattered, mesh.normal[on], mesh.area[on])
         return np.full(wavenumber.shape, np.sum(amplitude**2))
 

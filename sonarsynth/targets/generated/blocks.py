@@ -22,18 +22,18 @@ def blocks(breaks: Sequence[Sequence[float]], solid: Bools, edge: float) -> Surf
     pace = edge / np.sqrt(1.25)
     counts = [2 * np.maximum(1, np.ceil(0.5 * w / pace - 1e-9)).astype(int) for w in widths]
     starts = [np.concatenate([[0], np.cumsum(2 * n)]) for n in counts]  # in half steps
-    parts = []
+    quads = []
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
         cells = np.pad(np.moveaxis(solid, (axis, u, v), (0, 1, 2)), ((1, 1), (0, 0), (0, 0)))
         for plane, i, j in np.argwhere(cells[1:] != cells[:-1]):
             flat = _rows(int(counts[u][i]), int(counts[v][j]))
-            place = np.empty((*flat.shape[:2], 3), np.int64)
-            place[..., axis] = starts[axis][plane]
-            place[..., u] = starts[u][i] + flat[..., 0]
-            place[..., v] = starts[v][j] + flat[..., 1]
-            parts.append(place if cells[plane, i, j] else place[:, ::-1])
-    places = np.concatenate(parts)
+            steps = np.empty((*flat.shape[:2], 3), np.int64)
+            steps[..., axis] = starts[axis][plane]
+            steps[..., u] = starts[u][i] + flat[..., 0]
+            steps[..., v] = starts[v][j] + flat[..., 1]
+            quads.append(steps if cells[plane, i, j] else steps[:, ::-1])
+    places = np.concatenate(quads)
     size = [int(s[-1]) + 1 for s in starts]
     code = (places[..., 0] * size[1] + places[..., 1]) * size[2] + places[..., 2]
     _, first, index = np.unique(code, return_index=True, return_inverse=True)
@@ -60,5 +60,5 @@ def _rows(across: int, rows: int) -> Ints:
 
 def _coordinates(breaks: Floats, counts: Ints) -> Floats:
     """Coordinate (m) at each half step."""
-    parts = [np.linspace(a, b, 2 * n + 1)[:-1] for a, b, n in zip(breaks[:-1], breaks[1:], counts, strict=True)]
-    return np.concatenate([*parts, breaks[-1:]])
+    segments = [np.linspace(a, b, 2 * n + 1)[:-1] for a, b, n in zip(breaks[:-1], breaks[1:], counts, strict=True)]
+    return np.concatenate([*segments, breaks[-1:]])

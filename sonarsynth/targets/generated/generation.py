@@ -134,7 +134,7 @@ def l_shape(shape: LShape) -> Surface:
     """An L of twenty facets: its outline in the plane of x and z, drawn out along y."""
     t = shape.thickness
     outline = [(-t, -t), (shape.length, -t), (shape.length, 0.0), (0.0, 0.0), (0.0, shape.height), (-t, shape.height)]
-    points = [(x, side * 0.5 * shape.width, z) for side in (-1, 1) for x, z in outline]
+    points = [(x, sign * 0.5 * shape.width, z) for sign in (-1, 1) for x, z in outline]
     edges = [(i, (i + 1) % 6) for i in range(6)]
     sides = [(j, i, i + 6, j + 6) for i, j in edges]
     starboard, port = [(0, 1, 2, 3), (0, 3, 4, 5)], [(9, 8, 7, 6), (11, 10, 9, 6)]

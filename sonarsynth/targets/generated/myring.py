@@ -48,11 +48,11 @@ def hull_meridian(hull: Myring) -> list[Arc]:
     half = 0.5 * hull_length(hull)
     shoulder = half - hull.nose + hull.nose_offset  # x where the middle begins
     hip = shoulder - hull.middle
-    most = 1.0 - hull.nose_offset / hull.nose  # t at the foremost point
+    t_tip = 1.0 - hull.nose_offset / hull.nose  # t at the foremost point
 
     def nose(u: Floats) -> tuple[Floats, Floats]:
         # t = cos(angle) keeps every digit of the radius of a pointed and of a blunt nose.
-        angle = np.arccos(most) + u * (0.5 * np.pi - np.arccos(most))
+        angle = np.arccos(t_tip) + u * (0.5 * np.pi - np.arccos(t_tip))
         return shoulder + hull.nose * np.cos(angle), 0.5 * hull.diameter * np.sin(angle) ** (2.0 / hull.exponent)
 
     def tail(u: Floats) -> tuple[Floats, Floats]:
@@ -61,7 +61,7 @@ def hull_meridian(hull: Myring) -> list[Arc]:
 
     # A blunt nose (large exponent) is steep at its tip: sample it evenly in radius as well.
     even = np.linspace(0.0, 1.0, 2049)
-    first = np.arccos(most)
+    first = np.arccos(t_tip)
     radius = np.linspace(np.sin(first) ** (2.0 / hull.exponent), 1.0, 2049)
     by_radius = (np.arcsin(radius ** (0.5 * hull.exponent)) - first) / (0.5 * np.pi - first)
     arcs = [Arc(nose, np.unique(np.clip(np.concatenate([even, by_radius]), 0.0, 1.0)))]

@@ -107,7 +107,7 @@ def _loft(chordwise: Floats, height: Floats, across: int) -> Surface:
     middle = 0.5 * hull_length(HULL) - FIN_STATION
     half = naca0012(chordwise)
     half[[0, -1]] = 0.0
-    side = np.linspace(1.0, -1.0, across + 1)
+    share_across = np.linspace(1.0, -1.0, across + 1)
 
     def point(i: np.ndarray, level: Floats, share: Floats) -> Floats:
         """Vertices at a chordwise index, a height, and a share of the half thickness."""
@@ -115,15 +115,15 @@ def _loft(chordwise: Floats, height: Floats, across: int) -> Surface:
         x = middle + chord * (0.5 - chordwise[i])
         return np.stack(np.broadcast_arrays(x, share * chord * half[i], level), axis=-1)
 
-    i, one = np.arange(len(chordwise)), np.ones(1)
-    port = point(i[None], height[:, None], one[0])
-    starboard = point(i[None], height[:, None], -one[0])
-    foot = point(i[:, None], height[:1], side[None])
-    tip = point(i[:, None], height[-1:], side[None])
-    parts = [_grid(port), _grid(starboard[::-1]), _grid(foot), _grid(tip[::-1])]
-    vertices, faces = weld(join(*parts))
-    whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return vertices, faces[whole]  # grids end in points at the leading and trailing edges
+    i, unit = np.arange(len(chordwise)), np.ones(1)
+    port = point(i[None], height[:, None], unit[0])
+    starboard = point(i[None], height[:, None], -unit[0])
+    foot = point(i[:, None], height[:1], share_across[None])
+    tip = point(i[:, None], height[-1:], share_across[None])
+    grids = [_grid(port), _grid(starboard[::-1]), _grid(foot), _grid(tip[::-1])]
+    vertices, faces = weld(join(*grids))
+    distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return vertices, faces[distinct]  # grids end in points at the leading and trailing edges
 
 
 def _grid(points: Floats) -> Surface:

@@ -101,9 +101,9 @@ def _limits(arc: Arc, edge: float, sagitta: float) -> tuple[Floats, Floats]:
     curvature R along the meridian and r' = r/cos(slope) across it. The height takes half of what is allowed at most.
     """
     x, r, s = arc.along()
-    whole = np.full(len(s), np.inf)
+    unlimited = np.full(len(s), np.inf)
     if np.isinf(sagitta):
-        return whole, np.full(len(s), edge)
+        return unlimited, np.full(len(s), edge)
     slope = np.unwrap(np.arctan2(np.diff(r), np.diff(x)))
     bent = np.abs(np.diff(slope)) / (0.5 * (s[2:] - s[:-2]))  # 1/m
     bent = np.concatenate([bent[:1], bent, bent[-1:]])
@@ -111,8 +111,8 @@ def _limits(arc: Arc, edge: float, sagitta: float) -> tuple[Floats, Floats]:
     lean = np.minimum(np.append(lean, lean[-1]), np.append(lean[:1], lean))
     with np.errstate(divide="ignore"):
         step = np.minimum(np.sqrt(6.0 * sagitta / bent), edge)
-        left = sagitta - step**2 * bent / 12.0
-        girth = np.minimum(4.0 * np.sqrt(left * r / lean), edge)
+        allowed = sagitta - step**2 * bent / 12.0
+        girth = np.minimum(4.0 * np.sqrt(allowed * r / lean), edge)
     return step, np.where(r > 0, girth, edge)
 
 
@@ -153,17 +153,17 @@ def _band(full: int, front: tuple[int, int, int], back: tuple[int, int, int]) ->
     """Facets between two rings (first vertex, vertices, phase): each edge of a ring with the other's nearest vertex."""
     a, n, at_a = front
     b, m, at_b = back
-    parts = []
+    fans = []
     if n > 1:
         apex = b + _nearest(full, n, at_a, m, at_b)
         i = np.arange(n)
-        parts.append((_middles(full, n, at_a), np.stack([a + i, apex, a + (i + 1) % n], axis=1)))
+        fans.append((_middles(full, n, at_a), np.stack([a + i, apex, a + (i + 1) % n], axis=1)))
     if m > 1:
         apex = a + _nearest(full, m, at_b, n, at_a)
         i = np.arange(m)
-        parts.append((_middles(full, m, at_b), np.stack([b + i, b + (i + 1) % m, apex], axis=1)))
-    angle = np.concatenate([p[0] % (2 * full) for p in parts])
-    return np.concatenate([p[1] for p in parts])[np.argsort(angle, kind="stable")]
+        fans.append((_middles(full, m, at_b), np.stack([b + i, b + (i + 1) % m, apex], axis=1)))
+    angle = np.concatenate([p[0] % (2 * full) for p in fans])
+    return np.concatenate([p[1] for p in fans])[np.argsort(angle, kind="stable")]
 
 
 def _middles(full: int, n: int, phase: int) -> Ints:
@@ -171,9 +171,9 @@ def _middles(full: int, n: int, phase: int) -> Ints:
     return np.asarray(phase + (full // n) * (2 * np.arange(n) + 1))
 
 
-def _nearest(full: int, n: int, phase: int, other: int, other_phase: int) -> Ints:
+def _nearest(full: int, n: int, phase: int, m: int, phase_m: int) -> Ints:
     """The vertex of the other ring nearest to the middle of each edge."""
-    if other == 1:
+    if m == 1:
         return np.zeros(n, int)
-    step = 2 * (full // other)
-    return np.asarray(((_middles(full, n, phase) - other_phase + step // 2) // step) % other)
+    step = 2 * (full // m)
+    return np.asarray(((_middles(full, n, phase) - phase_m + step // 2) // step) % m)

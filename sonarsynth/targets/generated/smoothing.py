@@ -73,8 +73,8 @@ def corner_normals(surface: Surface, crease: float) -> Floats:
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(cross, axis=1)
     normal = cross / size[:, None]
-    one, other, joint = _pairs(faces)
-    turn = np.linalg.norm(normal[one] - normal[other], axis=1)  # 2 sin(angle/2)
+    facet, neighbour, joint = _pairs(faces)
+    turn = np.linalg.norm(normal[facet] - normal[neighbour], axis=1)  # 2 sin(angle/2)
     flat, smooth = turn <= FLAT, turn <= 2.0 * np.sin(0.5 * crease)
     group = _parts(3 * len(faces), joint[smooth, :2].ravel(), joint[smooth, 2:].ravel())  # corners with one normal
     sector = _parts(3 * len(faces), joint[flat, :2].ravel(), joint[flat, 2:].ravel())  # those in one plane besides
@@ -106,23 +106,23 @@ def _weights(corners: Floats, group: Ints, sector: Ints, flat: Ints) -> Floats:
     usual = np.sqrt(number / np.maximum(np.bincount(group, (outer**-2.0).sum(axis=1)), TINY))[group]  # m
     share = np.log(np.maximum(edges / (LONG * np.maximum(usual, TINY))[:, None], 1.0))
     share = np.where(within, 0.0, 4.0 * share - np.log(edges))
-    whole = np.maximum(np.bincount(sector, angle)[sector], TINY)
+    sector_angle = np.maximum(np.bincount(sector, angle)[sector], TINY)
     # Of a straight side (180 degrees) the sine is 0, and a small share of the angle stands in for it.
-    sine = np.maximum(np.sin(whole), 0.0) + 1e-4 * whole
-    return np.asarray(sine * np.exp(np.bincount(sector, share.sum(axis=1)))[sector] * angle / whole)
+    sine = np.maximum(np.sin(sector_angle), 0.0) + 1e-4 * sector_angle
+    return np.asarray(sine * np.exp(np.bincount(sector, share.sum(axis=1)))[sector] * angle / sector_angle)
 
 
-def _parts(number: int, one: Ints, other: Ints) -> Ints:
-    graph = coo_array((np.ones(len(one), np.int8), (one, other)), shape=(number, number))
+def _parts(number: int, first: Ints, second: Ints) -> Ints:
+    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(number, number))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def _pairs(faces: Ints) -> tuple[Ints, Ints, Ints]:
     """Facets (pair,) and (pair,) that share an edge with no third, and their corners (pair, 4) at its ends: the
     first facet's at one end and at the other, the second's at the same ends. A corner is 3 facet + place."""
-    side = sides(faces)[1].ravel()
-    order = np.argsort(side, kind="stable")
-    first, count = np.unique(side[order], return_index=True, return_counts=True)[1:]
+    edge = sides(faces)[1].ravel()
+    order = np.argsort(edge, kind="stable")
+    first, count = np.unique(edge[order], return_index=True, return_counts=True)[1:]
     at, to = order[first[count == 2]], order[first[count == 2] + 1]
     ends = [np.stack([x, x - x % 3 + (x + 1) % 3], axis=1) for x in (at, to)]
     same = faces.ravel()[ends[0][:, 0]] == faces.ravel()[ends[1][:, 0]]  # wound against each other
@@ -154,7 +154,7 @@ def _curves(vertices: Floats, faces: Ints, normals: Floats, ends: Ints, of_facet
     e = span / length
     several = (np.bincount(edge, minlength=len(ends)) > 2)[:, None]
     n = normals.reshape(-1, 3)
-    low, high = (np.where(forward, *way) for way in ((corner, following), (following, corner)))
+    low, high = (np.where(forward, *order) for order in ((corner, following), (following, corner)))
     d0, d1 = (np.where(several, e, _into_planes(e, n[at[first]], n[at[last]])) for at in (low, high))
     off = 1.0 + 0.5 * np.einsum("ei,ei->e", e, d0 + d1)[:, None]
     tangent = 1.5 * e - 0.5 * (d0 + d1) / off
@@ -163,10 +163,10 @@ def _curves(vertices: Floats, faces: Ints, normals: Floats, ends: Ints, of_facet
     return _Curves(vertices[ends].mean(axis=1) + 0.25 * length * (d0 - d1) / off, tangent, height)
 
 
-def _into_planes(e: Floats, one: Floats, other: Floats) -> Floats:
-    """Unit vectors (edge, xyz) along the surface nearest to e, the normals of which are one and other (edge, xyz)."""
-    t = e - _dot(e, one) * one
-    across = other - _dot(other, one) * one
+def _into_planes(e: Floats, normal: Floats, other_normal: Floats) -> Floats:
+    """Unit vectors (edge, xyz) along the surface nearest to e, its normals normal and other_normal (edge, xyz)."""
+    t = e - _dot(e, normal) * normal
+    across = other_normal - _dot(other_normal, normal) * normal
     size = np.linalg.norm(across, axis=1)[:, None]
     across = np.where(size > SAME, across / np.where(size > SAME, size, 1.0), 0.0)
     t = t - _dot(t, across) * across
@@ -174,8 +174,8 @@ def _into_planes(e: Floats, one: Floats, other: Floats) -> Floats:
     return np.asarray(np.where(size > STEEP, t / np.where(size > STEEP, size, 1.0), e))
 
 
-def _dot(one: Floats, other: Floats) -> Floats:
-    return np.asarray(np.einsum("ei,ei->e", one, other)[:, None])
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.einsum("ei,ei->e", a, b)[:, None])
 
 
 def _cut(vertices: Floats, faces: Ints, normals: Floats, middle: Ints, tangent: Floats) -> tuple[Ints, Floats]:

@@ -31,7 +31,7 @@ def read_3mf(data: bytes) -> Surface:
     scale = METRES.get(root.get("unit", "millimeter"))
     if scale is None:
         raise MeshError(f"is in a unit that no 3MF has: '{str(root.get('unit'))[:20]}'")
-    objects = {found.get("id", ""): found for found in root.iter(f"{CORE}object")}
+    objects = {node.get("id", ""): node for node in root.iter(f"{CORE}object")}
     vertices: list[Floats] = []
     faces: list[np.ndarray] = []
     placed: list[str] = []
@@ -60,18 +60,18 @@ def _place(
     depth: int = DEEPEST,
 ) -> None:
     """The mesh of an object through a matrix, and those of its components. Raises MeshError."""
-    found = objects.get(name)
-    if found is None:
+    node = objects.get(name)
+    if node is None:
         raise MeshError(f"places object '{name[:20]}', which is not in its model")
     placed.append(name)
     if depth == 0 or len(placed) > MOST_PLACED:
         raise MeshError("has components within components without end")
-    for component in found.iter(f"{CORE}component"):
+    for component in node.iter(f"{CORE}component"):
         _refuse_other_parts(component)
         inner = _matrix(component)
         _place(objects, component.get("objectid", ""), inner @ matrix, vertices, faces, placed, depth - 1)
-    mesh = found.find(f"{CORE}mesh")
-    if mesh is None or found.get("type", "model") not in ("model", "solidsupport", "surface", "other"):
+    mesh = node.find(f"{CORE}mesh")
+    if mesh is None or node.get("type", "model") not in ("model", "solidsupport", "surface", "other"):
         return
     places = np.array([[float(v.get(axis, "nan")) for axis in "xyz"] for v in mesh.iter(f"{CORE}vertex")])
     corners = np.array([[int(t.get(f"v{k}", -1)) for k in (1, 2, 3)] for t in mesh.iter(f"{CORE}triangle")], np.int64)

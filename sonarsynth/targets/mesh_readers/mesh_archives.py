@@ -28,11 +28,11 @@ def only_file(data: bytes, ending: str) -> bytes:
             if not names:
                 raise MeshError(f"is an archive without a {ending}")
             with archive.open(names[0]) as file:
-                found = file.read(MAX_BYTES + 1)
+                content = file.read(MAX_BYTES + 1)
     except DAMAGED as error:
         if isinstance(error, MeshError):
             raise
         raise MeshError(f"is an archive that cannot be unpacked ({' '.join(str(error).split())[:80]})") from None
-    if len(found) > MAX_BYTES:
+    if len(content) > MAX_BYTES:
         raise MeshError(f"unpacks to more than {MAX_BYTES >> 20} MiB")
-    return found
+    return content

@@ -44,15 +44,15 @@ def read_collada(data: bytes) -> Surface:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            parts, scale, axis = _read(text)
+            surfaces, scale, axis = _read(text)
     except (MeshError, MemoryError):
         raise
     except Exception as error:  # whatever a damaged file may bring
         reason = " ".join(str(error).split())[:120]
         raise MeshError(f"cannot be read as COLLADA ({type(error).__name__}: {reason})") from None
-    if not parts:
+    if not surfaces:
         raise MeshError("holds no facets")
-    vertices, faces = join(*parts)
+    vertices, faces = join(*surfaces)
     return vertices @ UP.get(axis, UP["Y_UP"]).T * scale, faces
 
 
@@ -72,7 +72,7 @@ def _read(text: bytes) -> tuple[list[Surface], float, str]:
 
 def _check_placements(root: Element) -> None:
     """Refuses a scene that places nodes in themselves, or more often than any scene does (each may place two more)."""
-    nodes = {found.get("id"): found for found in root.iter() if found.tag.endswith("}node")}
+    nodes = {element.get("id"): element for element in root.iter() if element.tag.endswith("}node")}
     sizes: dict[Element, int] = {}
     for start in nodes.values():
         under: list[tuple[Element, bool]] = [(start, False)]
@@ -83,14 +83,14 @@ def _check_placements(root: Element) -> None:
             placed = [nodes[name] for name in named if name in nodes]
             if counted:
                 open_nodes.discard(node)
-                sizes[node] = sum(1 for _ in node.iter()) + sum(sizes[one] for one in placed)
+                sizes[node] = sum(1 for _ in node.iter()) + sum(sizes[inner] for inner in placed)
                 if sizes[node] > MOST_PLACED:
                     raise MeshError(f"places more than {MOST_PLACED} nodes")
             elif node in open_nodes:
                 raise MeshError("has a node that is placed in itself")
             elif node not in sizes:
                 open_nodes.add(node)
-                under += [(node, True), *((one, False) for one in placed if one not in sizes)]
+                under += [(node, True), *((inner, False) for inner in placed if inner not in sizes)]
 
 
 def _no_file(name: str) -> bytes:
@@ -99,7 +99,7 @@ def _no_file(name: str) -> bytes:
 
 def _parts(document: Any) -> list[Surface]:
     """Vertices and triangles of each primitive of each instance."""
-    parts: list[Surface] = []
+    surfaces: list[Surface] = []
     total = 0
     for bound in (*document.scene.objects("geometry"), *_skins(document)):
         for primitive in bound.primitives():
@@ -113,8 +113,8 @@ def _parts(document: Any) -> list[Surface]:
                     raise MeshError(f"has an index out of range: there are {len(vertices)} vertices")
                 faces = polygons(vertices, counts, index)
                 mirrored = np.linalg.det(np.asarray(getattr(bound, "matrix", np.eye(4)), float)[:3, :3]) < 0.0
-                parts.append((vertices, faces[:, ::-1] if mirrored else faces))
-    return parts
+                surfaces.append((vertices, faces[:, ::-1] if mirrored else faces))
+    return surfaces
 
 
 def _skins(document: Any) -> list[Any]:

@@ -109,12 +109,12 @@ def _chunk(kind: int, data: bytes) -> bytes:
     return len(data).to_bytes(4, "little") + kind.to_bytes(4, "little") + data
 
 
-def _buffer(buffer: dict[str, Any], folder: Path, most: int) -> bytes:
-    """The bytes of a buffer, padded to a whole number of words, of `most` at most. Raises MeshError."""
+def _buffer(buffer: dict[str, Any], folder: Path, limit: int) -> bytes:
+    """The bytes of a buffer, padded to a whole number of words, of `limit` at most. Raises MeshError."""
     name = str(buffer.get("uri", ""))
     if name.startswith("data:"):
         try:
-            found = base64.b64decode(name.partition(",")[2], validate=True)
+            content = base64.b64decode(name.partition(",")[2], validate=True)
         except binascii.Error:
             raise MeshError("has a buffer in its text that is no base64") from None
     else:
@@ -122,13 +122,13 @@ def _buffer(buffer: dict[str, Any], folder: Path, most: int) -> bytes:
         inside = not Path(unquote(name)).is_absolute() and file.resolve().is_relative_to(folder.resolve())
         if not name or ":" in name or not inside:
             raise MeshError(f"names a buffer outside its folder: '{name[:60]}'")
-        rest = "" if most == MAX_BYTES else f" (of {MAX_BYTES >> 20} MiB for all buffers)"
+        of_total = "" if limit == MAX_BYTES else f" (of {MAX_BYTES >> 20} MiB for all buffers)"
         try:
-            found = named_files.read(file, most)
+            content = named_files.read(file, limit)
         except named_files.FileError as error:
-            raise MeshError(f"names the buffer '{name[:60]}', which {error}{rest}") from None
-    if len(found) + 3 > most:
+            raise MeshError(f"names the buffer '{name[:60]}', which {error}{of_total}") from None
+    if len(content) + 3 > limit:
         raise MeshError(f"has buffers of more than {MAX_BYTES >> 20} MiB together")
-    if len(found) < int(buffer["byteLength"]):
-        raise MeshError(f"has a buffer of {len(found)} bytes where it says {buffer['byteLength']}")
-    return found + bytes(-len(found) % 4)
+    if len(content) < int(buffer["byteLength"]):
+        raise MeshError(f"has a buffer of {len(content)} bytes where it says {buffer['byteLength']}")
+    return content + bytes(-len(content) % 4)

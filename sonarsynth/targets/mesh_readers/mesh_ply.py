@@ -53,17 +53,17 @@ def read_ply(data: bytes) -> Surface:
     if kind == "ascii":
         body = _text(body)
         elements = [_all_double(e) for e in elements]
-    at, found = 0, {}
+    at, columns = 0, {}
     for element in elements:
         try:
-            found[element.name], at = _rows(element, body, at, ORDERS[kind])
+            columns[element.name], at = _rows(element, body, at, ORDERS[kind])
         except (struct.error, ValueError, OverflowError, MemoryError) as error:
             reason = "its numbers end before" if isinstance(error, struct.error) else error
             raise MeshError(f"is cut off, or damaged, in its element '{element.name}' ({reason})") from None
     if at != len(body):
         over = f"{(len(body) - at) // 8} numbers" if kind == "ascii" else f"{len(body) - at} bytes"
         raise MeshError(f"holds {over} more than its header says")
-    return _surface(as_written, found)
+    return _surface(as_written, columns)
 
 
 def _header(text: bytes) -> tuple[str, list[_Element]]:
@@ -159,16 +159,16 @@ def _row(element: _Element, body: bytes, at: int, order: str) -> tuple[dict[str,
         count, of = 1, element.scalars.get(name, "")
         if name in element.lists:
             many, of = element.lists[name]
-            (given,) = struct.unpack_from(order + np.dtype(many).char, body, at)
-            if given != given // 1 or not 0 <= given <= len(body):
-                raise ValueError(f"a list of {given:g}")
-            count, at = int(given), at + np.dtype(many).itemsize
+            (length,) = struct.unpack_from(order + np.dtype(many).char, body, at)
+            if length != length // 1 or not 0 <= length <= len(body):
+                raise ValueError(f"a list of {length:g}")
+            count, at = int(length), at + np.dtype(many).itemsize
         values[name] = struct.unpack_from(f"{order}{count}{np.dtype(of).char}", body, at)
         at += count * np.dtype(of).itemsize
     return values, at
 
 
-def _surface(elements: list[_Element], found: dict[str, Any]) -> Surface:
+def _surface(elements: list[_Element], columns: dict[str, Any]) -> Surface:
     by_name = {element.name: element for element in elements}
     if (strips := by_name.get("tristrips")) and strips.count:
         raise MeshError("holds strips of triangles ('tristrips'), which are not read: save it with faces")
@@ -180,17 +180,17 @@ def _surface(elements: list[_Element], found: dict[str, Any]) -> Surface:
     named = [name for name in face.lists if name in ("vertex_indices", "vertex_index")] or list(face.lists)
     if len(named) != 1:
         raise MeshError("does not say which list of a face holds its corners ('vertex_indices')")
-    vertices = np.stack([found["vertex"][axis].astype(float) for axis in "xyz"], axis=-1)
-    counts, corners = found["face"][named[0]]
+    vertices = np.stack([columns["vertex"][axis].astype(float) for axis in "xyz"], axis=-1)
+    counts, corners = columns["face"][named[0]]
     if (few := counts < 3).any():
         raise MeshError(f"facet {int(np.argmax(few))} has fewer than three corners")
     return vertices, polygons(vertices, counts, _indices(corners, counts, len(vertices)))
 
 
-def _indices(corners: npt.NDArray[Any], counts: Ints, most: int) -> Ints:
+def _indices(corners: npt.NDArray[Any], counts: Ints, count: int) -> Ints:
     """Raises MeshError where a corner is not the number of a vertex."""
-    wrong = ~((corners >= 0) & (corners < most) & (corners == np.floor(corners)))
+    wrong = ~((corners >= 0) & (corners < count) & (corners == np.floor(corners)))
     if wrong.any():
         facet = int(np.searchsorted(np.cumsum(counts), int(np.argmax(wrong)), side="right"))
-        raise MeshError(f"facet {facet} has index {corners[wrong][0]:g}, out of range: there are {most} vertices")
+        raise MeshError(f"facet {facet} has index {corners[wrong][0]:g}, out of range: there are {count} vertices")
     return corners.astype(np.int64)

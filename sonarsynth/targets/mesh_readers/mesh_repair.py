@@ -62,8 +62,8 @@ def repair(surface: Surface, name: str, *, shares_vertices: bool) -> tuple[Surfa
     if len(once) < len(faces):
         notes.append(f"{_count(len(faces) - len(once))} repeated, dropped")
         faces = faces[once]
-    faces, said = orient(vertices, faces)
-    return weld((vertices, faces)), (*notes, *said)
+    faces, turned = orient(vertices, faces)
+    return weld((vertices, faces)), (*notes, *turned)
 
 
 def without_area(corners: Floats) -> Bools:
@@ -122,37 +122,37 @@ def _winding(faces: Ints) -> tuple[Bools, Ints, int]:
     order = np.argsort(edge, kind="stable")
     first = np.flatnonzero(np.diff(edge[order], prepend=-1))
     pair = first[np.diff(np.append(first, len(edge))) == 2]  # edges of exactly two facets
-    one, two = order[pair], order[pair + 1]
-    differ = number * (forward[one] == forward[two])
+    first_side, second_side = order[pair], order[pair + 1]
+    differ = number * (forward[first_side] == forward[second_side])
     ends = (
-        np.concatenate([facet[one], facet[one] + number]),
-        np.concatenate([facet[two] + differ, facet[two] + number - differ]),
+        np.concatenate([facet[first_side], facet[first_side] + number]),
+        np.concatenate([facet[second_side] + differ, facet[second_side] + number - differ]),
     )
     graph = coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(2 * number, 2 * number))
     label = connected_components(graph, directed=False)[1]
     asis, turned = label[:number], label[number:]
-    kept = np.bincount(asis, minlength=label.max() + 1)
-    turn = (kept[turned] > kept[asis]) | ((kept[turned] == kept[asis]) & (turned < asis))
+    as_they_are = np.bincount(asis, minlength=label.max() + 1)
+    turn = (as_they_are[turned] > as_they_are[asis]) | ((as_they_are[turned] == as_they_are[asis]) & (turned < asis))
     part = np.unique(np.minimum(asis, turned), return_inverse=True)[1]
     return turn, part, len(np.unique(asis[asis == turned]))
 
 
 def _outward(vertices: Floats, faces: Ints, part: Ints) -> tuple[Bools, Bools]:
     """(part,) whether it is closed (its directed edges cancel); whether it looks outwards, or nobody can say."""
-    parts = int(part.max()) + 1
+    count = int(part.max()) + 1
     edge = sides(faces)[1].ravel()
     owner = np.repeat(part, 3)
     code, index = np.unique(owner * (int(edge.max()) + 1) + edge, return_inverse=True)
     net = np.bincount(index, np.where((faces < np.roll(faces, -1, axis=1)).ravel(), 1.0, -1.0))
-    closed = np.bincount(code // (int(edge.max()) + 1), np.abs(net), parts) == 0
+    closed = np.bincount(code // (int(edge.max()) + 1), np.abs(net), count) == 0
     corners = vertices[faces]
     doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(doubled, axis=1)
     centroid = corners.mean(axis=1)
-    total = np.bincount(part, area, parts)
-    middle = np.stack([np.bincount(part, area * centroid[:, i], parts) for i in range(3)], 1) / total[:, None]
-    volume = np.bincount(part, np.einsum("fi,fi->f", centroid - middle[part], doubled), parts)
-    opening = np.linalg.norm(np.stack([np.bincount(part, doubled[:, i], parts) for i in range(3)], 1), axis=1) / total
+    total = np.bincount(part, area, count)
+    middle = np.stack([np.bincount(part, area * centroid[:, i], count) for i in range(3)], 1) / total[:, None]
+    volume = np.bincount(part, np.einsum("fi,fi->f", centroid - middle[part], doubled), count)
+    opening = np.linalg.norm(np.stack([np.bincount(part, doubled[:, i], count) for i in range(3)], 1), axis=1) / total
     sure = closed | (opening < NEARLY_CLOSED)
     return np.asarray(closed), np.asarray(~(sure & (volume < 0)))
 
@@ -162,5 +162,5 @@ def _turned_to_smallest(faces: Ints) -> Ints:
     return np.take_along_axis(faces, (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3, axis=1)
 
 
-def _count(number: int | np.integer[Any], one: str = "facet", many: str = "facets") -> str:
-    return f"{number} {one if number == 1 else many}"
+def _count(number: int | np.integer[Any], singular: str = "facet", plural: str = "facets") -> str:
+    return f"{number} {singular if number == 1 else plural}"

@@ -57,7 +57,7 @@ def numbers(words: list[bytes], kind: type[float] = float) -> list[float]:
 def _statements(data: bytes) -> list[tuple[int, bytes]]:
     """Lines of an OBJ with their numbers, without comments, those that end in '\\' joined with the next. A comment goes
     to the end of its line, '\\' or not."""
-    found, begun, first = [], b"", 0
+    statements, begun, first = [], b"", 0
     for number, line in enumerate(lines_of(data), start=1):
         text, mark, _ = line.partition(b"#")
         begun, first = begun + text, first or number
@@ -65,9 +65,9 @@ def _statements(data: bytes) -> list[tuple[int, bytes]]:
             begun = begun[:-1] + b" "
             continue
         if begun.strip():
-            found.append((first, begun))
+            statements.append((first, begun))
         begun, first = b"", 0
-    return [*found, (first, begun)] if begun.strip() else found
+    return [*statements, (first, begun)] if begun.strip() else statements
 
 
 def read_obj(data: bytes) -> Surface:
@@ -78,9 +78,9 @@ def read_obj(data: bytes) -> Surface:
         if kind == b"v":
             places.extend(_vertex(number, words))
         elif kind in (b"f", b"fo"):
-            here = _corners(number, words, len(places) // 3)
-            corners.extend(here)
-            counts.append(len(here))
+            facet_corners = _corners(number, words, len(places) // 3)
+            corners.extend(facet_corners)
+            counts.append(len(facet_corners))
             rows.append(number)
         elif reason := UNREAD.get(kind):
             raise MeshError(f"line {number}: {reason}")
@@ -105,17 +105,17 @@ def _vertex(number: int, words: list[bytes]) -> list[float]:
         raise MeshError(f"line {number}: a vertex whose coordinates are not numbers") from None
 
 
-def _corners(number: int, words: list[bytes], seen: int) -> list[int]:
+def _corners(number: int, words: list[bytes], vertices: int) -> list[int]:
     """Vertices from 0 of a facet; a negative index counts back from the last vertex before it."""
     try:
-        given = [int(n) for n in numbers([word.split(b"/", 1)[0] for word in words], int)]
+        indices = [int(n) for n in numbers([word.split(b"/", 1)[0] for word in words], int)]
     except ValueError:
         raise MeshError(f"line {number}: a facet whose corners are not numbers") from None
-    if len(given) < 3:
+    if len(indices) < 3:
         raise MeshError(f"line {number}: a facet with fewer than three corners")
-    if wrong := [g for g in given if g == 0 or g < -seen or g > 1 << 40]:
-        raise MeshError(f"line {number}: index {wrong[0]} is out of range, there are {seen} vertices before it")
-    return [g - 1 if g > 0 else seen + g for g in given]
+    if wrong := [g for g in indices if g == 0 or g < -vertices or g > 1 << 40]:
+        raise MeshError(f"line {number}: index {wrong[0]} is out of range, there are {vertices} vertices before it")
+    return [g - 1 if g > 0 else vertices + g for g in indices]
 
 
 def read_off(data: bytes) -> Surface:

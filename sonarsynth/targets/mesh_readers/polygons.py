@@ -34,16 +34,16 @@ def triangles(vertices: Floats, counts: Ints, corners: Ints) -> Ints:
     Raises PolygonError for one that crosses itself, or is neither convex nor of few corners.
     """
     starts = np.cumsum(counts) - counts
-    parts, owners = [], []
+    cuts, owners = [], []
     for count in np.unique(counts):
-        some = np.flatnonzero(counts == count)
-        block = corners[starts[some, None] + np.arange(count)]
-        cut = block[:, None, :] if count == 3 else _cut(vertices, block, some)
-        parts.append(cut.reshape(-1, 3))
-        owners.append(np.repeat(some, cut.shape[1]))
-    if not parts:
+        rows = np.flatnonzero(counts == count)
+        block = corners[starts[rows, None] + np.arange(count)]
+        cut = block[:, None, :] if count == 3 else _cut(vertices, block, rows)
+        cuts.append(cut.reshape(-1, 3))
+        owners.append(np.repeat(rows, cut.shape[1]))
+    if not cuts:
         return np.empty((0, 3), np.int64)
-    return np.asarray(np.concatenate(parts)[np.argsort(np.concatenate(owners), kind="stable")])
+    return np.asarray(np.concatenate(cuts)[np.argsort(np.concatenate(owners), kind="stable")])
 
 
 def _cut(vertices: Floats, block: Ints, numbers: Ints) -> Ints:
@@ -104,31 +104,31 @@ def _ears(plane: Floats, least: float, number: int) -> Ints:
     """(count - 2, 3) of one polygon (corner, 2), cut off ear by ear."""
     if len(plane) > MOST_CORNERS:
         raise PolygonError(number, f"a polygon of {len(plane)} corners that is not convex, more than {MOST_CORNERS}")
-    left, found = list(range(len(plane))), []
-    while len(left) > 3:
-        at = next((n for n in range(len(left)) if _is_ear(plane, left, n, least)), None)
+    ring, ears = list(range(len(plane))), []
+    while len(ring) > 3:
+        at = next((n for n in range(len(ring)) if _is_ear(plane, ring, n, least)), None)
         if at is None:  # what is left has no area, or crosses itself
-            at = next((n for n in range(len(left)) if abs(_corner_area(plane, left, n)) <= least), None)
+            at = next((n for n in range(len(ring)) if abs(_corner_area(plane, ring, n)) <= least), None)
         if at is None:
             raise PolygonError(number, "a polygon that crosses itself")
-        found.append((left[at - 1], left[at], left[(at + 1) % len(left)]))
-        del left[at]
-    faces = np.array([*found, tuple(left)])
+        ears.append((ring[at - 1], ring[at], ring[(at + 1) % len(ring)]))
+        del ring[at]
+    faces = np.array([*ears, tuple(ring)])
     if _triangle_areas(plane, faces).min() < -least:
         raise PolygonError(number, "a polygon that crosses itself")
     return faces
 
 
-def _corner_area(plane: Floats, left: list[int], n: int) -> float:
-    return float(_doubled(plane[left[n - 1]], plane[left[n]], plane[left[(n + 1) % len(left)]]))
+def _corner_area(plane: Floats, ring: list[int], n: int) -> float:
+    return float(_doubled(plane[ring[n - 1]], plane[ring[n]], plane[ring[(n + 1) % len(ring)]]))
 
 
-def _is_ear(plane: Floats, left: list[int], n: int, least: float) -> bool:
+def _is_ear(plane: Floats, ring: list[int], n: int, least: float) -> bool:
     """True where a corner turns the right way and no other corner lies in its triangle or on the border of it."""
-    if _corner_area(plane, left, n) <= least:
+    if _corner_area(plane, ring, n) <= least:
         return False
-    a, b, c = (plane[left[n - 1]], plane[left[n]], plane[left[(n + 1) % len(left)]])
-    other = plane[left]
-    inside = np.min([_doubled(a, b, other), _doubled(b, c, other), _doubled(c, a, other)], axis=0) >= -least
-    same = (other == a).all(axis=1) | (other == b).all(axis=1) | (other == c).all(axis=1)
+    a, b, c = (plane[ring[n - 1]], plane[ring[n]], plane[ring[(n + 1) % len(ring)]])
+    corners = plane[ring]
+    inside = np.min([_doubled(a, b, corners), _doubled(b, c, corners), _doubled(c, a, corners)], axis=0) >= -least
+    same = (corners == a).all(axis=1) | (corners == b).all(axis=1) | (corners == c).all(axis=1)
     return not bool((inside & ~same).any())
