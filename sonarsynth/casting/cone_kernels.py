@@ -33,9 +33,9 @@ def _frame(axis: Floats, frame: Floats) -> None:
     for j in range(1, 3):
         if abs(axis[j]) < abs(axis[small]):
             small = j
-    one, two = (small + 1) % 3, (small + 2) % 3
-    length = math.hypot(axis[one], axis[two])
-    frame[0, small], frame[0, one], frame[0, two] = 0.0, axis[two] / length, -axis[one] / length
+    second, third = (small + 1) % 3, (small + 2) % 3
+    length = math.hypot(axis[second], axis[third])
+    frame[0, small], frame[0, second], frame[0, third] = 0.0, axis[third] / length, -axis[second] / length
     frame[2, 0], frame[2, 1], frame[2, 2] = axis[0], axis[1], axis[2]
     frame[1, 0] = axis[1] * frame[0, 2] - axis[2] * frame[0, 1]
     frame[1, 1] = axis[2] * frame[0, 0] - axis[0] * frame[0, 2]
@@ -61,10 +61,10 @@ def _misses_box(nodes: Floats, n: int, apex: Floats, axis: Floats, inverse: Floa
     dx, dy, dz = nodes[n, 0] - apex[0], nodes[n, 1] - apex[1], nodes[n, 2] - apex[2]
     hx, hy, hz = nodes[n, 3], nodes[n, 4], nodes[n, 5]
     along = dx * axis[0] + dy * axis[1] + dz * axis[2]
-    most = hx * abs(axis[0]) + hy * abs(axis[1]) + hz * abs(axis[2])
-    if not (along + most >= 0.0 and along - most <= reach):
+    half_extent = hx * abs(axis[0]) + hy * abs(axis[1]) + hz * abs(axis[2])
+    if not (along + half_extent >= 0.0 and along - half_extent <= reach):
         return True
-    wide = slope * (along + most) + 1e-12
+    wide = slope * (along + half_extent) + 1e-12
     x, y, z = dx * inverse[0], dy * inverse[1], dz * inverse[2]
     sx, sy, sz = (hx + wide) * abs(inverse[0]), (hy + wide) * abs(inverse[1]), (hz + wide) * abs(inverse[2])
     return bool(max(x - sx, y - sy, z - sz, 0.0) > min(x + sx, y + sy, z + sz, reach) * (1.0 + 1e-9) + 1e-12)
@@ -122,18 +122,18 @@ def _beside(corner: Floats, slope: float, reach: float) -> bool:
 @njit(cache=True, error_model="numpy", nogil=True)
 def _across(facet: int, a: int, b: int, faces: Int32s, first: Int32s, around: Int32s) -> int:
     """The facet across the edge from vertex a to b of a facet; -1 unless there is one, with the same outer side."""
-    found = -1
+    neighbour = -1
     for i in range(first[a], first[a + 1]):
-        other = around[i]
-        if other == facet:
+        candidate = around[i]
+        if candidate == facet:
             continue
         for j in range(3):
-            tail, head = faces[other, j], faces[other, (j + 1) % 3]
-            if tail == b and head == a and found < 0:
-                found = other
+            tail, head = faces[candidate, j], faces[candidate, (j + 1) % 3]
+            if tail == b and head == a and neighbour < 0:
+                neighbour = candidate
             elif (tail == a and head == b) or (tail == b and head == a):
                 return -1
-    return found
+    return neighbour
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -143,12 +143,12 @@ def _crosses(corner: Floats, slope: float, far: float, sense: float) -> float:
     ex, ey, ez = corner[1, 0] - corner[0, 0], corner[1, 1] - corner[0, 1], corner[1, 2] - corner[0, 2]
     fx, fy, fz = corner[2, 0] - corner[0, 0], corner[2, 1] - corner[0, 1], corner[2, 2] - corner[0, 2]
     nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
-    side = sense if sense != 0.0 else math.copysign(1.0, nz)
-    steep, lean = side * nz, slope * math.hypot(nx, ny)
+    sign = sense if sense != 0.0 else math.copysign(1.0, nz)
+    steep, lean = sign * nz, slope * math.hypot(nx, ny)
     if not steep > 1.001 * lean + 1e-9 * math.sqrt(nx * nx + ny * ny + nz * nz):
         return 0.0
-    height = side * (nx * corner[0, 0] + ny * corner[0, 1] + nz * corner[0, 2])
-    return side if height / (steep + lean) > 1e-5 and height / (steep - lean) < far else 0.0
+    height = sign * (nx * corner[0, 0] + ny * corner[0, 1] + nz * corner[0, 2])
+    return sign if height / (steep + lean) > 1e-5 and height / (steep - lean) < far else 0.0
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -164,23 +164,23 @@ def _closes(
     """
     patch[0], count, done, sense = facet, 1, 0, 0.0
     while done < count:
-        here = patch[done]
+        current = patch[done]
         done += 1
-        _corners(here, apex, frame, vertices, faces, corner)
+        _corners(current, apex, frame, vertices, faces, corner)
         sense = _crosses(corner, slope, far, sense)
         if sense == 0.0:
             return False
         for j in range(3):
             if not _touches(corner[j], corner[(j + 1) % 3], slope * slope):
                 continue
-            other = _across(here, faces[here, j], faces[here, (j + 1) % 3], faces, first, around)
-            known = False
+            next_facet = _across(current, faces[current, j], faces[current, (j + 1) % 3], faces, first, around)
+            in_patch = False
             for i in range(count):
-                known = known or patch[i] == other
-            if other < 0 or (not known and count == PATCH):
+                in_patch = in_patch or patch[i] == next_facet
+            if next_facet < 0 or (not in_patch and count == PATCH):
                 return False
-            if not known:
-                patch[count] = other
+            if not in_patch:
+                patch[count] = next_facet
                 count += 1
     return True
 

@@ -22,16 +22,16 @@ def classify_cones(
     apex, axis: (cone, xyz) world, axes of unit length; slope (cone,): radius of the cone over the distance along it.
     Holds for any line that stays in the cone, bent or not, from its apex to where it ends.
     """
-    found = np.full(len(apex), EMPTY)
+    verdicts = np.full(len(apex), EMPTY)
     for body in bodies:
-        left = np.flatnonzero(found != CLOSED)
-        if not len(body.mesh.faces) or not len(left):
+        open_cones = np.flatnonzero(verdicts != CLOSED)
+        if not len(body.mesh.faces) or not len(open_cones):
             continue
         mesh = casting_mesh(body.mesh)
-        start = (body.pose.to_body(apex[left]) - mesh.centre) / mesh.size
-        verdict = np.empty(len(left), np.int64)
-        tree, towards = mesh.tree, np.ascontiguousarray(body.pose.turn_to_body(axis[left]))
-        limits = slope[left], reach[left] / mesh.size, far[left] / mesh.size
+        start = (body.pose.to_body(apex[open_cones]) - mesh.centre) / mesh.size
+        verdict = np.empty(len(open_cones), np.int64)
+        tree, towards = mesh.tree, np.ascontiguousarray(body.pose.turn_to_body(axis[open_cones]))
+        limits = slope[open_cones], reach[open_cones] / mesh.size, far[open_cones] / mesh.size
         cone_kernels.look(start, towards, *limits, *tree, mesh.vertices, mesh.faces, *mesh.around, verdict)
-        found[left] = np.where(verdict == CLOSED, CLOSED, np.maximum(found[left], verdict))
-    return found
+        verdicts[open_cones] = np.where(verdict == CLOSED, CLOSED, np.maximum(verdicts[open_cones], verdict))
+    return verdicts

@@ -47,22 +47,22 @@ def _select(order: Int32s, key: Any, axis: int, low: int, high: int, middle: int
 @njit(cache=True, error_model="numpy", nogil=True)
 def order_of(vertices: Floats, faces: Int32s, leaves: int) -> Int32s:
     """The facets in order of place: halved at the middle of the longest side of what is left, leaf by leaf."""
-    count, order, parts = len(faces), np.arange(len(faces)).astype(np.int32), 1
+    count, order, ranges = len(faces), np.arange(len(faces)).astype(np.int32), 1
     key = np.empty((count, 3), np.float32)
     for i in range(count):
         for x in range(3):
             key[i, x] = vertices[faces[i, 0], x] + vertices[faces[i, 1], x] + vertices[faces[i, 2], x]
-    while parts < leaves:
-        for part in range(parts):
-            low, high, longest, side = part * count // parts, (part + 1) * count // parts, -1.0, 0
+    while ranges < leaves:
+        for n in range(ranges):
+            low, high, longest, axis = n * count // ranges, (n + 1) * count // ranges, -1.0, 0
             for x in range(3):
-                least, most = np.inf, -np.inf
+                lowest, highest = np.inf, -np.inf
                 for i in range(low, high):
-                    least, most = min(least, key[order[i], x]), max(most, key[order[i], x])
-                if most - least > longest:
-                    longest, side = most - least, x
-            _select(order, key, side, low, high, (2 * part + 1) * count // (2 * parts))
-        parts *= 2
+                    lowest, highest = min(lowest, key[order[i], x]), max(highest, key[order[i], x])
+                if highest - lowest > longest:
+                    longest, axis = highest - lowest, x
+            _select(order, key, axis, low, high, (2 * n + 1) * count // (2 * ranges))
+        ranges *= 2
     return order
 
 

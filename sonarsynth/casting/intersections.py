@@ -104,12 +104,12 @@ def round_vertices(faces: Int32s, vertices: int) -> tuple[Int32s, Int32s]:
             first[faces[facet, corner] + 1] += 1
     for vertex in range(vertices):
         first[vertex + 1] += first[vertex]
-    place = first.copy()
+    next_slot = first.copy()
     for facet in range(len(faces)):
         for corner in range(3):
             vertex = faces[facet, corner]
-            around[place[vertex]] = facet
-            place[vertex] += 1
+            around[next_slot[vertex]] = facet
+            next_slot[vertex] += 1
     return first, around
 
 
@@ -179,18 +179,18 @@ def folded_pass_near(
         within = (radius + reach[i]) ** 2
         near[i] = False
         done, z, sense = 0.0, z0, rising if n > 0 else 1.0
-        for k in range(n + 1):  # piece by piece between boundaries, part: of the whole way
+        for k in range(n + 1):  # piece by piece between boundaries, fraction: of the whole path
             edge = 0.0 if sense > 0.0 else -bottom
-            part = 1.0 if k == n or climb == 0.0 else min(done + abs(edge - z) / climb, 1.0)
+            fraction = 1.0 if k == n or climb == 0.0 else min(done + abs(edge - z) / climb, 1.0)
             z_after = end[i, 2] if k == n else edge
-            first = max(done, min(part, skip[i] / length if length > 0.0 else 1.0))
-            if part > first or (k == n and first == done):
-                along = (first - done) / (part - done) if part > done else 0.0
+            first = max(done, min(fraction, skip[i] / length if length > 0.0 else 1.0))
+            if fraction > first or (k == n and first == done):
+                along = (first - done) / (fraction - done) if fraction > done else 0.0
                 ax, ay, az = x0 + first * dx, y0 + first * dy, z + along * (z_after - z)
-                sx, sy, sz = (part - first) * dx, (part - first) * dy, z_after - az
+                sx, sy, sz = (fraction - first) * dx, (fraction - first) * dy, z_after - az
                 cx, cy, cz = centre[0] - ax, centre[1] - ay, centre[2] - az
                 square = sx * sx + sy * sy + sz * sz
                 t = min(max((cx * sx + cy * sy + cz * sz) / square, 0.0), 1.0) if square > 0.0 else 0.0
                 ex, ey, ez = cx - t * sx, cy - t * sy, cz - t * sz
                 near[i] = near[i] or ex * ex + ey * ey + ez * ez <= within
-            done, z, sense = part, z_after, -sense
+            done, z, sense = fraction, z_after, -sense

@@ -110,8 +110,8 @@ class CastingMesh:
         entry, leave = _through_unit_sphere(origin, direction, far)
         open_rays = np.flatnonzero(entry < leave)
         start = origin[open_rays] + entry[open_rays, None] * direction[open_rays]
-        facet[open_rays], where = self.within(start, direction[open_rays], (far - entry)[open_rays])
-        distance[open_rays] = where + entry[open_rays]
+        facet[open_rays], along = self.within(start, direction[open_rays], (far - entry)[open_rays])
+        distance[open_rays] = along + entry[open_rays]
         return facet, distance
 
     def within(self, start: Floats, heading: Floats, limit: Floats) -> tuple[Ints, Floats]:
@@ -119,11 +119,11 @@ class CastingMesh:
         from sonarsynth.casting import intersections
 
         facet, distance = np.full(len(start), NO_TARGET), np.full(len(start), np.nan)
-        left, passed = np.arange(len(start)), np.zeros(len(start))
+        rays, passed = np.arange(len(start)), np.zeros(len(start))
         for _ in range(ROUNDS):
             proposed, at = self.caster.nearest(start + passed[:, None] * heading, heading, limit - passed)
             proposed = np.where((proposed >= 0) & (proposed < len(self.faces)), proposed, -1)
-            found, where = np.empty(len(start), np.int64), np.empty(len(start))
+            hit, along = np.empty(len(start), np.int64), np.empty(len(start))
             from_start, as_proposed = np.zeros(len(start)), np.fmin(limit, passed + at + SLACK)
             intersections.confirm(
                 start,
@@ -135,18 +135,18 @@ class CastingMesh:
                 self.faces,
                 *self.around,
                 1.0,
-                found,
-                where,
+                hit,
+                along,
             )
-            facet[left], distance[left] = found, where
-            again = (found < 0) & (proposed >= 0)
+            facet[rays], distance[rays] = hit, along
+            again = (hit < 0) & (proposed >= 0)
             if not again.any():
                 return facet, distance
             passed = (passed + at + 2 * OFFSET)[again]
-            left, start, heading, limit = left[again], start[again], heading[again], limit[again]
-        found, where = np.empty(len(start), np.int64), np.empty(len(start))
-        intersections.search(start, heading, np.zeros(len(start)), limit, self.vertices, self.faces, 1.0, found, where)
-        facet[left], distance[left] = found, where
+            rays, start, heading, limit = rays[again], start[again], heading[again], limit[again]
+        hit, along = np.empty(len(start), np.int64), np.empty(len(start))
+        intersections.search(start, heading, np.zeros(len(start)), limit, self.vertices, self.faces, 1.0, hit, along)
+        facet[rays], distance[rays] = hit, along
         return facet, distance
 
 

@@ -22,9 +22,9 @@ FLAT: Final = 1e-6
 class Neighbours(NamedTuple):
     """Pairs of facets that share an edge; edges of one facet, or of more than two, are left out."""
 
-    one: Ints  # (pair,) facet
-    other: Ints  # (pair,) facet
-    start: Floats  # (pair, xyz) m: the edge, in the sense of `one`
+    facet: Ints  # (pair,)
+    neighbour: Ints  # (pair,) the facet across the edge
+    start: Floats  # (pair, xyz) m: the edge, as `facet` runs along it
     stop: Floats  # (pair, xyz) m
     turn: Floats  # (pair,) |n1 - n2|
 
@@ -32,15 +32,15 @@ class Neighbours(NamedTuple):
 def neighbours(mesh: Mesh) -> Neighbours:
     """Facets that share an edge; vertices in the same place are one."""
     _, faces = weld((mesh.vertices, mesh.faces.astype(np.int64)))
-    side = sides(faces)[1].ravel()
-    order = np.argsort(side, kind="stable")
-    first, count = np.unique(side[order], return_index=True, return_counts=True)[1:]
+    edge = sides(faces)[1].ravel()
+    order = np.argsort(edge, kind="stable")
+    first, count = np.unique(edge[order], return_index=True, return_counts=True)[1:]
     shared = first[count == 2]
-    at, other = order[shared], order[shared + 1] // 3
-    one, corner = at // 3, at % 3
-    turn = np.linalg.norm(mesh.normal[one] - mesh.normal[other], axis=1)
-    start, stop = (mesh.vertices[mesh.faces[one, n]] for n in (corner, (corner + 1) % 3))
-    return Neighbours(one, other, start, stop, turn)
+    at, neighbour = order[shared], order[shared + 1] // 3
+    facet, corner = at // 3, at % 3
+    turn = np.linalg.norm(mesh.normal[facet] - mesh.normal[neighbour], axis=1)
+    start, stop = (mesh.vertices[mesh.faces[facet, n]] for n in (corner, (corner + 1) % 3))
+    return Neighbours(facet, neighbour, start, stop, turn)
 
 
 def curvature_radius(mesh: Mesh) -> Floats:
@@ -52,11 +52,11 @@ def curvature_radius(mesh: Mesh) -> Floats:
     """
     pair = neighbours(mesh)
     smooth = (pair.turn > FLAT) & (pair.turn < CREASE)
-    one, other = pair.one[smooth], pair.other[smooth]
-    radius = np.linalg.norm(mesh.centroid[one] - mesh.centroid[other], axis=1) / pair.turn[smooth]
+    facet, neighbour = pair.facet[smooth], pair.neighbour[smooth]
+    radius = np.linalg.norm(mesh.centroid[facet] - mesh.centroid[neighbour], axis=1) / pair.turn[smooth]
     out = np.full(len(mesh.faces), np.inf)
-    np.minimum.at(out, one, radius)
-    np.minimum.at(out, other, radius)
+    np.minimum.at(out, facet, radius)
+    np.minimum.at(out, neighbour, radius)
     return out
 
 
@@ -93,9 +93,9 @@ def bend(mesh: Mesh) -> Bend:
     determinant = 0.5 * np.abs(np.trace(s, axis1=1, axis2=2) ** 2 - trace)
     total = np.sqrt(trace + 2.0 * determinant)  # tr |S|
     wanted = np.einsum("pij,pij->p", square, c) + determinant * np.trace(c, axis1=1, axis2=2)  # tr |S| times tr(|S| C)
-    some = np.where(total > 0, total, 1.0)
-    sagitta = 1.5 * wanted / some
-    across = np.sqrt(24.0 * wanted) / some
+    nonzero = np.where(total > 0, total, 1.0)
+    sagitta = 1.5 * wanted / nonzero
+    across = np.sqrt(24.0 * wanted) / nonzero
     return Bend(sagitta[piece], across[piece])
 
 
@@ -104,7 +104,7 @@ def flat_pieces(mesh: Mesh) -> tuple[Ints, Neighbours]:
     pairs = neighbours(mesh)
     flat = pairs.turn <= FLAT
     number = len(mesh.faces)
-    ends = (pairs.one[flat], pairs.other[flat])
+    ends = (pairs.facet[flat], pairs.neighbour[flat])
     graph = coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(number, number))
     return connected_components(graph, directed=False)[1].astype(np.int64), pairs
 
@@ -113,18 +113,18 @@ def _smooth(mesh: Mesh, pairs: Neighbours) -> Neighbours:
     """The pairs across whose edge the surface goes on in a curve."""
     smooth = (pairs.turn > FLAT) & (pairs.turn < CREASE)
     if mesh.flat is not None:
-        smooth &= ~(mesh.flat[pairs.one] | mesh.flat[pairs.other])
-    one, other, start, stop, turn = pairs
-    return Neighbours(one[smooth], other[smooth], start[smooth], stop[smooth], turn[smooth])
+        smooth &= ~(mesh.flat[pairs.facet] | mesh.flat[pairs.neighbour])
+    facet, neighbour, start, stop, turn = pairs
+    return Neighbours(facet[smooth], neighbour[smooth], start[smooth], stop[smooth], turn[smooth])
 
 
 def _shape_operators(mesh: Mesh, piece: Ints, pairs: Neighbours, area: Floats) -> Floats:
     """(piece, 3, 3) mean gradient of the normal over each flat piece (1/m): symmetric, in its plane."""
     along = pairs.stop - pairs.start
-    half = mesh.normal[pairs.one] + mesh.normal[pairs.other]
+    half = mesh.normal[pairs.facet] + mesh.normal[pairs.neighbour]
     half /= np.linalg.norm(half, axis=1)[:, None]
     total = np.zeros((len(area), 9))
-    for facet, sense in ((pairs.one, 1.0), (pairs.other, -1.0)):
+    for facet, sense in ((pairs.facet, 1.0), (pairs.neighbour, -1.0)):
         normal = mesh.normal[facet]
         tangent = half - np.einsum("pi,pi->p", half, normal)[:, None] * normal
         outward = np.cross(sense * along, normal)

@@ -22,8 +22,8 @@ def east_north(latitude: Floats, longitude: Floats, origin: tuple[float, float])
     Mueller (2012), Geodesy, 4th ed., sections 4.1 (ellipsoid) and 4.3 (local axes).
     """
     phi, lam = np.asarray(latitude, float), np.asarray(longitude, float)
-    there, here = (_from_centre(np.asarray(a), np.asarray(b)) for a, b in ((phi, lam), origin))
-    away = there - here
+    point, centre = (_from_centre(np.asarray(a), np.asarray(b)) for a, b in ((phi, lam), origin))
+    away = point - centre
     (sp, cp), (sl, cl) = ((np.sin(angle), np.cos(angle)) for angle in origin)
     east = away @ np.array([-sl, cl, 0.0])
     north = away @ np.array([-sp * cl, -sp * sl, cp])

@@ -32,21 +32,21 @@ class Mesh:
     def _corners(self) -> Floats:
         return read_only(self.vertices[self.faces])
 
-    def corners_of(self, some: Ints | slice) -> Floats:
+    def corners_of(self, rows: Ints | slice) -> Floats:
         """(row, 3, xyz) m: corners of the facets picked by indices or a slice."""
-        return self.vertices[self.faces[some]]
+        return self.vertices[self.faces[rows]]
 
     @cached_property
     def _sides(self) -> tuple[Floats, Floats]:
         """Area and normal, by blocks of facets."""
         count = len(self.faces)
         area, normal = np.empty(count), np.empty((count, 3))
-        for some in in_blocks(count):
-            a, b, c = np.moveaxis(self.corners_of(some), 1, 0)
+        for block in in_blocks(count):
+            a, b, c = np.moveaxis(self.corners_of(block), 1, 0)
             (ux, uy, uz), (vx, vy, vz) = (b - a).T, (c - a).T  # a tenth of the time of np.cross
             cross = np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
-            area[some] = 0.5 * np.linalg.norm(cross, axis=1)
-            normal[some] = cross / (2.0 * area[some, None])
+            area[block] = 0.5 * np.linalg.norm(cross, axis=1)
+            normal[block] = cross / (2.0 * area[block, None])
         return read_only(area), read_only(normal)
 
     @property
@@ -63,9 +63,9 @@ class Mesh:
     def centroid(self) -> Floats:
         """(facet, xyz) m."""
         centroid = np.empty((len(self.faces), 3))
-        for some in in_blocks(len(self.faces)):
-            a, b, c = np.moveaxis(self.corners_of(some), 1, 0)
-            centroid[some] = (a + b + c) / 3.0
+        for block in in_blocks(len(self.faces)):
+            a, b, c = np.moveaxis(self.corners_of(block), 1, 0)
+            centroid[block] = (a + b + c) / 3.0
         return read_only(centroid)
 
     @cached_property
@@ -103,16 +103,16 @@ class Mesh:
 
 def in_blocks(count: int) -> list[slice]:
     """Parts of a table, so that what is needed to make it stays small: as many equal ones as hold BLOCK at most."""
-    parts = max(-(-count // BLOCK), 1)
-    edges = [count * n // parts for n in range(parts + 1)]
+    blocks = max(-(-count // BLOCK), 1)
+    edges = [count * n // blocks for n in range(blocks + 1)]
     return [slice(first, last) for first, last in pairwise(edges)]
 
 
 def farthest_corner(mesh: Mesh) -> float:
     """Largest distance (m) of a corner of a facet from its middle."""
     far = 0.0
-    for some in in_blocks(len(mesh.faces)):
-        apart = np.linalg.norm(mesh.corners_of(some) - mesh.centroid[some, None, :], axis=-1)
+    for block in in_blocks(len(mesh.faces)):
+        apart = np.linalg.norm(mesh.corners_of(block) - mesh.centroid[block, None, :], axis=-1)
         far = max(far, float(apart.max(initial=0.0)))
     return far
 

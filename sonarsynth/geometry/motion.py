@@ -215,10 +215,10 @@ class Track:
     def part(self, offset: Floats) -> Track:
         """The track of a point of it, offset (xyz) m in its own frame."""
         turned = self.pose.turn_to_world(offset)
-        place = Pose(self.pose.position + turned, self.pose.orientation)
+        pose = Pose(self.pose.position + turned, self.pose.orientation)
         x, y, z = (np.asarray(self.offset) + offset).tolist()
         turning = np.cross(self.spin, turned) if offset.any() else 0.0
-        return Track(place, self.velocity + turning, self.motion, self.time, (x, y, z))
+        return Track(pose, self.velocity + turning, self.motion, self.time, (x, y, z))
 
     def later(self, seconds: float) -> Track:
         """The same so many seconds (s) after, or before."""
@@ -226,8 +226,8 @@ class Track:
         if self.motion is None:
             moved = Pose(self.pose.position + self.velocity * seconds, self.pose.orientation)
             return Track(moved, self.velocity, None, time, self.offset)
-        whole = Track(pose(self.motion, time), velocity(self.motion, time), self.motion, time)
-        return whole.part(np.array(self.offset))
+        body = Track(pose(self.motion, time), velocity(self.motion, time), self.motion, time)
+        return body.part(np.array(self.offset))
 
     def positions(self, seconds: Floats) -> Floats:
         """Where it is (..., xyz) m, world, so many seconds (...) s after."""
@@ -264,13 +264,13 @@ def _heading_at(motion: Waypoints, index: int) -> float:
 
 def _pose_on_waypoints(motion: Waypoints, time: float) -> Pose:
     a, b = _leg(motion, time)
-    part = float(np.clip((time - a.time) / (b.time - a.time), 0.0, 1.0))
-    position = (1 - part) * np.array(a.position) + part * np.array(b.position)
+    fraction = float(np.clip((time - a.time) / (b.time - a.time), 0.0, 1.0))
+    position = (1 - fraction) * np.array(a.position) + fraction * np.array(b.position)
     i = motion.points.index(a)
     start = _heading_at(motion, i)
-    if a.heading is None and b.heading is None and part >= 1.0:
+    if a.heading is None and b.heading is None and fraction >= 1.0:
         start = _heading_at(motion, i + 1)
-    return Pose(position, quaternion(start + part * _turn(motion, a, b), motion.pitch, motion.roll))
+    return Pose(position, quaternion(start + fraction * _turn(motion, a, b), motion.pitch, motion.roll))
 
 
 def _turn(motion: Waypoints, a: Waypoint, b: Waypoint) -> float:

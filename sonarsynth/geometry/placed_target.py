@@ -38,8 +38,8 @@ class PlacedTarget:
 
     def later(self, seconds: float) -> PlacedTarget:
         """The body where it will be, or was, so many seconds (s) after."""
-        there = self.track.later(seconds)
-        return replace(self, pose=there.pose, velocity=there.velocity, time=there.time)
+        track = self.track.later(seconds)
+        return replace(self, pose=track.pose, velocity=track.velocity, time=track.time)
 
     @property
     def frozen(self) -> PlacedTarget:

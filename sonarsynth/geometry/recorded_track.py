@@ -121,15 +121,15 @@ def _curve(track: RecordedTrack, changed: tuple[int, int]) -> _Curve:
     table = read_track(Path(track.path))
     clock = table.columns["time"]
     time = clock - (clock[0] if track.start == "first" else track.start)
-    place = _places(track, table)
+    position = _places(track, table)
     angles = [np.full(len(time), angle) for angle in (track.pitch, track.roll)]
     angles = [np.unwrap(table.columns.get(name, a)) for name, a in zip(("pitch", "roll"), angles, strict=True)]
-    velocity = Akima1DInterpolator(time, place, method="makima").derivative()(time)
+    velocity = Akima1DInterpolator(time, position, method="makima").derivative()(time)
     if track.heading is not None:
         heading = np.full(len(time), track.heading)
     else:
         heading = np.unwrap(table.columns["heading"]) if "heading" in table.columns else _courses(velocity)
-    values = np.column_stack([place, heading, *angles])
+    values = np.column_stack([position, heading, *angles])
     curve = Akima1DInterpolator(time, values, method="makima")
     return _Curve(time.tolist(), np.asarray(curve.c, float))
 
@@ -164,5 +164,5 @@ def _courses(velocity: Floats) -> Floats:
     moving = np.flatnonzero(np.hypot(velocity[:, 0], velocity[:, 1]) > AT_REST)
     if not len(moving):
         return np.zeros(len(velocity))
-    held = moving[np.maximum(np.searchsorted(moving, np.arange(len(velocity)), side="right") - 1, 0)]
-    return np.unwrap(np.arctan2(velocity[held, 0], velocity[held, 1]))
+    last = moving[np.maximum(np.searchsorted(moving, np.arange(len(velocity)), side="right") - 1, 0)]
+    return np.unwrap(np.arctan2(velocity[last, 0], velocity[last, 1]))

@@ -24,11 +24,11 @@ class MeshError(ValueError):
     """A mesh that cannot be used: one line that names it and the reason."""
 
 
-def join(*parts: Surface) -> Surface:
+def join(*surfaces: Surface) -> Surface:
     """One surface of several, in order."""
-    starts = np.cumsum([0, *(len(v) for v, _ in parts[:-1])])
-    vertices = np.concatenate([v for v, _ in parts])
-    return vertices, np.concatenate([f + start for (_, f), start in zip(parts, starts, strict=True)])
+    starts = np.cumsum([0, *(len(v) for v, _ in surfaces[:-1])])
+    vertices = np.concatenate([v for v, _ in surfaces])
+    return vertices, np.concatenate([f + start for (_, f), start in zip(surfaces, starts, strict=True)])
 
 
 def weld(surface: Surface, tolerance: float = 0.0) -> Surface:
@@ -42,12 +42,12 @@ def weld(surface: Surface, tolerance: float = 0.0) -> Surface:
     points = vertices[used] + 0.0  # -0 is 0
     key = np.round(points / tolerance) + 0.0 if tolerance > 0 else points
     _, first, same = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    corner = first[same.ravel()][index.ravel()]  # the kept vertex of each corner
-    kept, seen, corner = np.unique(corner, return_index=True, return_inverse=True)
-    order = np.argsort(seen)
+    corner = first[same.ravel()][index.ravel()]  # the vertex that stays for each corner
+    remaining, first_use, corner = np.unique(corner, return_index=True, return_inverse=True)
+    order = np.argsort(first_use)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
-    return points[kept[order]], rank[corner.ravel()].reshape(-1, 3)
+    return points[remaining[order]], rank[corner.ravel()].reshape(-1, 3)
 
 
 def longest_edge(surface: Facets) -> float:

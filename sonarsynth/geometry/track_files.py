@@ -108,11 +108,11 @@ def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
 
 def _wanted(path: Path, line: int, names: list[str]) -> dict[str, tuple[int, float]]:
     """Index and size of the unit of the column of each quantity that is there."""
-    found: dict[str, tuple[int, float]] = {}
+    columns: dict[str, tuple[int, float]] = {}
     for index, name in enumerate(names):
         plain, unit = _split(name)
-        for quantity, (usual, known) in NAMES.items():
-            if plain not in known or quantity in found:
+        for quantity, (usual, spellings) in NAMES.items():
+            if plain not in spellings or quantity in columns:
                 continue
             symbol = {"deg": "rad"}.get(usual, usual)
             if unit is not None and unit not in UNITS[symbol]:
@@ -120,19 +120,19 @@ def _wanted(path: Path, line: int, names: list[str]) -> dict[str, tuple[int, flo
                     f"{path}, line {line}, column '{name.strip()[:40]}': unit '{unit}' is not one of "
                     f"{', '.join(UNITS[symbol])}"
                 )
-            found[quantity] = (index, UNITS[symbol][usual if unit is None else unit])
+            columns[quantity] = (index, UNITS[symbol][usual if unit is None else unit])
     shown = ", ".join(f"'{name.strip()[:30]}'" for name in names[:12])
-    if "time" not in found:
+    if "time" not in columns:
         raise TrackError(f"{path}, line {line}: no column of time among {shown}")
-    if not ({"x", "y"} <= set(found) or {"latitude", "longitude"} <= set(found)):
+    if not ({"x", "y"} <= set(columns) or {"latitude", "longitude"} <= set(columns)):
         raise TrackError(f"{path}, line {line}: no columns of x and y, or of latitude and longitude, among {shown}")
-    return found
+    return columns
 
 
 def _split(name: str) -> tuple[str, str | None]:
     """A column's name in lower case, and the unit in brackets after it."""
-    found = re.fullmatch(r"\s*(.*?)\s*[(\[]\s*(.*?)\s*[)\]]\s*", name)
-    plain, unit = (found[1], found[2]) if found else (name, None)
+    match = re.fullmatch(r"\s*(.*?)\s*[(\[]\s*(.*?)\s*[)\]]\s*", name)
+    plain, unit = (match[1], match[2]) if match else (name, None)
     unit = {"degrees": "deg", "metres": "m", "meters": "m", "seconds": "s", "utc": "s", "": None}.get(
         unit.lower(), unit
     ) if unit is not None else None  # fmt: skip
@@ -145,8 +145,8 @@ def _value(quantity: str, cell: str, where: str) -> float:
     except ValueError:
         seconds = _instant(cell) if quantity == "time" else None
         if seconds is None:
-            what = "a number or a date such as 2024-05-01T10:00:00Z" if quantity == "time" else "a number"
-            raise TrackError(f"{where}: {cell[:40]!r} is not {what}") from None
+            needed = "a number or a date such as 2024-05-01T10:00:00Z" if quantity == "time" else "a number"
+            raise TrackError(f"{where}: {cell[:40]!r} is not {needed}") from None
         return seconds
     if not np.isfinite(number) or abs(number) > 1e12:
         raise TrackError(f"{where}: {cell[:40]!r} is not a number of this world")
@@ -192,15 +192,15 @@ def _gpx(path: Path, data: bytes) -> TrackTable:
 
 def _point(point: Element, where: str) -> dict[str, float]:
     """Time (s), latitude and longitude (deg), and height (m) where it has one."""
-    texts = {_name(part): part.text or "" for part in point}
+    texts = {_name(child): child.text or "" for child in point}
     if "time" not in texts:
         raise TrackError(f"{where}: has no time")
-    found = {
+    values = {
         "time": _value("time", texts["time"], f"{where}, time"),
         "latitude": _value("latitude", point.get("lat", ""), f"{where}, lat"),
         "longitude": _value("longitude", point.get("lon", ""), f"{where}, lon"),
     }
-    return found | ({"z": _value("z", texts["ele"], f"{where}, ele")} if "ele" in texts else {})
+    return values | ({"z": _value("z", texts["ele"], f"{where}, ele")} if "ele" in texts else {})
 
 
 def _name(element: Element) -> str:

@@ -204,54 +204,54 @@ def _find(
         kinds = ", ".join(kind.__name__ for kind in get_args(get_args(SoundSpeed)[0]))
         raise ValueError(f"sound_speed must be one of {kinds}, not {type(sound_speed).__name__}")
     try:
-        most = operator.index(vertices)
+        max_vertices = operator.index(vertices)
     except TypeError:
         raise ValueError(f"vertices must be a whole number, not {vertices!r}") from None
-    if not 0 <= most <= MOST_VERTICES:
-        raise ValueError(f"vertices must lie between 0 and {MOST_VERTICES}, but is {most}")
+    if not 0 <= max_vertices <= MOST_VERTICES:
+        raise ValueError(f"vertices must lie between 0 and {MOST_VERTICES}, but is {max_vertices}")
     _check(names, bottom_depth, start, end, distance)
     profile = profile_of(sound_speed)
     for note in profile.notes:
         warnings.warn(note, OutOfRange, stacklevel=2)
-    parts, pairs = [], []
+    groups, pairs = [], []
     for depth in np.unique(bottom_depth) if len(bottom_depth) else []:
         reaches(sound_speed, float(depth))
         chosen = np.flatnonzero(bottom_depth == depth)
         water = kernel.water(profile.depth, profile.speed, float(depth))
-        found = kernel.eigenrays(water, start[chosen], end[chosen], distance[chosen], most, most)
-        parts.append(_arrivals(found, chosen[found.pair], ahead, distance))
-        pairs.append(parts[-1].pair)
-    if not parts:
+        rays = kernel.eigenrays(water, start[chosen], end[chosen], distance[chosen], max_vertices, max_vertices)
+        groups.append(_arrivals(rays, chosen[rays.pair], ahead, distance))
+        pairs.append(groups[-1].pair)
+    if not groups:
         nothing = np.empty(0)
         water = kernel.water(profile.depth, profile.speed, 1.0)
         return _arrivals(kernel.eigenrays(water, nothing, nothing, nothing), np.empty(0, np.int64), ahead, nothing)
     order = np.argsort(np.concatenate(pairs), kind="stable")
-    return RayArrivals(**{name: np.concatenate([vars(part)[name] for part in parts])[order] for name in vars(parts[0])})
+    return RayArrivals(**{name: np.concatenate([vars(g)[name] for g in groups])[order] for name in vars(groups[0])})
 
 
-def _arrivals(found: kernel.Eigenrays, pair: Ints, ahead: Floats, distance: Floats) -> RayArrivals:
+def _arrivals(rays: kernel.Eigenrays, pair: Ints, ahead: Floats, distance: Floats) -> RayArrivals:
     toward = np.broadcast_to(ahead, (len(distance), 2))[pair]
     vertical = distance[pair] == 0.0
     angles, directions = [], []
-    for sine, speed in ((found.start_sine, found.start_speed), (found.end_sine, found.end_speed)):
-        cosine = np.where(np.isnan(sine), np.nan, np.where(vertical, 0.0, found.slowness * speed))
+    for sine, speed in ((rays.start_sine, rays.start_speed), (rays.end_sine, rays.end_speed)):
+        cosine = np.where(np.isnan(sine), np.nan, np.where(vertical, 0.0, rays.slowness * speed))
         angles.append(np.arctan2(0.0 - sine, cosine))
         directions.append(np.concatenate([toward * cosine[:, None], sine[:, None]], axis=1))
     return RayArrivals(
         pair=pair,
-        travel_time=found.travel_time,
-        length=found.length,
+        travel_time=rays.travel_time,
+        length=rays.length,
         launch_angle=angles[0],
         arrival_angle=angles[1],
-        surface=found.surface,
-        bottom=found.bottom,
-        turning=found.turning,
-        caustics=found.caustics,
-        ray_parameter=found.slowness,
-        amplitude=found.amplitude,
+        surface=rays.surface,
+        bottom=rays.bottom,
+        turning=rays.turning,
+        caustics=rays.caustics,
+        ray_parameter=rays.slowness,
+        amplitude=rays.amplitude,
         departure=directions[0],
         arrival=directions[1],
-        flag=found.flag,
+        flag=rays.flag,
     )
 
 
@@ -279,11 +279,11 @@ def _together(names: tuple[str, ...], arrays: list[Floats]) -> list[Floats]:
 def _check(names: tuple[str, ...], bottom_depth: Floats, start: Floats, end: Floats, distance: Floats) -> None:
     """Raises ValueError in one line that names what is wrong, and which of them."""
 
-    def first(wrong: Bools, name: str, values: Floats, what: str) -> None:
+    def first(wrong: Bools, name: str, values: Floats, problem: str) -> None:
         if wrong.any():
             i = int(np.argmax(wrong))
             which = f"{name} of pair {i}" if len(values) > 1 else name
-            raise ValueError(f"{which} {what.format(value=values[i], bottom_depth=bottom_depth[i])}")
+            raise ValueError(f"{which} {problem.format(value=values[i], bottom_depth=bottom_depth[i])}")
 
     for name, values in zip(names, (bottom_depth, start, end, distance), strict=True):
         first(~np.isfinite(values), name, values, "must be finite, but is {value:g} m")

@@ -25,17 +25,17 @@ class Image:
 def images(start: Floats, end: Floats, bottom_depth: float, bounces: int) -> list[Image]:
     """All ways from depths start to depths end (pair,) by at most so many reflections; the straight one first."""
     top, bottom = np.minimum(start, end), np.maximum(start, end)
-    span, found = bottom - top, []
+    span, paths = bottom - top, []
     for n in range(bounces + 1):
         for down in (True, False) if n else (True,):
             below = (n + 1) // 2 if down else n // 2
             surface = n - below
             towards = (start <= end) == down  # launched towards the depth of the other end
             passes = np.where(towards, 2 * (n // 2) + 1, 2 * ((n - 1) // 2) + 1) if n else np.ones(len(top))
-            parts = (2.0 * surface * top, passes * span, 2.0 * below * (bottom_depth - bottom))
-            climb = start - end if n == 0 else (-1.0 if down else 1.0) * sum(parts)
-            found.append(Image(surface, below, np.asarray(climb, float), 1.0 - 2.0 * (n % 2), *parts))
-    return found
+            climbs = (2.0 * surface * top, passes * span, 2.0 * below * (bottom_depth - bottom))
+            climb = start - end if n == 0 else (-1.0 if down else 1.0) * sum(climbs)
+            paths.append(Image(surface, below, np.asarray(climb, float), 1.0 - 2.0 * (n % 2), *climbs))
+    return paths
 
 
 def order(pair: Ints, time: Floats) -> Ints:

@@ -68,8 +68,8 @@ class PathModel(Method):
     def reflected(self, bounces: int) -> Self:
         """The same model, of paths with at most so many reflections."""
         model: Any = self
-        found: Self = replace(model, bounces=bounces)
-        return found
+        changed: Self = replace(model, bounces=bounces)
+        return changed
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`, of the paths to all facets: what they take more than straight lines, once an emission and

@@ -50,10 +50,10 @@ def polylines(
     distance = np.hypot(span[:, 0], span[:, 1])
     ahead = np.divide(span, distance[:, None], out=np.zeros_like(span), where=distance[:, None] > 0)
     none = np.empty(0)
-    made = [_points(layers, rays, i, z1[i], z2[i], distance[i], spacing, sagitta) for i in range(len(p1))]
-    ray = np.repeat(np.arange(len(p1)), [len(m.x) for m in made])
-    made.append(_Points(none, none, none, none, none, np.empty(0, int)))
-    x, z, phi, time, length, event = (np.concatenate([getattr(m, f.name) for m in made]) for f in fields(_Points))
+    points = [_points(layers, rays, i, z1[i], z2[i], distance[i], spacing, sagitta) for i in range(len(p1))]
+    ray = np.repeat(np.arange(len(p1)), [len(m.x) for m in points])
+    points.append(_Points(none, none, none, none, none, np.empty(0, int)))
+    x, z, phi, time, length, event = (np.concatenate([getattr(m, f.name) for m in points]) for f in fields(_Points))
     position = np.column_stack([p1[ray, :2] + x[:, None] * ahead[ray], -z])
     direction = np.column_stack([np.cos(phi)[:, None] * ahead[ray], -np.sin(phi)])
     last = np.searchsorted(ray, np.arange(len(p1)), side="right") - 1
@@ -94,14 +94,14 @@ def _points(
     if min(stops) == max(stops):  # level, also along a boundary, or coincident ends
         x = np.linspace(0.0, distance, max(len(stops), 1 + int(np.ceil(distance / spacing))))
         level = np.full(len(x), rays.start_sine[i])
-        what = np.array([LAUNCH, *events[:-1], *[ON] * (len(x) - len(stops)), ARRIVAL])
-        return _Points(x, np.full(len(x), z1), level, x / rays.start_speed[i], x, what)
+        event = np.array([LAUNCH, *events[:-1], *[ON] * (len(x) - len(stops)), ARRIVAL])
+        return _Points(x, np.full(len(x), z1), level, x / rays.start_speed[i], x, event)
     arcs = _arcs(layers, stops, events, sense, float(rays.start_speed[i]), float(rays.end_speed[i]))
     p, sine, dx = _closed(arcs, rays, i, distance)
-    made = _along(arcs, p, sine, dx, spacing, sagitta)
+    points = _along(arcs, p, sine, dx, spacing, sagitta)
     for end, sine_there, c in ((0, rays.start_sine[i], rays.start_speed[i]), (-1, rays.end_sine[i], rays.end_speed[i])):
-        made.phi[end] = -np.arctan2(sine_there, p * c)  # on a jump: on the side of the jump that the eigenray says
-    return made
+        points.phi[end] = -np.arctan2(sine_there, p * c)  # on a jump: on the side of the jump that the eigenray says
+    return points
 
 
 def _stops(rays: Eigenrays, i: int, z1: float, z2: float, bottom_depth: float) -> tuple[list[float], list[int], float]:
@@ -134,9 +134,9 @@ def _arcs(layers: Water, stops: list[float], events: list[int], sense: float, c_
             level = last and event == TURN and not _at_jump(layers, b)
             rows.append((*_span(layers, j, a, b, sense), sense, starts_level, level, event if last else ON))
         sense = -sense
-    z1, z2, c1, c2, rise, gradient, senses, starts, ends, what = np.array(rows, float).T
+    z1, z2, c1, c2, rise, gradient, senses, starts, ends, kind = np.array(rows, float).T
     turns = np.column_stack([starts > 0, ends > 0])
-    return _Arcs(np.column_stack([z1, z2]), np.column_stack([c1, c2]), rise, gradient, senses, turns, what.astype(int))
+    return _Arcs(np.column_stack([z1, z2]), np.column_stack([c1, c2]), rise, gradient, senses, turns, kind.astype(int))
 
 
 def _layers_between(layers: Water, a: float, b: float, sense: float) -> list[int]:
@@ -162,8 +162,8 @@ def _span(layers: Water, j: int, a: float, b: float, sense: float) -> tuple[floa
     top, bottom = layers.depth[j], layers.depth[j + 1]
     thickness, difference = bottom - top, layers.speed[j + 1] - layers.speed[j]
     z = np.clip(np.array([a, b]), top, bottom)
-    part = (z - top) / thickness if thickness > 0 else np.zeros(2)
-    c = np.where(part == 1.0, layers.speed[j + 1], layers.speed[j] + part * difference)
+    fraction = (z - top) / thickness if thickness > 0 else np.zeros(2)
+    c = np.where(fraction == 1.0, layers.speed[j + 1], layers.speed[j] + fraction * difference)
     rise = abs(thickness / difference) if difference != 0 else 0.0
     return z[0], z[1], c[0], c[1], rise, sense * difference / thickness if thickness > 0 else 0.0
 
@@ -183,12 +183,12 @@ def _closed(arcs: _Arcs, rays: Eigenrays, i: int, distance: float) -> tuple[floa
     v = float(np.sqrt(max(square, (LEAST * fastest) ** 2)))
     h, dx, slope = _extents(arcs, offset, v)
     for _ in range(4):
-        left = dx.sum() - distance
-        there = max(v - left / slope, 0.0) if slope != 0.0 else v
-        better = _extents(arcs, offset, there)
-        if not abs(better[1].sum() - distance) < abs(left):
+        misfit = dx.sum() - distance
+        trial = max(v - misfit / slope, 0.0) if slope != 0.0 else v
+        better = _extents(arcs, offset, trial)
+        if not abs(better[1].sum() - distance) < abs(misfit):
             break
-        v, (h, dx, slope) = there, better
+        v, (h, dx, slope) = trial, better
     p = float(1.0 / np.hypot(v, fastest))
     return p, p * h, dx
 
@@ -212,13 +212,13 @@ def _along(arcs: _Arcs, p: float, sine: Floats, dx: Floats, spacing: float, sagi
     pieces = np.maximum(pieces, 1.0).astype(int)
     arc = np.repeat(np.arange(len(pieces)), pieces)
     nth = np.arange(1, len(arc) + 1) - (np.cumsum(pieces) - pieces)[arc]
-    part, last = nth / pieces[arc], nth == pieces[arc]
-    half = 0.5 * part * turn[arc]
+    fraction, last = nth / pieces[arc], nth == pieces[arc]
+    half = 0.5 * fraction * turn[arc]
     mean = angle[arc, 0] - half
-    chord = part * length[arc] * np.sinc(half / np.pi)
+    chord = fraction * length[arc] * np.sinc(half / np.pi)
     speed = np.maximum(arcs.c[arc, 0] + arcs.gradient[arc] * chord * np.sin(mean), 1e-3 * arcs.c[arc, 0])
     time = _chord_time(chord, arcs.c[arc, 0], np.where(last, arcs.c[arc, 1], speed), arcs.gradient[arc])
-    before = [np.cumsum(whole) - whole for whole in (dx, time[last], length)]
+    before = [np.cumsum(extent) - extent for extent in (dx, time[last], length)]
     leaving = arcs.sense[arc] * (mean - half)
     leaving[last] = np.append((arcs.sense * angle[:, 0])[1:], arcs.sense[-1] * angle[-1, 1])
     depths = np.where(last, arcs.z[arc, 1], arcs.z[arc, 0] + arcs.sense[arc] * chord * np.sin(mean))
@@ -227,7 +227,7 @@ def _along(arcs: _Arcs, p: float, sine: Floats, dx: Floats, spacing: float, sagi
         z=np.append(arcs.z[0, 0], depths),
         phi=np.append(arcs.sense[0] * angle[0, 0], leaving),
         time=np.append(0.0, before[1][arc] + time),
-        length=np.append(0.0, before[2][arc] + part * length[arc]),
+        length=np.append(0.0, before[2][arc] + fraction * length[arc]),
         event=np.append(LAUNCH, np.where(last, arcs.event[arc], ON)),
     )
 

@@ -53,8 +53,8 @@ def snell(layers: Water, layer: Ints, z: Floats, direction: Floats) -> tuple[Flo
     """Angle (positive down) and p = cos/c of directions (ray, xyz) at depths z in layers."""
     flat = np.hypot(direction[:, 0], direction[:, 1])
     thickness = layers.depth[layer + 1] - layers.depth[layer]
-    part = np.divide(z - layers.depth[layer], thickness, out=np.zeros_like(z), where=thickness > 0)
-    c = layers.speed[layer] + part * (layers.speed[layer + 1] - layers.speed[layer])
+    fraction = np.divide(z - layers.depth[layer], thickness, out=np.zeros_like(z), where=thickness > 0)
+    c = layers.speed[layer] + fraction * (layers.speed[layer + 1] - layers.speed[layer])
     return np.arctan2(-direction[:, 2], flat), flat / c
 
 
@@ -107,14 +107,14 @@ def step(
     target, facet, length = meet(bodies, state.clear, after.position)
     hit = np.flatnonzero(target >= 0)
     if len(hit):
-        start, whole, s = state.select(hit), (after.length - state.length)[hit], length[hit]
+        start, chord, s = state.select(hit), (after.length - state.length)[hit], length[hit]
         corner, normal = planes(bodies, target[hit], facet[hit])
         for _ in range(4):  # Newton along the arc to the plane of the facet
             moved, _ = move(layers, start, s, np.inf)
             off = np.einsum("ij,ij->i", normal, moved.position - corner)
             with np.errstate(divide="ignore", invalid="ignore"):
                 better = s - off / np.einsum("ij,ij->i", normal, moved.direction)
-            s = np.where((better >= 0) & (better <= whole), better, s)
+            s = np.where((better >= 0) & (better <= chord), better, s)
         moved, _ = move(layers, start, s, np.inf)
         why[hit] = FACET
         for f in fields(Rays):
@@ -130,10 +130,10 @@ def meet(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats) -> tuple[
     for index, body in enumerate(bodies):
         going = np.flatnonzero(nearest > 0)
         o, d = body.pose.to_body(start[going]), body.pose.turn_to_body(span[going])
-        found, at = first_hit(body.mesh, o, d)
-        closer = (found >= 0) & (at <= nearest[going])
+        hit, at = first_hit(body.mesh, o, d)
+        closer = (hit >= 0) & (at <= nearest[going])
         rows = going[closer]
-        target[rows], facet[rows], nearest[rows] = index, found[closer], at[closer]
+        target[rows], facet[rows], nearest[rows] = index, hit[closer], at[closer]
     return target, facet, nearest
 
 
@@ -141,9 +141,9 @@ def planes(bodies: tuple[PlacedTarget, ...], target: Ints, facet: Ints) -> tuple
     """A point and the normal of facets, in the world."""
     point, normal = np.empty((len(target), 3)), np.empty((len(target), 3))
     for index, body in enumerate(bodies):
-        mine = target == index
-        point[mine] = body.pose.to_world(body.mesh.centroid[facet[mine]])
-        normal[mine] = body.pose.turn_to_world(body.mesh.normal[facet[mine]])
+        own = target == index
+        point[own] = body.pose.to_world(body.mesh.centroid[facet[own]])
+        normal[own] = body.pose.turn_to_world(body.mesh.normal[facet[own]])
     return point, normal
 
 

@@ -55,6 +55,6 @@ def at_boundaries(
 def as_sign(phase: Floats) -> tuple[Floats, Floats]:
     """Sign (path,) and what is left of phases (path,), 0 for whole multiples of pi, else as it is within a turn."""
     half = np.rint(phase / np.pi)
-    whole = np.abs(phase - np.pi * half) < 1e-9
-    sign = np.where(whole & (np.mod(half, 2) == 1), -1.0, 1.0)
-    return sign, np.where(whole, 0.0, np.mod(phase + np.pi, 2.0 * np.pi) - np.pi)
+    multiple = np.abs(phase - np.pi * half) < 1e-9
+    sign = np.where(multiple & (np.mod(half, 2) == 1), -1.0, 1.0)
+    return sign, np.where(multiple, 0.0, np.mod(phase + np.pi, 2.0 * np.pi) - np.pi)

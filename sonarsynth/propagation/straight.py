@@ -65,8 +65,8 @@ class Straight(PathModel):
         for image in images(z1, z2, environment_depth, self.bounces):
             height = np.abs(image.climb)
             length = np.sqrt(level[:, 0] ** 2 + level[:, 1] ** 2 + height**2)
-            parts = (image.above, image.between, image.below)
-            crossed = sum(part * s for part, s in zip(parts, slowness, strict=True))
+            heights = (image.above, image.between, image.below)
+            crossed = sum(h * s for h, s in zip(heights, slowness, strict=True))
             mean = np.divide(crossed, height, out=slowness[1].copy(), where=height > 0)
             with np.errstate(divide="ignore", invalid="ignore"):
                 departure = np.column_stack([level, image.climb]) / length[:, None]
