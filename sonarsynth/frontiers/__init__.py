@@ -86,35 +86,35 @@ def measure(
     FieldError as `plan` does.
     """
     say("planning")
-    made = plan_of(recipe)
+    plan = plan_of(recipe)
     if seed is not None:
-        made = replace(plan_of(replace(recipe, seed=seed), choices=made.choices), errors=made.errors)
+        plan = replace(plan_of(replace(recipe, seed=seed), choices=plan.choices), errors=plan.errors)
     chosen = usual_frames(recipe.frames) if frames is None else tuple(frames)
     points: list[Point] = []
-    rests, hydrophones_computed = [], 0
+    others, hydrophones_computed = [], 0
     for index in chosen:
-        found, rest, count = _frame(made, index, hydrophones, say, peers=peers and index == chosen[0])
-        points += found
-        rests.append(rest)
+        of_frame, other_seconds, count = _frame(plan, index, hydrophones, say, peers=peers and index == chosen[0])
+        points += of_frame
+        others.append(other_seconds)
         hydrophones_computed = count
     rows = merged(points)
-    rest = sum(rests) / len(rests)
-    own = tuple(sorted(set_by_recipe(made.scene)))
+    other_seconds = sum(others) / len(others)
+    own = tuple(sorted(set_by_recipe(plan.scene)))
     return AccuracyReport(
         recipe.title,
         chosen,
         hydrophones_computed,
         tuple(rows),
-        tuple(verdicts(rows, made.scene, rest)),
-        made.choices.as_json(),
+        tuple(verdicts(rows, plan.scene, other_seconds)),
+        plan.choices.as_json(),
         own,
     )
 
 
-def _frame(made: Plan, index: int, hydrophones: int | None, say: Say, *, peers: bool) -> tuple[list[Point], float, int]:
+def _frame(base: Plan, index: int, hydrophones: int | None, say: Say, *, peers: bool) -> tuple[list[Point], float, int]:
     """The points of one frame; seconds of what nothing is chosen for; and hydrophones computed exactly."""
     say(f"frame {index}: exactly")
-    exact = exact_frame(made, index, hydrophones)
+    exact = exact_frame(base, index, hydrophones)
     plan, frame = exact.plan, exact.frame
     points = [synthesis_check(exact)]
     say(f"frame {index}: tracing, {len(exact.sensor)} hydrophones")
@@ -124,16 +124,16 @@ def _frame(made: Plan, index: int, hydrophones: int | None, say: Say, *, peers: 
     points += synthesis_points(traced)
     arrivals = arrivals_of(plan, frame)
     signals = frame_signals(plan, frame, arrivals)
-    whole = FullFrame.of(exact, signals)
+    full = FullFrame.of(exact, signals)
     say(f"frame {index}: image and range")
-    points += image_points(plan, whole.beamformed, peers)
-    points += range_points(plan, frame, whole.beamformed)
-    points += picking_points(plan, frame, arrivals, whole.beamformed)
+    points += image_points(plan, full.beamformed, peers)
+    points += range_points(plan, frame, full.beamformed)
+    points += picking_points(plan, frame, arrivals, full.beamformed)
     if peers:
         say(f"frame {index}: peers")
         points += synthesis_peers(plan, frame, arrivals.seen_from_centre)  # peers know no shade
-        points += image_peers(plan, frame, arrivals.seen_from_centre, whole.beamformed)
+        points += image_peers(plan, frame, arrivals.seen_from_centre, full.beamformed)
     say(f"frame {index}: everything exact")
-    spent = whole.seconds + sum(p.seconds for p in points if p.chosen and p.stage not in ("synthesis", "picking"))
-    points += whole_points(whole, traced, spent)
-    return points, whole.seconds, len(exact.sensor)
+    spent = full.seconds + sum(p.seconds for p in points if p.chosen and p.stage not in ("synthesis", "picking"))
+    points += whole_points(full, traced, spent)
+    return points, full.seconds, len(exact.sensor)

@@ -57,16 +57,16 @@ class ExactFrame:
 
     plan: Plan  # that of the frame's sequence
     frame: Frame
-    sensor: Ints  # (heard,) live hydrophones, ascending; some of those of `each`
+    sensor: Ints  # (heard,) live hydrophones, ascending; some of those of `single`
     pressures: Pressures  # from the description alone, where its laws are known there
     seconds: float  # of that, of all live hydrophones: estimated
-    each: SensorPressures
+    single: SensorPressures
     note: str = ""  # why it is not from the description alone
 
     @property
     def whole(self) -> bool:
         """Whether every live hydrophone is traced by itself."""
-        return len(self.each.sensor) == int(np.count_nonzero(self.plan.elements.gain))
+        return len(self.single.sensor) == int(np.count_nonzero(self.plan.elements.gain))
 
     @property
     def partly(self) -> str:
@@ -78,7 +78,7 @@ class ExactFrame:
     def pressure(self) -> Floats:
         """(sensor, sample) Pa: everything, at all hydrophones, each traced by itself; 0 at dead ones."""
         out = np.zeros((self.plan.elements.count, self.plan.windows.samples))
-        out[self.each.sensor] = self.each.pressures[0] + self.each.pressures[1]
+        out[self.single.sensor] = self.single.pressures[0] + self.single.pressures[1]
         return out
 
 
@@ -106,46 +106,46 @@ def exact_frame(plan: Plan, index: int, hydrophones: int | None = None) -> Exact
     """A frame at so many hydrophones, spread over the array; left out: at all, or those that can be afforded."""
     plan = plan.at(index)
     frame = plan.recipe.frame(index)[1]
-    each = each_hydrophone(exact_plan(plan), frame, hydrophones)
+    single = each_hydrophone(exact_plan(plan), frame, hydrophones)
     alone = FramePressure(plan.scene, frame, plan.profile)
     if alone.unknown:
-        return ExactFrame(plan, frame, each.sensor, each.pressures, sum(each.seconds), each, alone.unknown)
+        return ExactFrame(plan, frame, single.sensor, single.pressures, sum(single.seconds), single, alone.unknown)
     start, samples, live = frame_start(plan, frame), plan.windows.samples, int(np.count_nonzero(plan.elements.gain))
     rows: dict[int, Pressures] = {}
     began = time.process_time()
-    for sensor in spread(each.sensor, min(TRIED, len(each.sensor))):
+    for sensor in spread(single.sensor, min(TRIED, len(single.sensor))):
         rows[int(sensor)] = alone.pressure([int(sensor)], start, samples)
     mean = (time.process_time() - began) / len(rows)
-    wanted = len(each.sensor)
+    wanted = len(single.sensor)
     if hydrophones is None:
         wanted = min(wanted, int(np.clip(COMPUTED / max(mean, 1e-3), FEWEST, SOME)))
-    chosen = each.sensor if wanted == len(each.sensor) else np.union1d(list(rows), spread(each.sensor, wanted))
+    chosen = single.sensor if wanted == len(single.sensor) else np.union1d(list(rows), spread(single.sensor, wanted))
     for sensor in chosen:
         if int(sensor) not in rows:
             rows[int(sensor)] = alone.pressure([int(sensor)], start, samples)
     seconds = (time.process_time() - began) / len(rows) * live
     received = (np.vstack([rows[int(n)][0] for n in chosen]), np.vstack([rows[int(n)][1] for n in chosen]))
-    return ExactFrame(plan, frame, chosen, received, seconds, each)
+    return ExactFrame(plan, frame, chosen, received, seconds, single)
 
 
 def each_hydrophone(
-    plan: Plan, frame: Frame, hydrophones: int | None = None, some: Ints | None = None
+    plan: Plan, frame: Frame, hydrophones: int | None = None, sensors: Ints | None = None
 ) -> SensorPressures:
     """So many hydrophones of a frame, each traced by itself with the choices of a plan, by the exact synthesis; left
-    out: all, or those that can be afforded. some (heard,): these."""
+    out: all, or those that can be afforded. sensors (heard,): these."""
     live = np.flatnonzero(plan.elements.gain)
     rows: dict[int, tuple[Pressures, float, float]] = {}
 
     def hear(sensor: int) -> None:
         if sensor not in rows:
-            part = subarray(plan.elements, np.array([sensor]))
+            single = subarray(plan.elements, np.array([sensor]))
             began = time.process_time()
-            arrivals = arrivals_of(plan, frame, part)
+            arrivals = arrivals_of(plan, frame, single)
             traced = time.process_time()
-            made = pressures(plan, frame, arrivals, part.elements, golden(plan))
-            rows[sensor] = made, traced - began, time.process_time() - traced
+            received_there = pressures(plan, frame, arrivals, single.elements, golden(plan))
+            rows[sensor] = received_there, traced - began, time.process_time() - traced
 
-    chosen = some
+    chosen = sensors
     if chosen is None:
         wanted = len(live) if hydrophones is None else min(hydrophones, len(live))
         first = spread(live, min(TRIED, wanted))
@@ -156,15 +156,15 @@ def each_hydrophone(
         chosen = live if wanted == len(live) else np.union1d(first, spread(live, wanted))
     for sensor in chosen:
         hear(int(sensor))
-    found = [rows[int(sensor)] for sensor in chosen]
-    received = (np.vstack([r[0][0] for r in found]), np.vstack([r[0][1] for r in found]))
-    typical = (float(np.median([r[n] for r in found])) * len(live) for n in (1, 2))  # the first may compile
+    computed = [rows[int(sensor)] for sensor in chosen]
+    received = (np.vstack([r[0][0] for r in computed]), np.vstack([r[0][1] for r in computed]))
+    typical = (float(np.median([r[n] for r in computed])) * len(live) for n in (1, 2))  # the first may compile
     return SensorPressures(chosen, received, (next(typical), next(typical)))
 
 
 def _mean(rows: dict[int, tuple[Pressures, float, float]]) -> float:
     """Seconds of a hydrophone, without the slowest."""
-    seconds = sorted(traced + made for _, traced, made in rows.values())
+    seconds = sorted(traced + synthesised for _, traced, synthesised in rows.values())
     return sum(seconds[: max(len(seconds) - 1, 1)]) / max(len(seconds) - 1, 1)
 
 
@@ -178,19 +178,19 @@ def pressures(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, 
     """Echoes and direct arrivals (element, sample) in Pa, each by itself."""
     start, samples = frame_start(plan, frame), plan.windows.samples
     sonar, snaps = plan.scene.sonar, frame.moment.snaps
-    found = []
-    for some in (~arrivals.direct, arrivals.direct):
-        given = arrivals.select(some), snaps, elements, sonar, plan.absorption, start, samples
+    received = []
+    for kind in (~arrivals.direct, arrivals.direct):
+        arguments = arrivals.select(kind), snaps, elements, sonar, plan.absorption, start, samples
         unrounded = getattr(method, "pressure", None)
-        found.append(unrounded(*given)[0] if unrounded is not None else method.signals(*given).pressure)
-    return np.asarray(found[0], float), np.asarray(found[1], float)
+        received.append(unrounded(*arguments)[0] if unrounded is not None else method.signals(*arguments).pressure)
+    return np.asarray(received[0], float), np.asarray(received[1], float)
 
 
-def differences(found: Sequence[Floats], exact: Sequence[Floats]) -> tuple[float, float]:
+def differences(measured: Sequence[Floats], exact: Sequence[Floats]) -> tuple[float, float]:
     """Errors of echoes or of direct arrivals, whichever errs more: root of the summed squares, relative; and the
     largest over the peak."""
     square, largest = 0.0, 0.0
-    for a, b in zip(found, exact, strict=True):
+    for a, b in zip(measured, exact, strict=True):
         if b.any():
             square = max(square, float(np.linalg.norm(a - b) / np.linalg.norm(b)))
             largest = max(largest, float(np.abs(a - b).max() / np.abs(b).max()))
@@ -201,13 +201,13 @@ def synthesis_check(exact: ExactFrame) -> Point:
     """The exact way's synthesis against `DirectSum`: at a few hydrophones, on the loudest path and some others."""
     plan, frame = exact.plan, exact.frame
     sensor = exact.sensor[:: max(len(exact.sensor) // CHECKED_HYDROPHONES, 1)][:CHECKED_HYDROPHONES]
-    part = subarray(plan.elements, sensor)
-    arrivals = arrivals_of(exact_plan(plan), frame, part)
+    few = subarray(plan.elements, sensor)
+    arrivals = arrivals_of(exact_plan(plan), frame, few)
     echoes = np.flatnonzero(~arrivals.direct)
-    some = echoes[np.linspace(0, len(echoes) - 1, min(CHECKED_PATHS, len(echoes))).astype(int)]
-    arrivals = arrivals.select(np.concatenate([np.flatnonzero(arrivals.direct), some]))
-    made = [pressures(plan, frame, arrivals, part.elements, method) for method in (golden(plan), DirectSum())]
-    error, largest = differences(*made)
+    sampled = echoes[np.linspace(0, len(echoes) - 1, min(CHECKED_PATHS, len(echoes))).astype(int)]
+    arrivals = arrivals.select(np.concatenate([np.flatnonzero(arrivals.direct), sampled]))
+    both = [pressures(plan, frame, arrivals, few.elements, method) for method in (golden(plan), DirectSum())]
+    error, largest = differences(*both)
     return Point(
         stage="synthesis",
         knob="the exact way's",
@@ -215,7 +215,7 @@ def synthesis_check(exact: ExactFrame) -> Point:
         error=error,
         unit="relative",
         allowed=0.1 * plan.recipe.accuracy.signal,
-        seconds=exact.each.seconds[1],
+        seconds=exact.single.seconds[1],
         role="check",
         also={"largest": largest, "hydrophones": len(sensor), "paths": len(arrivals.delay)},
     )

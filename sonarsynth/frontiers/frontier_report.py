@@ -40,15 +40,15 @@ def write(measured: AccuracyReport, out: Path, name: str = "recipe") -> list[Pat
 
 def _panel(stage: str, points: Sequence[Point]) -> Panel | None:
     """The panel of a stage; None where it was not walked."""
-    mine = [p for p in points if p.stage == stage and p.role != "check" and isfinite(p.error)]
-    chosen = next((p for p in mine if p.chosen), None)
+    of_stage = [p for p in points if p.stage == stage and p.role != "check" and isfinite(p.error)]
+    chosen = next((p for p in of_stage if p.chosen), None)
     if chosen is None:
         return None
     lines = []
     for role in ("point", "peer"):
-        some = [p for p in mine if p.role == role]
-        for knob in dict.fromkeys(p.knob for p in some if p.knob != "chosen"):
-            of = [p for p in some if p.knob == knob]
+        of_role = [p for p in of_stage if p.role == role]
+        for knob in dict.fromkeys(p.knob for p in of_role if p.knob != "chosen"):
+            of = [p for p in of_role if p.knob == knob]
             if role == "point" and not any(p.chosen for p in of) and len(of) > 1 and stage != "synthesis":
                 of = [*of, chosen]
             lines.append(Line(knob, tuple(1e3 * p.seconds for p in of), tuple(p.error for p in of), role == "peer"))

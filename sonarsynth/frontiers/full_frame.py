@@ -32,24 +32,24 @@ class FullFrame:
         plan, frame = exact.plan, exact.frame
         recorded = digitise(plan, frame, signals)
         beamformed = locate_and_image(plan, frame, recorded)
-        locating, known, snaps = (
+        locating, receiver_and_survey, snaps = (
             locator(plan.scene),
             (receiver_of(plan, frame), survey_of(plan, frame)),
             plan.sizes["emission"],
         )
-        _, seconds = timed(lambda: locating.locate(recorded, *known, snaps))
+        _, seconds = timed(lambda: locating.locate(recorded, *receiver_and_survey, snaps))
         return FullFrame(exact, beamformed, seconds)
 
 
-def whole_points(whole: FullFrame, traced: TracedBySensor, seconds: float) -> Iterator[Point]:
+def whole_points(full: FullFrame, traced: TracedBySensor, seconds: float) -> Iterator[Point]:
     """Signals, image and cloud of the plan against exact ones; seconds: of the plan's whole frame.
 
     Image and cloud are compared with those of every hydrophone traced by itself, where all were. Noise is the same in
     both.
     """
-    exact, plan, accuracy = whole.exact, whole.exact.plan, whole.exact.plan.recipe.accuracy
-    found = _signals(exact, traced)
-    error, largest = differences(found, exact.pressures)
+    exact, plan, accuracy = full.exact, full.exact.plan, full.exact.plan.recipe.accuracy
+    synthesised = _signals(exact, traced)
+    error, largest = differences(synthesised, exact.pressures)
     yield Point(
         stage="frame",
         knob="signals",
@@ -62,7 +62,7 @@ def whole_points(whole: FullFrame, traced: TracedBySensor, seconds: float) -> It
         also={"largest": largest, "hydrophones": len(exact.sensor)},
         note=exact.partly,
     )
-    if not (exact.whole and imaged(whole.beamformed)):
+    if not (exact.whole and imaged(full.beamformed)):
         return
     slow, frame = exact_plan(plan), exact.frame
     rate, start = plan.scene.sonar.sampling_frequency, frame_start(plan, frame)
@@ -72,10 +72,10 @@ def whole_points(whole: FullFrame, traced: TracedBySensor, seconds: float) -> It
     if not imaged(best):
         return
     cloud = cloud_of(slow, frame, best)
-    slowest = time.process_time() - began + sum(exact.each.seconds)
+    slowest = time.process_time() - began + sum(exact.single.seconds)
     yield Point("frame", "exact", "everything exact", 0.0, "relative", accuracy.signal, slowest)
-    assert whole.beamformed.image is not None and best.image is not None
-    off = off_by(whole.beamformed.image.energy, best.image.energy)
+    assert full.beamformed.image is not None and best.image is not None
+    off = off_by(full.beamformed.image.energy, best.image.energy)
     yield Point(
         stage="frame",
         knob="image",
@@ -87,7 +87,7 @@ def whole_points(whole: FullFrame, traced: TracedBySensor, seconds: float) -> It
         chosen=True,
         also={"largest_db": float(np.abs(off).max(initial=0.0)), "beams": len(off)},
     )
-    metres, angle, alone = apart(cloud_of(plan, frame, whole.beamformed), cloud)
+    metres, angle, alone = apart(cloud_of(plan, frame, full.beamformed), cloud)
     yield Point(
         stage="frame",
         knob="range",
@@ -110,10 +110,10 @@ def whole_points(whole: FullFrame, traced: TracedBySensor, seconds: float) -> It
 def _signals(exact: ExactFrame, traced: TracedBySensor) -> tuple[np.ndarray, np.ndarray]:
     """Echoes and direct arrivals (heard, sample) by the plan's own synthesis."""
     out = tuple(np.zeros((len(exact.sensor), exact.plan.windows.samples)) for _ in range(2))
-    for part, arrivals in traced.pieces:
-        rows = np.flatnonzero(np.isin(exact.sensor, part.sensor))
-        own = np.searchsorted(part.sensor, exact.sensor[rows])
-        made = pressures(exact.plan, exact.frame, arrivals, part.elements, exact.plan.choices.synthesis)
-        for total, one in zip(out, made, strict=True):
-            total[rows] = one[own]
+    for subarray, arrivals in traced.pieces:
+        rows = np.flatnonzero(np.isin(exact.sensor, subarray.sensor))
+        own = np.searchsorted(subarray.sensor, exact.sensor[rows])
+        received = pressures(exact.plan, exact.frame, arrivals, subarray.elements, exact.plan.choices.synthesis)
+        for total, values in zip(out, received, strict=True):
+            total[rows] = values[own]
     return out[0], out[1]

@@ -51,23 +51,23 @@ def image_points(plan: Plan, beamformed: BeamformedFrame, peers: bool = True) ->
         if knob != "chosen" and method == chosen:
             continue
         if method == slow:
-            made, seconds = exact, slowest
+            image, seconds = exact, slowest
         else:
-            made, seconds = timed(partial(image_of, plan, beamformed, method))
-        yield image_point(plan, made.energy, exact.energy, knob, setting, seconds, chosen=knob == "chosen")
+            image, seconds = timed(partial(image_of, plan, beamformed, method))
+        yield image_point(plan, image.energy, exact.energy, knob, setting, seconds, chosen=knob == "chosen")
     if chosen != slow:
         yield image_point(plan, exact.energy, exact.energy, "exact", "dense", slowest)
     for method in other_images(slow, plan.elements) if peers else ():
-        made, seconds = timed(partial(image_of, plan, beamformed, method))
-        point = image_point(plan, made.energy, exact.energy, "another image", method.row(), seconds)
+        image, seconds = timed(partial(image_of, plan, beamformed, method))
+        point = image_point(plan, image.energy, exact.energy, "another image", method.row(), seconds)
         yield replace(point, role="peer")
 
 
 def other_images(slow: Any, elements: Elements) -> list[Any]:
     """Beamformers that make another image than delay and sum, focused as `slow` is: what differs is no error."""
     kinds = [kind for kind in get_args(get_args(Beamformer)[0]) if kind().exact().kind != slow.kind]
-    made = [kind(focus=slow.focus) if "focus" in kind.__dataclass_fields__ else kind() for kind in kinds]
-    return [method for method in made if not method.refusal(elements)]
+    methods = [kind(focus=slow.focus) if "focus" in kind.__dataclass_fields__ else kind() for kind in kinds]
+    return [method for method in methods if not method.refusal(elements)]
 
 
 def named(method: Any) -> str:
@@ -84,10 +84,10 @@ def imaged(beamformed: BeamformedFrame) -> bool:
 def image_of(plan: Plan, beamformed: BeamformedFrame, method: Any) -> EnergyImage:
     """The image of what a frame heard, by a method."""
     assert beamformed.image is not None and beamformed.imaged is not None
-    made: EnergyImage = method.image(
+    image: EnergyImage = method.image(
         beamformed.imaged, plan.elements, plan.scene.sonar, beamformed.image.start, beamformed.image.stop
     )
-    return made
+    return image
 
 
 def off_by(energy: npt.NDArray[Any], exact: npt.NDArray[Any]) -> Floats:
@@ -130,10 +130,10 @@ def range_points(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> Itera
     exact, slowest = timed(lambda: placed(plan, frame, beamformed, slow))
     for method in dict.fromkeys((chosen, IsovelocityPlacing(), slow)):
         if method == slow:
-            made, seconds = exact, slowest
+            cloud, seconds = exact, slowest
         else:
-            made, seconds = timed(partial(placed, plan, frame, beamformed, method))
-        yield range_point(plan, made, exact, method, seconds, chosen=method == chosen)
+            cloud, seconds = timed(partial(placed, plan, frame, beamformed, method))
+        yield range_point(plan, cloud, exact, method, seconds, chosen=method == chosen)
 
 
 def placed(plan: Plan, frame: Frame, beamformed: BeamformedFrame, method: Placing) -> PointCloud:
@@ -172,13 +172,13 @@ def apart(cloud: PointCloud, exact: PointCloud) -> tuple[Floats, Floats, int]:
     """
     if not (len(cloud) and len(exact)):
         return np.zeros(0), np.zeros(0), len(cloud) + len(exact)
-    mine, theirs = (np.column_stack([c.azimuth, c.elevation, 1500.0 * c.delay]) for c in (cloud, exact))
-    far, there = cKDTree(theirs).query(mine, distance_upper_bound=BESIDE)
-    here = np.flatnonzero(np.isfinite(far))
-    back = cKDTree(mine).query(theirs[there[here]])[1]
-    here = here[back == here]
-    there = there[here]
-    a, b = cloud.position[here].astype(float), exact.position[there].astype(float)
+    points, exact_points = (np.column_stack([c.azimuth, c.elevation, 1500.0 * c.delay]) for c in (cloud, exact))
+    far, partner = cKDTree(exact_points).query(points, distance_upper_bound=BESIDE)
+    shared = np.flatnonzero(np.isfinite(far))
+    back = cKDTree(points).query(exact_points[partner[shared]])[1]
+    shared = shared[back == shared]
+    partner = partner[shared]
+    a, b = cloud.position[shared].astype(float), exact.position[partner].astype(float)
     angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("pi,pi->p", a, b))
-    metres = np.abs(cloud.range[here].astype(float) - exact.range[there])
-    return metres, angle, len(cloud) + len(exact) - 2 * len(here)
+    metres = np.abs(cloud.range[shared].astype(float) - exact.range[partner])
+    return metres, angle, len(cloud) + len(exact) - 2 * len(shared)

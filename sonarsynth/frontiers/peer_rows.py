@@ -41,15 +41,15 @@ def synthesis_peers(plan: Plan, frame: Frame, arrivals: Arrivals) -> Iterator[Po
     if not installed("finufft"):
         yield absent("synthesis", "FINUFFT")
         return
-    some = plain(arrivals, plan, frame)
-    if not len(some.delay):
+    paths = plain(arrivals, plan, frame)
+    if not len(paths.delay):
         return
     elements, sonar, start = replace(plan.elements, face=0.0), plan.scene.sonar, frame_start(plan, frame)
-    arguments = (some, frame.moment.snaps, elements, sonar, None, start, plan.windows.samples)
+    arguments = (paths, frame.moment.snaps, elements, sonar, None, start, plan.windows.samples)
     exact = golden(plan, FINER).pressure(*arguments)[0]
 
-    def row(name: str, setting: str, made: np.ndarray, seconds: float) -> Point:
-        error = float(np.linalg.norm(made - exact) / np.linalg.norm(exact))
+    def row(name: str, setting: str, pressure: np.ndarray, seconds: float) -> Point:
+        error = float(np.linalg.norm(pressure - exact) / np.linalg.norm(exact))
         return Point(
             stage="synthesis",
             knob=name,
@@ -59,17 +59,17 @@ def synthesis_peers(plan: Plan, frame: Frame, arrivals: Arrivals) -> Iterator[Po
             allowed=plan.recipe.accuracy.signal,
             seconds=seconds,
             role="peer",
-            also={"paths": len(some.delay)},
+            also={"paths": len(paths.delay)},
             note=PLAIN,
         )
 
     for asked in EPSILONS:
-        made, seconds = timed(partial(finufft_signals, plan, frame, some, asked))
-        yield row("FINUFFT", f"{asked:g}", made, seconds)
+        pressure, seconds = timed(partial(finufft_signals, plan, frame, paths, asked))
+        yield row("FINUFFT", f"{asked:g}", pressure, seconds)
     method = plan.choices.synthesis
     if isinstance(method, GriddedSynthesis):
-        made, seconds = timed(lambda: method.pressure(*arguments)[0])
-        yield row("ours, on the same", "chosen", made, seconds)
+        pressure, seconds = timed(lambda: method.pressure(*arguments)[0])
+        yield row("ours, on the same", "chosen", pressure, seconds)
 
 
 def image_peers(plan: Plan, frame: Frame, arrivals: Arrivals, beamformed: BeamformedFrame) -> Iterator[Point]:

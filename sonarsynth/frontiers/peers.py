@@ -116,10 +116,10 @@ def plain(arrivals: Arrivals, plan: Plan, frame: Frame) -> Arrivals:
     """What FINUFFT can add up: paths of the first snap that are wholly heard, their pulses not reshaped."""
     start = frame_start(plan, frame)
     after = start + plan.windows.samples / plan.scene.sonar.sampling_frequency
-    some = arrivals.select((arrivals.snap == 0) & (arrivals.delay > start) & (arrivals.delay < after))
-    nought = np.zeros_like(some.delay)
+    selected = arrivals.select((arrivals.snap == 0) & (arrivals.delay > start) & (arrivals.delay < after))
+    nought = np.zeros_like(selected.delay)
     return replace(
-        some,
+        selected,
         delay_std=nought,
         echo_delay_std=nought,
         doppler=nought,
@@ -153,5 +153,5 @@ def finufft_signals(plan: Plan, frame: Frame, arrivals: Arrivals, error: float) 
     for n in range(elements.count):
         modes = finufft.nufft1d1(turn[n], strength[n], 2 * used, eps=error, isign=-1, nthreads=1)
         spectra[n] = modes[used:]  # from frequency 0 on
-    made = irfft(spectra * spectrum, length, axis=1)[:, margin : margin + samples]
-    return np.asarray(made * fs)
+    pressure = irfft(spectra * spectrum, length, axis=1)[:, margin : margin + samples]
+    return np.asarray(pressure * fs)

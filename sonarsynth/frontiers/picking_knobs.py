@@ -38,12 +38,12 @@ def picking_point(
     plan: Plan, frame: Frame, arrivals: Arrivals, beamformed: BeamformedFrame, knob: str, setting: str, method: Any
 ) -> Point:
     """A row of the picking stage: the median distance of points from the targets that made them, exact (m)."""
-    made = replace(plan, choices=replace(plan.choices, picking=method))
-    cloud, seconds = timed(partial(cloud_of, made, frame, beamformed))
+    varied = replace(plan, choices=replace(plan.choices, picking=method))
+    cloud, seconds = timed(partial(cloud_of, varied, frame, beamformed))
     estimates = beamformed.estimates
     distance = np.zeros(0)
     if len(cloud) and estimates is not None:
-        distance = point_labels(made, frame, arrivals, estimates, cloud).distance.astype(float)
+        distance = point_labels(varied, frame, arrivals, estimates, cloud).distance.astype(float)
     off = int(np.isnan(distance).sum())
     distance = distance[np.isfinite(distance)]
     return Point(

@@ -87,11 +87,11 @@ def timed(function: Callable[[], T]) -> tuple[T, float]:
     best, total, calls = float("inf"), 0.0, 0
     while True:
         began = time.process_time()
-        made = function()
+        result = function()
         seconds = time.process_time() - began
         best, total, calls = min(best, seconds), total + seconds, calls + 1
         if calls == REPEATS or total > LONG or (calls > 1 and total > ENOUGH):
-            return made, best
+            return result, best
 
 
 def merged(points: Iterable[Point]) -> list[Point]:

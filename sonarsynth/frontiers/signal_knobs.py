@@ -47,7 +47,7 @@ def synthesis_points(traced: TracedBySensor) -> Iterator[Point]:
 
 def _settings(chosen: GriddedSynthesis, allowed: float) -> Iterator[tuple[str, GriddedSynthesis]]:
     """Every setting that is walked, with the name of its knob."""
-    seen = {chosen}
+    yielded = {chosen}
     for knob, method in (
         *(("auto", deposit_for(error)) for error in AUTO),
         *(
@@ -60,8 +60,8 @@ def _settings(chosen: GriddedSynthesis, allowed: float) -> Iterator[tuple[str, G
         ("precision", replace(chosen, precision="float64" if chosen.precision == "float32" else "float32")),
     ):
         fits = FROM * allowed <= method.tolerance <= TO * allowed
-        if method not in seen and fits and (method.precision == "float64" or method.tolerance > 1e-7):
-            seen.add(method)
+        if method not in yielded and fits and (method.precision == "float64" or method.tolerance > 1e-7):
+            yielded.add(method)
             yield knob, method
 
 
@@ -72,17 +72,17 @@ def _rounded(method: GriddedSynthesis, times: float) -> GriddedSynthesis:
 
 
 def _synthesised(traced: TracedBySensor, method: Synthesis, n: int) -> Pressures:
-    part, arrivals = traced.few[n]
-    return pressures(traced.plan, traced.frame, arrivals, part.elements, method)
+    piece, arrivals = traced.few[n]
+    return pressures(traced.plan, traced.frame, arrivals, piece.elements, method)
 
 
 def _point(
     traced: TracedBySensor, exact: list[Pressures], method: Synthesis, knob: str, *, chosen: bool = False
 ) -> Point:
     plan, few = traced.plan, traced.few
-    made = [_synthesised(traced, method, n) for n in range(len(few))]
+    received = [_synthesised(traced, method, n) for n in range(len(few))]
     error, largest = differences(
-        [np.vstack([m[n] for m in made]) for n in (0, 1)], [np.vstack([e[n] for e in exact]) for n in (0, 1)]
+        [np.vstack([m[n] for m in received]) for n in (0, 1)], [np.vstack([e[n] for e in exact]) for n in (0, 1)]
     )
     seconds = replace(traced, plan=replace(plan, choices=replace(plan.choices, synthesis=method))).synthesis_seconds()
     return Point(
@@ -108,16 +108,16 @@ def named(method: Synthesis) -> str:
 
 def direct_sum_point(traced: TracedBySensor) -> Point:
     """The direct sum: no error; its cost from a few hydrophones and paths."""
-    plan, (part, arrivals) = traced.plan, traced.few[0]
+    plan, (piece, arrivals) = traced.plan, traced.few[0]
     arrivals = arrivals.seen_from_centre  # they have as many terms at hydrophones that miss some
-    some = np.linspace(0, len(arrivals.delay) - 1, min(SUMMED_PATHS, len(arrivals.delay))).astype(int)
+    paths = np.linspace(0, len(arrivals.delay) - 1, min(SUMMED_PATHS, len(arrivals.delay))).astype(int)
     start, samples = frame_start(plan, traced.frame), plan.windows.samples
     seconds = []
     for count in SUMMED_HYDROPHONES:
-        elements = subarray(part.elements, np.resize(np.arange(part.elements.count), count)).elements
+        elements = subarray(piece.elements, np.resize(np.arange(piece.elements.count), count)).elements
         began = time.process_time()
         exact_signals(
-            arrivals.select(some),
+            arrivals.select(paths),
             traced.frame.moment.snaps,
             elements,
             plan.scene.sonar,
@@ -127,9 +127,9 @@ def direct_sum_point(traced: TracedBySensor) -> Point:
         )
         seconds.append(time.process_time() - began)
     few, more = SUMMED_HYDROPHONES
-    each = max(seconds[1] - seconds[0], 0.0) / (more - few)  # of a hydrophone; the pulses' spectra serve all
+    per_hydrophone = max(seconds[1] - seconds[0], 0.0) / (more - few)  # of a hydrophone; the pulses' spectra serve all
     live = int(np.count_nonzero(plan.elements.gain))
-    once = max(seconds[0] - few * each, 0.0)
+    once = max(seconds[0] - few * per_hydrophone, 0.0)
     return Point(
         stage="synthesis",
         knob="direct sum",
@@ -137,7 +137,7 @@ def direct_sum_point(traced: TracedBySensor) -> Point:
         error=0.0,
         unit="relative",
         allowed=plan.recipe.accuracy.signal,
-        seconds=(once * traced.parts + each * live) * len(arrivals.delay) / len(some),
+        seconds=(once * traced.parts + per_hydrophone * live) * len(arrivals.delay) / len(paths),
         chosen=isinstance(plan.choices.synthesis, DirectSum),
-        note=f"cost from {len(some)} paths at {few} and {more} hydrophones",
+        note=f"cost from {len(paths)} paths at {few} and {more} hydrophones",
     )

@@ -59,28 +59,28 @@ class TracedBySensor:
     def of(plan: Plan, frame: Frame, sensor: Ints) -> TracedBySensor:
         """Trace with the subarrays, the faintest paths and the propagation of a plan (that of the sequence)."""
         count, elements = plan.choices.subarrays, plan.elements
-        whole, seconds = timed(lambda: arrivals_of(plan, frame))
+        traced, seconds = timed(lambda: arrivals_of(plan, frame))
         if count == 1:
             every = Subarray(np.arange(elements.count), np.zeros(3), elements)
-            return TracedBySensor(plan, frame, ((every, whole),), 1, seconds)
-        parts = subarrays(elements, count)
-        needed = [part for part in parts if np.isin(part.sensor, sensor).any()]
+            return TracedBySensor(plan, frame, ((every, traced),), 1, seconds)
+        cut = subarrays(elements, count)
+        needed = [piece for piece in cut if np.isin(piece.sensor, sensor).any()]
         began = time.process_time()
-        pieces = tuple((part, arrivals_of(plan, frame, part)) for part in needed)
-        of_parts = (time.process_time() - began) / len(needed) * len(parts)
-        return TracedBySensor(plan, frame, pieces, len(parts), seconds + of_parts)
+        pieces = tuple((piece, arrivals_of(plan, frame, piece)) for piece in needed)
+        of_parts = (time.process_time() - began) / len(needed) * len(cut)
+        return TracedBySensor(plan, frame, pieces, len(cut), seconds + of_parts)
 
     def pressures(self, sensor: Ints) -> Pressures:
         """Echoes and direct arrivals at some hydrophones, by the exact way's synthesis."""
         out = tuple(np.zeros((len(sensor), self.plan.windows.samples)) for _ in range(2))
-        for part, traced in self.pieces:
-            rows = np.flatnonzero(np.isin(sensor, part.sensor))
-            own = np.searchsorted(part.sensor, sensor[rows])
-            some, place = with_rim(part, own)
-            arrivals = traced.for_sensors(place, part.elements.count)
-            made = pressures(self.plan, self.frame, arrivals, some, golden(self.plan))
-            for total, one in zip(out, made, strict=True):
-                total[rows] = one[: len(rows)]
+        for piece, traced in self.pieces:
+            rows = np.flatnonzero(np.isin(sensor, piece.sensor))
+            own = np.searchsorted(piece.sensor, sensor[rows])
+            rimmed, index = with_rim(piece, own)
+            arrivals = traced.for_sensors(index, piece.elements.count)
+            received = pressures(self.plan, self.frame, arrivals, rimmed, golden(self.plan))
+            for total, values in zip(out, received, strict=True):
+                total[rows] = values[: len(rows)]
         return out[0], out[1]
 
     @property
@@ -93,8 +93,8 @@ class TracedBySensor:
         """CPU seconds of the plan's synthesis at all parts."""
         plan, total = self.plan, 0.0
         start, samples = frame_start(plan, self.frame), plan.windows.samples
-        for part, arrivals in self.few:
-            make = partial(plan.choices.synthesis.signals, arrivals, self.frame.moment.snaps, part.elements)
+        for piece, arrivals in self.few:
+            make = partial(plan.choices.synthesis.signals, arrivals, self.frame.moment.snaps, piece.elements)
             total += timed(partial(make, plan.scene.sonar, plan.absorption, start, samples))[1]
         return total * self.parts / len(self.few)
 
@@ -114,11 +114,11 @@ def trace_points(exact: ExactFrame, traced: TracedBySensor) -> Iterator[Point]:
         yield _point(exact, of, "occlusion", f"from the centre, {_cut(plan)}")
     for level in DYNAMIC_RANGES:
         share = 10.0 ** (-level / 10.0)
-        some = replace(best, choices=replace(best.choices, negligible=share))
-        yield _each_point(exact, some, "dynamic range", f"{level:.0f} dB")
+        varied = replace(best, choices=replace(best.choices, negligible=share))
+        yield _each_point(exact, varied, "dynamic range", f"{level:.0f} dB")
     if not plan.profile.uniform:
-        some = replace(best, propagation=Straight(bounces=plan.propagation.bounces))
-        yield _each_point(exact, some, "rays", "straight")
+        varied = replace(best, propagation=Straight(bounces=plan.propagation.bounces))
+        yield _each_point(exact, varied, "rays", "straight")
     yield exact_point(exact)
 
 
@@ -144,23 +144,23 @@ def _cuts(exact: ExactFrame, traced: TracedBySensor) -> Iterator[Point]:
     for count in _counts(exact.plan)[:-1]:
         if 2.0 * spent > max(LONGEST, SLOWER * traced.seconds):
             break
-        some = replace(best, choices=replace(best.choices, subarrays=count))
-        yield (point := _point(exact, TracedBySensor.of(some, exact.frame, exact.sensor), "subarrays", _cut(some)))
+        varied = replace(best, choices=replace(best.choices, subarrays=count))
+        yield (point := _point(exact, TracedBySensor.of(varied, exact.frame, exact.sensor), "subarrays", _cut(varied)))
         spent = point.seconds
         if point.error < FINER * point.allowed:
             break
-    yield _of_each(exact, exact.each, exact.sensor, "subarrays", "each hydrophone, every path")
+    yield _of_each(exact, exact.single, exact.sensor, "subarrays", "each hydrophone, every path")
 
 
 def _each_point(exact: ExactFrame, plan: Plan, knob: str, setting: str) -> Point:
     """Of a plan that traces each hydrophone by itself: at a few."""
     few = exact.sensor[:: max(len(exact.sensor) // EACH, 1)][:EACH]
-    return _of_each(exact, each_hydrophone(plan, exact.frame, some=few), few, knob, setting)
+    return _of_each(exact, each_hydrophone(plan, exact.frame, sensors=few), few, knob, setting)
 
 
-def _of_each(exact: ExactFrame, each: SensorPressures, sensor: Ints, knob: str, setting: str) -> Point:
+def _of_each(exact: ExactFrame, single: SensorPressures, sensor: Ints, knob: str, setting: str) -> Point:
     rows = np.searchsorted(exact.sensor, sensor)
-    error, largest = differences(each.at(sensor), [part[rows] for part in exact.pressures])
+    error, largest = differences(single.at(sensor), [received[rows] for received in exact.pressures])
     few = f"at {len(sensor)} hydrophones" if len(sensor) < len(exact.sensor) else exact.partly
     return Point(
         stage="trace",
@@ -169,8 +169,8 @@ def _of_each(exact: ExactFrame, each: SensorPressures, sensor: Ints, knob: str, 
         error=error,
         unit="relative",
         allowed=exact.plan.recipe.accuracy.signal,
-        seconds=sum(each.seconds),
-        also={"trace_s": each.seconds[0], "synthesis_s": each.seconds[1], "largest": largest},
+        seconds=sum(single.seconds),
+        also={"trace_s": single.seconds[0], "synthesis_s": single.seconds[1], "largest": largest},
         note=few,
     )
 
@@ -198,7 +198,7 @@ def exact_point(exact: ExactFrame) -> Point:
 
 def _point(exact: ExactFrame, traced: TracedBySensor, knob: str, setting: str, *, chosen: bool = False) -> Point:
     error, largest = differences(traced.pressures(exact.sensor), exact.pressures)
-    made = traced.synthesis_seconds()
+    synthesis_seconds = traced.synthesis_seconds()
     paths = max(len(arrivals.delay) for _, arrivals in traced.pieces)
     several = f", {len(traced.pieces)} of {traced.parts} parts" if len(traced.pieces) < traced.parts else ""
     return Point(
@@ -208,12 +208,12 @@ def _point(exact: ExactFrame, traced: TracedBySensor, knob: str, setting: str, *
         error=error,
         unit="relative",
         allowed=exact.plan.recipe.accuracy.signal,
-        seconds=traced.seconds + made,
+        seconds=traced.seconds + synthesis_seconds,
         chosen=chosen,
         also={
             "largest": largest,
             "trace_s": traced.seconds,
-            "synthesis_s": made,
+            "synthesis_s": synthesis_seconds,
             "paths": paths,
             "hydrophones": len(exact.sensor),
         },

@@ -12,26 +12,27 @@ SLOWER = 1.5
 """A choice may cost so many times what the cheapest one does that keeps within the accuracy."""
 
 
-def verdicts(points: Sequence[Point], scene: Scene, rest: float) -> list[Verdict]:
-    """One for each stage that was walked, and one for the whole frame; rest: seconds of what nothing is chosen for."""
+def verdicts(points: Sequence[Point], scene: Scene, other_seconds: float) -> list[Verdict]:
+    """One for each stage that was walked, and one for the whole frame; other_seconds: of what nothing is chosen
+    for."""
     walked = {s: [p for p in points if p.stage == s and p.role == "point"] for s in STAGES}
-    chosen = {s: next((p for p in some if p.chosen), None) for s, some in walked.items()}
+    chosen = {s: next((p for p in of_stage if p.chosen), None) for s, of_stage in walked.items()}
     own = set_by_recipe(scene)
-    made = []
+    judged = []
     for stage in ("trace", "synthesis", "image", "range"):
-        one = chosen[stage]
-        if one is None:
+        row = chosen[stage]
+        if row is None:
             continue
-        other = chosen[PAIR[stage]] if stage in PAIR else None
-        beside = 0.0 if other is None or not other.meets else other.error
+        partner = chosen[PAIR[stage]] if stage in PAIR else None
+        beside = 0.0 if partner is None or not partner.meets else partner.error
         best = cheapest(walked[stage], beside)
-        made.append(_verdict(one, one.setting, best, stage in own))
+        judged.append(_verdict(row, row.setting, best, stage in own))
     frame = [p for p in walked["frame"] if p.chosen]
     if frame:
-        there = {p.knob for p in frame}
-        alone = [one for stage in ("image", "range") if (one := chosen[stage]) is not None and stage not in there]
-        made.append(_whole([*frame, *alone], walked, rest, own))
-    return made
+        knobs = {p.knob for p in frame}
+        alone = [row for stage in ("image", "range") if (row := chosen[stage]) is not None and stage not in knobs]
+        judged.append(_whole([*frame, *alone], walked, other_seconds, own))
+    return judged
 
 
 PAIR = {"trace": "synthesis", "synthesis": "trace"}
@@ -41,13 +42,13 @@ PAIR = {"trace": "synthesis", "synthesis": "trace"}
 def set_by_recipe(scene: Scene) -> set[str]:
     """Stages whose method the recipe sets itself."""
     physics, processing = scene.physics, scene.processing
-    found = {
+    settings = {
         "trace": physics.subarrays != "auto" or physics.dynamic_range != "auto" or physics.tracing.kind != "auto",
         "synthesis": physics.synthesis.kind != "auto",
         "image": getattr(processing.beamforming, "kind", "") != "auto",
         "range": processing.placing.kind != "auto",
     }
-    return {stage for stage, own in found.items() if own}
+    return {stage for stage, own in settings.items() if own}
 
 
 def cheapest(points: Sequence[Point], beside: float = 0.0) -> Point | None:
@@ -56,21 +57,21 @@ def cheapest(points: Sequence[Point], beside: float = 0.0) -> Point | None:
     return min(good, key=lambda p: p.seconds, default=None)
 
 
-def _verdict(one: Point, choice: str, best: Point | None, own: bool) -> Verdict:
+def _verdict(row: Point, choice: str, best: Point | None, own: bool) -> Verdict:
     seconds = best.seconds if best is not None else float("nan")
-    name = "none" if best is None else choice if best is one else f"{best.knob}: {best.setting}"
-    fast = own or isnan(seconds) or one.seconds <= SLOWER * seconds
+    name = "none" if best is None else choice if best is row else f"{best.knob}: {best.setting}"
+    fast = own or isnan(seconds) or row.seconds <= SLOWER * seconds
     note = "set in the recipe" if own else ""
     return Verdict(
-        one.stage, choice, one.error, one.unit, one.allowed, one.seconds, name, seconds, one.meets and fast, note
+        row.stage, choice, row.error, row.unit, row.allowed, row.seconds, name, seconds, row.meets and fast, note
     )
 
 
-def _whole(errors: Sequence[Point], walked: dict[str, list[Point]], rest: float, own: set[str]) -> Verdict:
+def _whole(errors: Sequence[Point], walked: dict[str, list[Point]], other_seconds: float, own: set[str]) -> Verdict:
     """Of all settings together: signals by every pair of a tracing and a synthesis, image, range. errors: first those
     of the whole frame, then of stages that it has none of."""
     best_signals, names = _signals(walked["trace"], walked["synthesis"])
-    seconds = rest + best_signals
+    seconds = other_seconds + best_signals
     for stage in ("image", "range"):
         best = None if stage in own else cheapest(walked[stage])
         best = best or next((p for p in walked[stage] if p.chosen), None)

@@ -92,9 +92,9 @@ def test_what_all_fast_ways_would_share_is_seen(measured: AccuracyReport) -> Non
     exact = exact_frame(made, 1, 2)
     scene = replace(made.scene, physics=replace(made.scene.physics, doppler=False))
     frozen = replace(made, recipe=replace(made.recipe, scene=scene))
-    still = each_hydrophone(exact_plan(frozen), exact.frame, some=exact.sensor)
+    still = each_hydrophone(exact_plan(frozen), exact.frame, sensors=exact.sensor)
     assert differences(still.pressures, exact.pressures)[0] > 1e-2
-    assert differences(exact.each.at(exact.sensor), exact.pressures)[0] < 1e-4
+    assert differences(exact.single.at(exact.sensor), exact.pressures)[0] < 1e-4
 
 
 def test_the_table_fits_120_columns(
@@ -153,10 +153,10 @@ def test_a_few_hydrophones_say_so() -> None:
     exact = exact_frame(made, 1, 5)
     assert len(exact.sensor) == 5 and not exact.whole
     everything = exact_frame(made, 1)
-    assert everything.whole and len(everything.each.sensor) == 24
-    for few, every in zip(exact.each.pressures, everything.each.at(exact.sensor), strict=True):
+    assert everything.whole and len(everything.single.sensor) == 24
+    for few, every in zip(exact.single.pressures, everything.single.at(exact.sensor), strict=True):
         np.testing.assert_array_equal(few, every)
-    assert np.array_equal(everything.pressure, everything.each.pressures[0] + everything.each.pressures[1])
+    assert np.array_equal(everything.pressure, everything.single.pressures[0] + everything.single.pressures[1])
     assert spread(np.arange(508), 24).size == 24
 
 

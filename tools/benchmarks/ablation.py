@@ -84,7 +84,7 @@ def frame_rows(made: Plan, index: int) -> list[dict[str, Any]]:
     whole = replace(made, choices=replace(choices, subarrays=1))
     sensor = spread(np.flatnonzero(made.elements.gain), HYDROPHONES)
     every = replace(made, choices=replace(choices, negligible=1e-3 * choices.negligible))
-    exact = each_hydrophone(every, frame, some=sensor).pressures
+    exact = each_hydrophone(every, frame, sensors=sensor).pressures
     rows: list[dict[str, Any]] = []
 
     def row(part: str, of: Plan, arrivals: Arrivals, seconds: float) -> None:
