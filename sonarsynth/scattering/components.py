@@ -163,10 +163,10 @@ class DiffuseKirchhoff:
         """Amplitude (path, direction) of what is sent in directions `away` (path, direction, xyz) over that in
         `scattered` (path, xyz), at a wavenumber (path,) (rad/m): low heights send more where they are seen more
         squarely, great ones do not."""
-        there = self._sent(incident[:, None], away, patch.over(), wavenumber[:, None])
-        here = self._sent(incident, scattered, patch, wavenumber)[:, None]
-        both = (there > 0.0) & (here > 0.0)
-        return np.where(both, np.sqrt(np.divide(there, here, out=np.ones_like(there), where=both)), there > 0.0)
+        sent = self._sent(incident[:, None], away, patch.over(), wavenumber[:, None])
+        base = self._sent(incident, scattered, patch, wavenumber)[:, None]
+        both = (sent > 0.0) & (base > 0.0)
+        return np.where(both, np.sqrt(np.divide(sent, base, out=np.ones_like(sent), where=both)), sent > 0.0)
 
     def _sent(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
         """Power (...) in m2 that is sent without phase in common."""
@@ -213,21 +213,21 @@ class Shadow:
 
 
 def size_at(
-    parts: tuple[Component, ...],
+    components: tuple[Component, ...],
     incident: Floats,
     scattered: Floats,
     patch: FacetGeometry,
     frequency: float,
     sound_speed: Floats,
 ) -> Floats:
-    """|f| (path,) in m of facets at a frequency (Hz): powers of the parts summed.
+    """|f| (path,) in m of facets at a frequency (Hz): powers of the components summed.
 
     Directions (path, xyz) in the frame of the body; sound_speed (path,) in m/s at the facets.
     """
     power = np.zeros(len(incident))
-    for part in parts:
-        pulse = part.pulses(incident, scattered, patch, sound_speed)
-        amplitude = part.amplitude(incident, scattered, patch, 2.0 * np.pi * frequency / sound_speed)
+    for component in components:
+        pulse = component.pulses(incident, scattered, patch, sound_speed)
+        amplitude = component.amplitude(incident, scattered, patch, 2.0 * np.pi * frequency / sound_speed)
         response = facet_response(np.array([frequency]), *pulse[:4], frequency)[:, 0]
         power += np.abs(amplitude * response * np.exp(-0.5 * (2.0 * np.pi * frequency * pulse.delay_std) ** 2)) ** 2
     return np.sqrt(power)

@@ -41,13 +41,13 @@ def _rows(column: Floats, rows: Ints | slice) -> Floats:
 
 
 @byte_bounded_cache(32)
-def patches(mesh: Mesh, whole: bool = True) -> FacetGeometry:
+def patches(mesh: Mesh, with_corners: bool = True) -> FacetGeometry:
     """All facets (facet, ...) of a mesh. What is drawn is the same for every mesh of this content.
 
-    Not whole: for laws that need only normals and areas, the rest is 0.
+    Without corners: for laws that need only normals and areas, the rest is 0.
     """
     count = len(mesh.faces)
-    if not whole:
+    if not with_corners:
         none = np.zeros((1, 3, 3))
         corners, spot = np.broadcast_to(none, (count, 3, 3)), np.broadcast_to(none[0, 0], (count, 3))
         zero = np.broadcast_to(none[0, 0, 0], count)
@@ -81,7 +81,7 @@ class PulseResponse(NamedTuple):
         return PulseResponse(*columns)
 
     @staticmethod
-    def join(parts: list[PulseResponse]) -> PulseResponse:
+    def join(responses: list[PulseResponse]) -> PulseResponse:
         """Rows of all, in order."""
-        columns: Any = zip(*parts, strict=True)
+        columns: Any = zip(*responses, strict=True)
         return PulseResponse(*(np.concatenate(column) for column in columns))

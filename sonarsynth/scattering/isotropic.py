@@ -26,11 +26,11 @@ class Isotropic(FacetLaw):
     def validity(self, body: Scatterer) -> tuple[str, ...]:
         """As `FacetLaw.validity`: it is the echo of no body, whatever ka and angle."""
         level, count = 20.0 * np.log10(self.strength), len(body.mesh.faces)
-        said = (
+        level_note = (
             f"each of {count} facets echoes by {level:.3g} dB re 1 m2, whatever its area, ka and angle: that is for "
             "calibration, and not the level of a body"
         )
-        notes = said, facets_note(body, COARSE)
+        notes = level_note, facets_note(body, COARSE)
         return tuple(note for note in notes if note)
 
     def amplitude(

@@ -103,12 +103,12 @@ class Kirchhoff(FacetLaw):
             f"nearer than {NEAR * body.aperture:.2g} m, where the echo may be some per cent off at the rim of the "
             "array: facets have one direction to all hydrophones (shape.edge: a quarter wavelength helps)"
         )
-        found = [self.too_small(body), concave_note(body.mesh), slopes_note(self.roughness, self.slope, body)]
+        notes = [self.too_small(body), concave_note(body.mesh), slopes_note(self.roughness, self.slope, body)]
         if self.forward == "blocked":
-            found.append(aside_note(body))
+            notes.append(aside_note(body))
         if body.distance < NEAR * body.aperture:
-            found.append(near)
-        return tuple(note for note in found if note)
+            notes.append(near)
+        return tuple(note for note in notes if note)
 
     def reflection(self, incident: Floats, scattered: Floats) -> complex:
         """Plane-wave coefficient of the facets that would mirror one unit vector (xyz) of propagation into the other.
@@ -151,15 +151,15 @@ class Kirchhoff(FacetLaw):
 
         coefficient = self.reflection(incident, scattered)
         factor = self.lit(incident, scattered, normal, curved)
-        left = coefficient * np.sqrt(1.0 - self.diffuse)
-        ways = incident, scattered, wavenumber
+        smooth = coefficient * np.sqrt(1.0 - self.diffuse)
+        wave = incident, scattered, wavenumber
         if shape is None:
-            power = np.abs(mesh_amplitude(corners, *ways, left * factor, self.roughness)) ** 2
+            power = np.abs(mesh_amplitude(corners, *wave, smooth * factor, self.roughness)) ** 2
         else:
-            power = np.abs(convex_amplitude(corners, normal, shape, *ways, left, self.roughness)) ** 2
+            power = np.abs(convex_amplitude(corners, normal, shape, *wave, smooth, self.roughness)) ** 2
         if self.roughness > 0 or self.diffuse > 0:
             on = np.flatnonzero(factor > 0)
             g = roughness_parameter(wavenumber[:, None], self.roughness, incident, scattered, normal[on])
             albedo = np.abs(coefficient) ** 2 * self.diffuse
-            power = power + incoherent_power(g, incident, scattered, normal[on], self.slope, left, albedo) @ area[on]
+            power = power + incoherent_power(g, incident, scattered, normal[on], self.slope, smooth, albedo) @ area[on]
         return np.asarray(power)

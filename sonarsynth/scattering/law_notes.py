@@ -23,14 +23,14 @@ def facing_share(mesh: Mesh) -> float:
     """
     if not len(mesh.faces):
         return 0.0
-    place, one, two, out, turn = _even(RAYS, 5).T
+    pick, u, v, out, turn = _even(RAYS, 5).T
     share = np.cumsum(mesh.area) / mesh.area.sum()
-    facet = np.minimum(np.searchsorted(share, place), len(share) - 1)
-    normal, root = mesh.normal[facet], np.sqrt(one)
-    weight = np.stack([1.0 - root, root * (1.0 - two), root * two], axis=1)
+    facet = np.minimum(np.searchsorted(share, pick), len(share) - 1)
+    normal, root = mesh.normal[facet], np.sqrt(u)
+    weight = np.stack([1.0 - root, root * (1.0 - v), root * v], axis=1)
     start = np.einsum("rc,rcx->rx", weight, mesh.corners[facet]) + OFFSET * mesh.radius * normal
-    side, turn = _across(normal), 2.0 * np.pi * turn
-    level = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * np.cross(normal, side)
+    tangent, turn = _across(normal), 2.0 * np.pi * turn
+    level = np.cos(turn)[:, None] * tangent + np.sin(turn)[:, None] * np.cross(normal, tangent)
     direction = np.sqrt(out)[:, None] * level + np.sqrt(1.0 - out)[:, None] * normal
     return float(np.mean(first_hit(mesh, start, direction)[0] >= 0))
 
@@ -46,8 +46,8 @@ def _even(count: int, axes: int) -> Floats:
 def _across(normal: Floats) -> Floats:
     """Unit vectors (row, xyz) square to unit vectors (row, xyz)."""
     axis = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-    side = np.cross(normal, axis)
-    return np.asarray(side / np.linalg.norm(side, axis=1, keepdims=True))
+    tangent = np.cross(normal, axis)
+    return np.asarray(tangent / np.linalg.norm(tangent, axis=1, keepdims=True))
 
 
 class SmallBody(UserWarning):

@@ -62,7 +62,7 @@ def sphere_errors(amplitude: Amplitude, boundary: Literal["rigid", "soft"], ka: 
 
 
 def size_note(
-    body: Scatterer, amplitude: Amplitude, what: str = "this law", boundary: Literal["rigid", "soft"] = "rigid"
+    body: Scatterer, amplitude: Amplitude, law: str = "this law", boundary: Literal["rigid", "soft"] = "rigid"
 ) -> str | None:
     """One line if a sphere as wide as the body is off by more than `OFF` somewhere in the band; None if not."""
     low, high = body.ka
@@ -73,7 +73,7 @@ def size_note(
         return None
     return (
         f"{body.width:.3g} m across is ka {low:.2g} to {high:.2g} in the band: too small for facets that scatter as "
-        f"mirrors; of a {boundary} sphere as wide {what} is {errors.min():+.1f} to {errors.max():+.1f} dB off"
+        f"mirrors; of a {boundary} sphere as wide {law} is {errors.min():+.1f} to {errors.max():+.1f} dB off"
     )
 
 

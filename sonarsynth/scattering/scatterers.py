@@ -88,16 +88,16 @@ class Scatterers:
         """Where they will be, or were, so many seconds (s) after."""
         return self if self.track.still else replace(self, track=self.track.later(seconds))
 
-    def geometry(self, whole: bool) -> FacetGeometry:
-        """As laws see all of them (element, ...); not whole: normals and areas alone."""
+    def geometry(self, with_corners: bool) -> FacetGeometry:
+        """As laws see all of them (element, ...); without corners: normals and areas alone."""
         if self.mesh is not None:
-            return patches(self.mesh, whole)
+            return patches(self.mesh, with_corners)
         count = len(self)
         flat, none = np.zeros(count, bool), np.broadcast_to(0.0, (count, 3, 3))
         return FacetGeometry(self.normal, self.area, flat, none, none[:, 0])
 
-    def polarity(self, part: Component) -> Floats:
-        """Sign (element,) of the echo of each by a part of the law."""
+    def polarity(self, component: Component) -> Floats:
+        """Sign (element,) of the echo of each by a component of the law."""
         if self.mesh is not None:
-            return part.polarity(self.mesh)
+            return component.polarity(self.mesh)
         return np.ones(len(self)) if self.sign is None else self.sign

@@ -47,15 +47,15 @@ class NoiseRecording:
         windowed sinc, without what is above half the rate of the samples. Raises RecordingError where the file cannot
         be read."""
         rate, pressure = _read(self, named_files.stamp(self.path))
-        place = (time + self.start + step * np.arange(samples)) * rate
+        position = (time + self.start + step * np.arange(samples)) * rate
         cut = min(1.0, 1.0 / (step * rate))
         reach = int(np.ceil(0.5 * TAPS / cut))
-        first = np.floor(place).astype(int)
-        found = np.zeros(samples)
+        first = np.floor(position).astype(int)
+        pressures = np.zeros(samples)
         for tap in range(1 - reach, reach + 1):
-            away = cut * (place - first - tap)
-            found += np.sinc(away) * kaiser_bessel(away, TAPS, SHAPE) * pressure[(first + tap) % pressure.size]
-        return cut * found
+            away = cut * (position - first - tap)
+            pressures += np.sinc(away) * kaiser_bessel(away, TAPS, SHAPE) * pressure[(first + tap) % pressure.size]
+        return cut * pressures
 
 
 @lru_cache(maxsize=4)

@@ -37,7 +37,7 @@ class PulseModel(Method):
         """The closed form of its pressure, where it is a logarithmic bubble."""
         return None
 
-    def fault(self, longest: float, most: float) -> str:
-        """Why there is no such pulse, `longest` times as long and over in `most` seconds, before it is made; empty
+    def fault(self, longest: float, limit: float) -> str:
+        """Why there is no such pulse, `longest` times as long and over in `limit` seconds, before it is made; empty
         where nothing is wrong so far."""
         return ""

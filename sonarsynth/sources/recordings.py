@@ -119,9 +119,9 @@ def _recording(snap: RecordedSnap, changed: Stamp) -> Recording:
     return Recording(p, rate, zero)
 
 
-def _gate(size: int, part: float) -> Floats:
+def _gate(size: int, fraction: float) -> Floats:
     """A raised cosine at either end, from 0."""
-    u = np.arange(size) / (part * (size - 1))
+    u = np.arange(size) / (fraction * (size - 1))
     rise = np.sin(0.5 * np.pi * np.clip(u, 0.0, 1.0)) ** 2
     return np.asarray(rise * rise[::-1], float)
 
@@ -130,8 +130,8 @@ def _instrument(path: Path, data: bytes, snap: RecordedSnap) -> tuple[float, flo
     """Start (s), sampling frequency (Hz) and numbers (sample,) of a WAV or an HDF5."""
     rate, name = snap.sampling_frequency, snap.dataset
     try:
-        found = waveform_files.waveform(data, snap.channel, sampling_frequency=rate, dataset=name, most=MOST_NUMBERS)
-        return 0.0, *found
+        sound = waveform_files.waveform(data, snap.channel, sampling_frequency=rate, dataset=name, most=MOST_NUMBERS)
+        return 0.0, *sound
     except named_files.FileError as error:
         raise RecordingError(f"{path}: {error}") from None
 
@@ -150,8 +150,8 @@ def _text(path: Path, data: bytes, snap: RecordedSnap) -> tuple[float, float, Fl
     step = (time[-1] - time[0]) / max(time.size - 1, 1)
     uneven = np.flatnonzero(~(np.abs(time - (time[0] + step * np.arange(time.size))) <= 0.05 * step))
     if step <= 0 or uneven.size:
-        where = lines[uneven[0] if uneven.size else -1]
-        raise RecordingError(f"{path}, line {where}: time does not rise in even steps (of {step:.6g} s)")
+        line = lines[uneven[0] if uneven.size else -1]
+        raise RecordingError(f"{path}, line {line}: time does not rise in even steps (of {step:.6g} s)")
     return float(time[0]), float(1.0 / step), values
 
 
@@ -201,9 +201,9 @@ def _number(cell: str) -> float | None:
 
 def _unit(path: Path, names: list[str], column: int, symbol: str) -> float:
     """Size of the unit in a column's name, in brackets ("time (us)"); 1 where it names none."""
-    if not (found := re.search(r"[(\[]\s*(.*?)\s*[)\]]", names[column] if column < len(names) else "")):
+    if not (match := re.search(r"[(\[]\s*(.*?)\s*[)\]]", names[column] if column < len(names) else "")):
         return 1.0
-    if found[1] not in UNITS[symbol]:
-        known = ", ".join(UNITS[symbol])
-        raise RecordingError(f"{path}, column '{names[column]}': unit '{found[1]}' is not one of {known}")
-    return UNITS[symbol][found[1]]
+    if match[1] not in UNITS[symbol]:
+        units = ", ".join(UNITS[symbol])
+        raise RecordingError(f"{path}, column '{names[column]}': unit '{match[1]}' is not one of {units}")
+    return UNITS[symbol][match[1]]

@@ -46,13 +46,13 @@ class LogarithmicBubble(PulseModel):
         """As `PulseModel.pulse`."""
         return waveforms.logarithmic(self.bubble, highest)
 
-    def fault(self, longest: float, most: float) -> str:
+    def fault(self, longest: float, limit: float) -> str:
         """As `PulseModel.fault`."""
         duration = -onset(self.bubble)
         if not 1.0 / -self.q < duration:
             return f"grows for {duration:.3g} s and has no time to collapse: q is too small"
-        if not longest * duration <= most:
-            return f"grows for {longest * duration:.3g} s; a snap is over in {most:g} s"
+        if not longest * duration <= limit:
+            return f"grows for {longest * duration:.3g} s; a snap is over in {limit:g} s"
         return ""
 
 
@@ -111,5 +111,5 @@ class SnappingShrimp(SoundSource):
     def emissions(self, bottom: float, random: np.random.Generator, start: float) -> tuple[Emission, ...]:
         """As `SoundSource.emissions`: each snap as loud and as long as is drawn for it."""
         drawn = scales(self.variation, random, len(self.times))
-        each = zip(self.times, drawn.gain.tolist(), drawn.width.tolist(), strict=True)
-        return tuple(self.emission(bottom, start, *snap) for snap in each)
+        snaps = zip(self.times, drawn.gain.tolist(), drawn.width.tolist(), strict=True)
+        return tuple(self.emission(bottom, start, *snap) for snap in snaps)

@@ -78,16 +78,16 @@ class KellerMiksis(PulseModel):
 
     def pulse(self, depth: float, highest: float) -> Pulse:
         """As `PulseModel.pulse`. Raises ValueError as `collapse`."""
-        found = self.collapse(depth)
-        made = bubble_pulse.pulse(found, highest, self.fade)
+        collapse = self.collapse(depth)
+        pulse = bubble_pulse.pulse(collapse, highest, self.fade)
         if self.level_below is None:
-            return made
-        return replace(made, peak=bubble_pulse.peak_below(found, self.level_below, self.fade))
+            return pulse
+        return replace(pulse, peak=bubble_pulse.peak_below(collapse, self.level_below, self.fade))
 
     def cavity(self, depth: float) -> Cavity:
         """The bubble at its own depth, or else at this one (m), as the equations take it."""
-        where = depth if self.depth is None else self.depth
-        ambient = bubble_collapse.ambient_pressure(where, self.density, surface=self.surface_pressure)
+        own_depth = depth if self.depth is None else self.depth
+        ambient = bubble_collapse.ambient_pressure(own_depth, self.density, surface=self.surface_pressure)
         core = (
             bubble_collapse.hard_core(self.radius, self.gas_pressure, ambient, self.core_ratio)
             if self.core_ratio
@@ -108,15 +108,15 @@ class KellerMiksis(PulseModel):
 
     def collapse(self, depth: float) -> Collapse:
         """The solved bubble. Raises ValueError where it does not collapse, or faster than `largest_mach`."""
-        found = bubble_collapse.collapse(self.cavity(depth), self.rebounds)
-        if found.flag in {bubble_collapse.SETTLED, bubble_collapse.SINGULAR}:
-            raise ValueError(f"the bubble has no snap: {found.reason}")
-        if found.mach > self.largest_mach:
+        collapse = bubble_collapse.collapse(self.cavity(depth), self.rebounds)
+        if collapse.flag in {bubble_collapse.SETTLED, bubble_collapse.SINGULAR}:
+            raise ValueError(f"the bubble has no snap: {collapse.reason}")
+        if collapse.mach > self.largest_mach:
             raise ValueError(
-                f"the wall reaches {found.mach:.3g} times the speed of sound, over largest_mach "
+                f"the wall reaches {collapse.mach:.3g} times the speed of sound, over largest_mach "
                 f"{self.largest_mach:.3g}: first-order theory does not hold; more gas_pressure slows it"
             )
-        return found
+        return collapse
 
 
 @description

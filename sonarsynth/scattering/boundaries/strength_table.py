@@ -54,11 +54,11 @@ class StrengthTable(BoundaryLaw):
         factor = np.sqrt(self._backwards(np.sin(angle)))
         outwards = 2.0 * np.pi * np.trapezoid(factor * np.cos(angle), angle)
         shares = factor[1:] * outwards / np.sin(angle[1:])
-        most = int(np.argmax(shares))
-        if shares[most] > 1.0:
+        i = int(np.argmax(shares))
+        if shares[i] > 1.0:
             raise ValueError(
-                f"strength_db gives back {shares[most]:.3g} times what arrives at a grazing angle of "
-                f"{np.rad2deg(angle[1 + most]):.3g} deg"
+                f"strength_db gives back {shares[i]:.3g} times what arrives at a grazing angle of "
+                f"{np.rad2deg(angle[1 + i]):.3g} deg"
             )
         return self
 

@@ -84,30 +84,30 @@ def draw_snaps(chorus: Chorus, seed: int, listening: ListeningWindow) -> ChorusS
     there, sorted by cell. Cost is linear in cells and snaps.
     """
     clusters, cells = chorus.clusters, _cells(chorus, listening)
-    each = chorus.rate * SIDE * SIDE * SLOT / (1.0 if clusters is None else clusters.snaps)
-    count = poisson(uniforms(seed, Draw.COUNT, *cells.T), each)
+    mean_count = chorus.rate * SIDE * SIDE * SLOT / (1.0 if clusters is None else clusters.snaps)
+    count = poisson(uniforms(seed, Draw.COUNT, *cells.T), mean_count)
     key = _numbered(cells, count)
 
-    def drawn(what: Draw) -> Floats:
-        return uniforms(seed, what, *key.T)
+    def drawn(draw: Draw) -> Floats:
+        return uniforms(seed, draw, *key.T)
 
-    place = SIDE * (key[:, :2] + np.column_stack([drawn(Draw.X), drawn(Draw.Y)]))
+    position = SIDE * (key[:, :2] + np.column_stack([drawn(Draw.X), drawn(Draw.Y)]))
     time = SLOT * (key[:, 2] + drawn(Draw.TIME))
     if clusters is None:
         key = np.column_stack([key, np.zeros(len(key), np.int64)])
     else:
         members = poisson(drawn(Draw.CLUSTER_COUNT), clusters.snaps)
-        place, time = np.repeat(place, members, axis=0), np.repeat(time, members)
+        position, time = np.repeat(position, members, axis=0), np.repeat(time, members)
         key = _numbered(key, members)
         angle, away = 2.0 * np.pi * drawn(Draw.CLUSTER_ANGLE), clusters.radius * np.sqrt(drawn(Draw.CLUSTER_RADIUS))
-        place = place + away[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+        position = position + away[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
         time = time + clusters.duration * drawn(Draw.CLUSTER_TIME)
-    away = np.hypot(*(place - listening.place).T)
+    away = np.hypot(*(position - listening.place).T)
     early = listening.start - np.hypot(away, listening.longer) / listening.slowest
     audible = (away <= listening.reach) & (time >= early) & (time <= listening.stop - away / listening.fastest)
-    key, place, time = key[audible], place[audible], time[audible]
+    key, position, time = key[audible], position[audible], time[audible]
     return ChorusSnaps(
-        place=place,
+        place=position,
         time=time,
         level=chorus.level + chorus.deviation * _normal(drawn(Draw.LEVEL)),
         width=np.floor(WIDTHS * drawn(Draw.WIDTH)).astype(np.int64),
@@ -121,7 +121,7 @@ def _cells(chorus: Chorus, listening: ListeningWindow) -> Ints:
     """Cells (cell, xyt) that may hold what is heard, in order."""
     spread, lasts = (0.0, 0.0) if chorus.clusters is None else (chorus.clusters.radius, chorus.clusters.duration)
     reach = listening.reach + spread
-    low, high = (np.floor((listening.place + way * reach) / SIDE).astype(np.int64) for way in (-1, 1))
+    low, high = (np.floor((listening.place + sign * reach) / SIDE).astype(np.int64) for sign in (-1, 1))
     x, y = np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij")
     middle = SIDE * (np.stack([x.ravel(), y.ravel()], axis=1) + 0.5)
     away, corner = np.hypot(*(middle - listening.place).T), np.sqrt(0.5) * SIDE + spread
@@ -147,13 +147,13 @@ def poisson(uniform: Floats, mean: float) -> Ints:
     """Numbers (...) of the law of Poisson, from numbers evenly in 0 to 1, by inverting its distribution."""
     count = np.zeros(uniform.shape, np.int64)
     more = np.flatnonzero(uniform >= np.exp(-mean))
-    part = total = float(np.exp(-mean))
+    term = total = float(np.exp(-mean))
     for k in range(1, MOST_OF_A_CELL):
         if not more.size:
             break
         count.flat[more] = k
-        part *= mean / k
-        total += part
+        term *= mean / k
+        total += term
         more = more[uniform.flat[more] >= total]
     return count
 
