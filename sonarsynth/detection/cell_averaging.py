@@ -39,20 +39,20 @@ class CellAveraging:
 
         inner = round(self.guard * view.reach)
         outer = inner + max(1, round(self.training * view.reach))
-        there = np.isfinite(view.energy)
-        energy = np.where(there, view.energy, 0.0)
-        count = _square_sum(there.astype(float), outer) - _square_sum(there.astype(float), inner)
+        finite = np.isfinite(view.energy)
+        energy = np.where(finite, view.energy, 0.0)
+        count = _square_sum(finite.astype(float), outer) - _square_sum(finite.astype(float), inner)
         mean = (_square_sum(energy, outer) - _square_sum(energy, inner)) / np.maximum(count, 1.0)
         ratio = np.divide(energy, mean, out=np.zeros_like(energy), where=(mean > 0.0) & (count > 0.0))
         cells = np.maximum(count, 1.0)
         over = ratio > cells * (self.false_alarm_rate ** (-1.0 / cells) - 1.0)
-        parts, _ = label(over, np.ones((3, 3), int))
-        found = []
-        for number, place in enumerate(find_objects(parts), 1):
-            rows, columns = np.nonzero(parts[place] == number)
-            rows, columns = rows + place[0].start, columns + place[1].start
-            found.append(Region(rows, columns, float(10.0 * np.log10(ratio[rows, columns].max()))))
-        return found
+        labels, _ = label(over, np.ones((3, 3), int))
+        regions = []
+        for number, box in enumerate(find_objects(labels), 1):
+            rows, columns = np.nonzero(labels[box] == number)
+            rows, columns = rows + box[0].start, columns + box[1].start
+            regions.append(Region(rows, columns, float(10.0 * np.log10(ratio[rows, columns].max()))))
+        return regions
 
 
 def _square_sum(values: Floats, reach: int) -> Floats:

@@ -42,7 +42,7 @@ def _detection(view: SonarView, region: Region) -> dict[str, Any]:
     x0, x1 = float(region.columns.min()), float(region.columns.max() + 1)
     y0, y1 = float(region.rows.min()), float(region.rows.max() + 1)
     sides = [_narrowed(low, high, view.beam_width / view.step) for low, high in ((x0, x1), (y0, y1))]
-    found: dict[str, Any] = {
+    detection: dict[str, Any] = {
         "score": region.score,
         "box": (*(narrow[0] for narrow in sides), *(narrow[1] for narrow in sides)),
         "azimuth": float(angle_at(0.5 * (x0 + x1), view.azimuth)),
@@ -51,9 +51,9 @@ def _detection(view: SonarView, region: Region) -> dict[str, Any]:
     at = [beams_at(view.points[:, n], angles) for n, angles in enumerate((view.azimuth, view.elevation))]
     within = (at[0] >= x0) & (at[0] <= x1) & (at[1] >= y0) & (at[1] <= y1)
     if within.any():
-        some = view.points[within]
-        found["range"] = float(some[some[:, 3].argmax(), 2])
-    return found
+        points = view.points[within]
+        detection["range"] = float(points[points[:, 3].argmax(), 2])
+    return detection
 
 
 def _narrowed(low: float, high: float, width: float) -> tuple[float, float]:
@@ -63,9 +63,9 @@ def _narrowed(low: float, high: float, width: float) -> tuple[float, float]:
     return middle - half, middle + half
 
 
-def angle_at(place: Floats | float, angles: Floats) -> Floats:
+def angle_at(position: Floats | float, angles: Floats) -> Floats:
     """Angles (deg) of places in beams, where beam j is at j + 0.5."""
-    return np.asarray(np.interp(np.subtract(place, 0.5), np.arange(len(angles)), angles))
+    return np.asarray(np.interp(np.subtract(position, 0.5), np.arange(len(angles)), angles))
 
 
 def beams_at(angle: Floats, angles: Floats) -> Floats:

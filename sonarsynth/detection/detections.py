@@ -131,7 +131,7 @@ def _row(entry: object, where: str) -> dict[str, Any]:
         box = entry["bbox"]
         if not (isinstance(box, list) and len(box) == 4):
             raise DetectionsError(f"{where}: bbox must be [x0, y0, width, height]")
-        x, y, width, height = (_number({"bbox": side}, "bbox", where) for side in box)
+        x, y, width, height = (_number({"bbox": value}, "bbox", where) for value in box)
         if width < 0 or height < 0:
             raise DetectionsError(f"{where}: bbox must not have a negative width or height")
         row["box"] = (x, y, x + width, y + height)

@@ -32,23 +32,23 @@ class ImagePeaks:
         """As `DetectionMethod.regions`."""
         from scipy.ndimage import label, maximum_filter
 
-        there = np.isfinite(view.energy)
-        middle = float(np.median(view.energy[there])) if there.any() else 0.0
+        finite = np.isfinite(view.energy)
+        middle = float(np.median(view.energy[finite])) if finite.any() else 0.0
         if not middle > 0.0:
             return []
-        energy = np.where(there, view.energy, 0.0)
+        energy = np.where(finite, view.energy, 0.0)
         level = 10.0 * np.log10(np.maximum(energy, np.finfo(float).tiny) / middle)
         highest = maximum_filter(level, 2 * view.reach + 1, mode="nearest")
         least = max(self.threshold, float(level.max()) - self.dynamic_range)
         rows, columns = np.nonzero((level == highest) & (level >= least))
-        found, taken = [], np.zeros(level.shape, bool)
+        regions, taken = [], np.zeros(level.shape, bool)
         for n in np.argsort(-level[rows, columns], kind="stable"):
             peak = rows[n], columns[n]
             if taken[peak]:  # on the flank of a brighter one
                 continue
-            parts, _ = label(level >= level[peak] - self.extent)
-            own = (parts == parts[peak]) & ~taken
+            labels, _ = label(level >= level[peak] - self.extent)
+            own = (labels == labels[peak]) & ~taken
             taken |= own
             own_rows, own_columns = np.nonzero(own)
-            found.append(Region(own_rows, own_columns, float(level[peak])))
-        return found
+            regions.append(Region(own_rows, own_columns, float(level[peak])))
+        return regions

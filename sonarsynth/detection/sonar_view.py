@@ -64,9 +64,9 @@ def views(tree: xr.DataTree, frames: np.ndarray) -> Iterator[tuple[int, SonarVie
     width = float(np.rad2deg(beam_width(tree)))
     azimuth, elevation = (np.asarray(image[axis].values, float) for axis in ("azimuth", "elevation"))
     for start in range(0, len(frames), BLOCK):
-        some = frames[start : start + BLOCK]
-        energy = np.asarray(image["energy"].isel(frame=some).values)
-        for row, (frame, points) in enumerate(zip(some.tolist(), _points(tree, some), strict=True)):
+        block = frames[start : start + BLOCK]
+        energy = np.asarray(image["energy"].isel(frame=block).values)
+        for row, (frame, points) in enumerate(zip(block.tolist(), _points(tree, block), strict=True)):
             yield frame, SonarView(energy[row].astype(float), azimuth, elevation, width, points)
 
 
@@ -75,7 +75,7 @@ def _points(tree: xr.DataTree, frames: np.ndarray) -> list[Floats]:
     if "cloud" not in tree.children:
         return [np.zeros((0, 4))] * len(frames)
     cloud = tree["cloud"].dataset.isel(frame=frames)
-    held = np.maximum(cloud["count"].values, 0)
-    cloud = cloud.isel(point=slice(0, int(held.max(initial=0))))
+    counts = np.maximum(cloud["count"].values, 0)
+    cloud = cloud.isel(point=slice(0, int(counts.max(initial=0))))
     table = np.stack([cloud[name].values for name in ("azimuth", "elevation", "range", "energy")], axis=-1)
-    return [rows[:count].astype(float) for rows, count in zip(table, held, strict=True)]
+    return [rows[:count].astype(float) for rows, count in zip(table, counts, strict=True)]

@@ -72,7 +72,7 @@ def write_bellhop(plan: Plan, index: int, folder: Path, name: str) -> tuple[list
     files: list[Path] = []
     for n in sorted(first.values()):
         snap = frame.moment.snaps[n].position
-        depths = _off_boundaries([float(depth_of(place)) for place in (snap, array)], environment.depth)
+        depths = _off_boundaries([float(depth_of(position)) for position in (snap, array)], environment.depth)
         away = float(np.hypot(*(array - snap)[:2]))
         if away < NEAREST:
             raise FieldError(("scene", "world", "sources"), f"snap {n} is straight above or below the array")
@@ -94,7 +94,7 @@ def write_bellhop(plan: Plan, index: int, folder: Path, name: str) -> tuple[list
             *(f"{z!r} {c!r} /" for z, c in nodes.tolist()),
             f"'{low}' 0.0  ! the bottom",
             *low_lines,
-            *(f"1\n{depth!r} /  ! m, {what}" for depth, what in zip(depths, ("snap", "array"), strict=True)),
+            *(f"1\n{depth!r} /  ! m, {end}" for depth, end in zip(depths, ("snap", "array"), strict=True)),
             f"1\n{1e-3 * away!r} /  ! km",
             "'A'  ! arrivals",
             f"{_beams(depths, away, float(layers.speed.min()))}  ! beams",
@@ -112,9 +112,9 @@ def _rising(layers: Water) -> Floats:
     depth = layers.depth.copy()
     for i in range(1, len(depth)):
         depth[i] = max(depth[i], depth[i - 1] + JUMP * (layers.depth[i] == layers.depth[i - 1]))
-    some = np.append(depth[:-1] < depth[-1] - JUMP, True)
-    rises = np.append(True, np.diff(depth[some]) > 0)
-    return np.asarray(np.column_stack([depth, layers.speed])[some][rises])
+    upper = np.append(depth[:-1] < depth[-1] - JUMP, True)
+    rises = np.append(True, np.diff(depth[upper]) > 0)
+    return np.asarray(np.column_stack([depth, layers.speed])[upper][rises])
 
 
 def _off_boundaries(depths: list[float], bottom: float) -> tuple[float, float]:
@@ -175,20 +175,20 @@ def _beams(depths: tuple[float, float], away: float, slowest: float) -> int:
 
 def _unsaid(plan: Plan) -> tuple[str, ...]:
     """What the scene has and Bellhop's environment has not."""
-    environment, found = plan.scene.world.environment, []
-    for what, boundary in (("surface", environment.surface), ("bottom", environment.bottom)):
+    environment, notes = plan.scene.world.environment, []
+    for name, boundary in (("surface", environment.surface), ("bottom", environment.bottom)):
         if (height := rms_height(boundary)) > 0.0:
-            found.append(f"the {what} is smooth: a roughness of {height:.3g} m rms takes nothing from the amplitudes")
+            notes.append(f"the {name} is smooth: a roughness of {height:.3g} m rms takes nothing from the amplitudes")
     if environment.surface.bubbles:
-        found.append("there are no bubbles under the surface")
+        notes.append("there are no bubbles under the surface")
     if environment.absorption.formula == "ainslie_mccolm":
-        found.append("absorption is that of Francois and Garrison: Bellhop has no formula of Ainslie and McColm")
+        notes.append("absorption is that of Francois and Garrison: Bellhop has no formula of Ainslie and McColm")
     elif environment.absorption.formula != "none":
-        found.append("absorption is that of the mean depth of snap and array, along the whole of each path")
-    found.append(f"a snap on the bottom or the surface is {1e3 * LIFT:g} mm off it, or a millionth of the depth")
+        notes.append("absorption is that of the mean depth of snap and array, along the whole of each path")
+    notes.append(f"a snap on the bottom or the surface is {1e3 * LIFT:g} mm off it, or a millionth of the depth")
     if (jumps := int(np.sum(np.diff(plan.profile.depth) == 0))) > 0:
-        found.append(f"{jumps} jumps of the sound speed are layers of {1e3 * JUMP:g} mm")
-    return tuple(found)
+        notes.append(f"{jumps} jumps of the sound speed are layers of {1e3 * JUMP:g} mm")
+    return tuple(notes)
 
 
 def _plain(title: str) -> str:

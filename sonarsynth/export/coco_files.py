@@ -55,8 +55,8 @@ def write_coco(
         if progress is not None:
             progress(done, len(frames), 0)
     files = []
-    for part, entry in entries.items():
-        files.append(folder / f"{part}.json")
+    for split_name, entry in entries.items():
+        files.append(folder / f"{split_name}.json")
         files[-1].write_text(json.dumps(entry), encoding="utf-8")
     return tuple(files)
 
@@ -98,7 +98,7 @@ def _annotation(objects: TrueObjects, row: int, whose: np.ndarray) -> dict[str, 
     corners: list[list[float]] = [[x0, y0, x1, y0, x1, y1, x0, y1]]
     more = {"visibility": "visible", "snr": "snr", "range": "range", "aspect": "aspect"}
     more |= {"azimuth": "azimuth", "elevation": "elevation"}
-    found = {name: float(getattr(objects, column)[row]) for name, column in more.items()}
+    measures = {name: float(getattr(objects, column)[row]) for name, column in more.items()}
     return {
         "id": row + 1,
         "image_id": int(objects.frame[row]),
@@ -108,7 +108,7 @@ def _annotation(objects: TrueObjects, row: int, whose: np.ndarray) -> dict[str, 
         "segmentation": {"counts": _run_lengths(mask), "size": list(mask.shape)} if mask.any() else corners,
         "iscrowd": 0,
         "track_id": int(objects.target[row]),
-        **{name: value for name, value in found.items() if np.isfinite(value)},
+        **{name: value for name, value in measures.items() if np.isfinite(value)},
     }
 
 

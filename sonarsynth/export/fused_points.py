@@ -53,9 +53,9 @@ def points(
             ("relative_to",), f"must be sonar, world or a target ({', '.join(names)}), not {relative_to!r}"
         )
     cloud = tree["cloud"].dataset
-    some = range(cloud.sizes["frame"]) if frames is None else list(frames)
-    parts = [_frame(tree, int(index), relative_to, names) for index in some]
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else {}
+    chosen = range(cloud.sizes["frame"]) if frames is None else list(frames)
+    of_frames = [_frame(tree, int(index), relative_to, names) for index in chosen]
+    columns = {name: np.concatenate([c[name] for c in of_frames]) for name in of_frames[0]} if of_frames else {}
     variables = {
         name: (("point", "xyz") if values.ndim == 2 else ("point",), values, _attributes(cloud, name))
         for name, values in columns.items()
@@ -76,15 +76,15 @@ def _frame(tree: xr.DataTree, index: int, relative_to: str, names: list[str]) ->
     """Columns (point,) of the points of a frame."""
     cloud, truth = (tree[group].dataset.isel(frame=index) for group in ("cloud", "truth"))
     bodies = tree["truth/targets"].dataset.isel(frame=index)
-    there = np.isfinite(cloud["range"].values)
-    columns = {name: cloud[name].values[there] for name in KEPT if name in cloud}
-    place = np.stack([cloud[axis].values[there] for axis in "xyz"], axis=-1).astype(float)
+    finite = np.isfinite(cloud["range"].values)
+    columns = {name: cloud[name].values[finite] for name in KEPT if name in cloud}
+    position = np.stack([cloud[axis].values[finite] for axis in "xyz"], axis=-1).astype(float)
     sonar = Pose(truth["sonar_position"].values, truth["sonar_orientation"].values)
     turn = _Turn(sonar, bodies, relative_to, names, columns["emission"])
     return {
-        "position": turn.place(place),
+        "position": turn.place(position),
         "normal": turn.vector(_normals(tree, bodies, columns["target"], columns["facet"], names)),
-        "frame": np.full(len(place), index, np.int32),
+        "frame": np.full(len(position), index, np.int32),
         **columns,
     }
 
@@ -114,15 +114,15 @@ class _Turn:
 
 def _normals(tree: xr.DataTree, bodies: xr.Dataset, target: Ints, facet: Ints, names: list[str]) -> Floats:
     """Outward normals (point, xyz), world, of the facets that brought the echoes; NaN where none did."""
-    found = np.full((len(target), 3), np.nan)
+    normals = np.full((len(target), 3), np.nan)
     for number in range(len(names)):
-        some = np.flatnonzero((target == number) & (facet >= 0))
-        if not len(some):
+        rows = np.flatnonzero((target == number) & (facet >= 0))
+        if not len(rows):
             continue
         group = tree["targets"][str(bodies["group"].values[number])]
         mesh = (group[str(int(bodies["mesh"].values[number]))] if group.children else group).dataset
-        a, b, c = np.moveaxis(mesh["vertices"].values.astype(float)[mesh["faces"].values[facet[some]]], 1, 0)
+        a, b, c = np.moveaxis(mesh["vertices"].values.astype(float)[mesh["faces"].values[facet[rows]]], 1, 0)
         across = np.cross(b - a, c - a)
         own = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
-        found[some] = Pose(np.zeros(3), bodies["orientation"].values[number]).turn_to_world(own)
-    return found
+        normals[rows] = Pose(np.zeros(3), bodies["orientation"].values[number]).turn_to_world(own)
+    return normals

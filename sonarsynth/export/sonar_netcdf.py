@@ -89,15 +89,15 @@ def write_sonar_netcdf(
 def _groups(tree: xr.DataTree) -> Iterator[_Beams]:
     if "signals" in tree.children:
         signals = tree["signals"].dataset
-        place = np.zeros(signals.sizes["sensor"])
-        names = [f"hydrophone {n}" for n in range(len(place))]
+        zeros = np.zeros(signals.sizes["sensor"])
+        names = [f"hydrophone {n}" for n in range(len(zeros))]
         interval = 1.0 / float(signals["sampling_frequency"])
 
         def pressure(frame: int) -> tuple[np.ndarray, float]:
-            one = signals.isel(frame=frame)
-            return np.asarray(one["pressure"].values, np.float32), float(one["start"])
+            ping = signals.isel(frame=frame)
+            return np.asarray(ping["pressure"].values, np.float32), float(ping["start"])
 
-        yield _Beams(names, place, place, 360.0, interval, "Pa", "Sound pressure", pressure)
+        yield _Beams(names, zeros, zeros, 360.0, interval, "Pa", "Sound pressure", pressure)
     if not {"beams", "image"} & set(tree.children):
         return
     steered = tree["beams" if "beams" in tree.children else "image"].dataset
@@ -110,9 +110,9 @@ def _groups(tree: xr.DataTree) -> Iterator[_Beams]:
             interval = float(np.diff(steered["delay"].values[:2])[0])
 
     def values(frame: int) -> tuple[np.ndarray, float]:
-        one = steered.isel(frame=frame)
-        data = np.asarray(one["level" if "delay" in steered.dims else "energy"].values, np.float32)
-        return data.reshape(len(names), -1), float(one["start"])
+        ping = steered.isel(frame=frame)
+        data = np.asarray(ping["level" if "delay" in steered.dims else "energy"].values, np.float32)
+        return data.reshape(len(names), -1), float(ping["start"])
 
     yield _Beams(
         names,
@@ -146,9 +146,9 @@ def _write(tree: xr.DataTree, path: Path, frames: np.ndarray, groups: list[_Beam
         )
         _environment(tree, file)
         _platform(tree, file)
-        made = {"conversion_software_name": "sonarsynth", "conversion_time": now}
-        made["conversion_software_version"] = str(tree.attrs.get("sonarsynth_version", ""))
-        file.create_group("Provenance").attrs.update(made)
+        provenance = {"conversion_software_name": "sonarsynth", "conversion_time": now}
+        provenance["conversion_software_version"] = str(tree.attrs.get("sonarsynth_version", ""))
+        file.create_group("Provenance").attrs.update(provenance)
         sonar = file.create_group("Sonar")
         sonar.attrs.update({"sonar_manufacturer": "none", "sonar_model": "sonarsynth", "sonar_type": "omni-sonar"})
         kinds = {name: sonar.create_enumtype(np.int8, name, words) for name, words in _ENUMS.items()}
@@ -170,13 +170,13 @@ def _environment(tree: xr.DataTree, file: Any) -> None:
 def _platform(tree: xr.DataTree, file: Any) -> None:
     """The hydrophones: transducers that receive alone."""
     group = file.create_group("Platform")
-    place = np.asarray(tree["signals/position"].values) if "signals" in tree.children else np.zeros((1, 3))
-    group.dimensions = {"transducer": len(place), "position": 1, "MRU": 1, "gyro": 1}
+    position = np.asarray(tree["signals/position"].values) if "signals" in tree.children else np.zeros((1, 3))
+    group.dimensions = {"transducer": len(position), "position": 1, "MRU": 1, "gyro": 1}
     kind = group.create_enumtype(np.int8, "transducer_type_t", {"Receive_only": 0, "Transmit_only": 1, "Monostatic": 3})
     function = group.create_variable("transducer_function", ("transducer",), kind, fillvalue=np.int8(3))
-    function[:] = np.zeros(len(place), np.int8)
+    function[:] = np.zeros(len(position), np.int8)
     for n, (axis, sign) in enumerate((("x", 1.0), ("y", -1.0), ("z", -1.0))):  # ours are port and up
-        values = (sign * place[:, n]).astype(np.float32)
+        values = (sign * position[:, n]).astype(np.float32)
         _put(group, f"transducer_offset_{axis}", ("transducer",), values, "m", f"{axis}-offset of the transducer")
     for name in ("Position", "Attitude", "Gyro"):
         group.create_group(name)
@@ -232,25 +232,25 @@ def _numbers(
 ) -> dict[str, tuple[tuple[str, ...], Any, str]]:
     """Numeric variables of a group of beams: dimensions, values, units."""
     truth = tree["truth"].dataset.isel(frame=frames)
-    place = np.asarray(truth["sonar_position"].values)
+    position = np.asarray(truth["sonar_position"].values)
     heading, pitch, roll = heading_pitch_roll(np.asarray(truth["sonar_orientation"].values))
     phi, theta = beam_rotation(beams.azimuth, beams.elevation)
-    ping, each, sent = ("ping_time",), ("ping_time", "beam"), ("ping_time", "tx_beam")
+    ping, beam, sent = ("ping_time",), ("ping_time", "beam"), ("ping_time", "tx_beam")
     solid = 4.0 * np.pi if beams.width >= 360.0 else 0.25 * np.pi * np.deg2rad(beams.width) ** 2
     return {
-        "beamwidth_receive_major": (each, beams.width, "arc_degree"),
-        "beamwidth_receive_minor": (each, beams.width, "arc_degree"),
-        "blanking_interval": (each, 0.0, "s"),
-        "equivalent_beam_angle": (each, solid, "sr"),
+        "beamwidth_receive_major": (beam, beams.width, "arc_degree"),
+        "beamwidth_receive_minor": (beam, beams.width, "arc_degree"),
+        "blanking_interval": (beam, 0.0, "s"),
+        "equivalent_beam_angle": (beam, solid, "sr"),
         "platform_heading": (ping, heading, "degrees_north"),
-        "platform_latitude": (ping, place[:, 1] / METRES_A_DEGREE, "degrees_north"),
-        "platform_longitude": (ping, place[:, 0] / METRES_A_DEGREE, "degrees_east"),
+        "platform_latitude": (ping, position[:, 1] / METRES_A_DEGREE, "degrees_north"),
+        "platform_longitude": (ping, position[:, 0] / METRES_A_DEGREE, "degrees_east"),
         "platform_pitch": (ping, pitch, "arc_degree"),
         "platform_roll": (ping, roll, "arc_degree"),
-        "platform_vertical_offset": (ping, -place[:, 2], "m"),
-        "rx_beam_rotation_phi": (each, phi, "arc_degree"),
-        "rx_beam_rotation_theta": (each, theta, "arc_degree"),
-        "rx_beam_rotation_psi": (each, 0.0, "arc_degree"),
+        "platform_vertical_offset": (ping, -position[:, 2], "m"),
+        "rx_beam_rotation_phi": (beam, phi, "arc_degree"),
+        "rx_beam_rotation_theta": (beam, theta, "arc_degree"),
+        "rx_beam_rotation_psi": (beam, 0.0, "arc_degree"),
         "sample_interval": (ping, beams.interval, "s"),
         "sample_time_offset": (sent, -start, "s"),  # subtracted from the time of each sample
         "transmit_duration_nominal": (sent, np.nan, "s"),
