@@ -189,14 +189,14 @@ def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_P
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
     with reading.locating(source), printing.planning():
-        made = planning.plan(made_from, chosen)
+        planned = planning.plan(made_from, chosen)
     with printing.planning("timing frames"):
-        prediction = schedule.predict(made, prepared=time.process_time())
-    made = replace(made, stages=prediction.rows(made))
+        prediction = schedule.predict(planned, prepared=time.process_time())
+    planned = replace(planned, stages=prediction.rows(planned))
     if as_json:
-        _print_json({**made.as_json(), **prediction.as_json()})
+        _print_json({**planned.as_json(), **prediction.as_json()})
     else:
-        printing.plan_report(made, prediction)
+        printing.plan_report(planned, prediction)
 
 
 @app.command()
@@ -281,9 +281,9 @@ def snap(
 
     source = reading.read(recipe, settings)
     with reading.locating(source):
-        file, found = snap_pictures.draw_snap(reading.recipe_of(source), out, compare)
-    if found is not None:
-        typer.echo(found.summary())
+        file, comparison = snap_pictures.draw_snap(reading.recipe_of(source), out, compare)
+    if comparison is not None:
+        typer.echo(comparison.summary())
     typer.echo(str(file))
 
 

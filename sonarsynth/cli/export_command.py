@@ -76,10 +76,10 @@ def _points(store: str, to: str, out: Path | None, frames: str | None, relative_
     from sonarsynth.store import named_after, open_store
 
     tree = open_store(store)
-    some = frame_numbers(frames, tree.sizes["frame"])
+    numbers = frame_numbers(frames, tree.sizes["frame"])
     file = out or named_after(store).with_suffix(f".{to}")
     try:
-        cloud = points(tree, some, relative_to=relative_to)
+        cloud = points(tree, numbers, relative_to=relative_to)
         written = write_points(cloud, file if file.suffix else file.with_suffix(f".{to}"))
     except (ValueError, ImportError) as error:
         raise BadOption(str(error)) from None
@@ -95,11 +95,11 @@ def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
     from sonarsynth.store import built_frames, named_after, open_store
 
     tree = open_store(store)
-    some = frame_numbers(frames, tree.sizes["frame"])
+    wanted = frame_numbers(frames, tree.sizes["frame"])
     chosen = built_frames(tree)
-    chosen = chosen if some is None else np.intersect1d(chosen, some)
+    chosen = chosen if wanted is None else np.intersect1d(chosen, wanted)
     if not len(chosen):
-        raise BadOption("--frames: none of these frames has been built" if some else f"{store} has no frames yet")
+        raise BadOption("--frames: none of these frames has been built" if wanted else f"{store} has no frames yet")
     folder = _new(out or named_after(store).with_name(f"{named_after(store).name}.{to}"))
     write, lost = (
         (coco_files.write_coco, coco_files.LOST) if to == COCO else (sonar_netcdf.write_sonar_netcdf, sonar_netcdf.LOST)
@@ -131,9 +131,9 @@ def _bellhop(recipe: Path, out: Path | None, frames: str | None, settings: list[
     made_from = reading.recipe_of(source)
     folder, notes = _new(out or Path(f"{recipe.stem}.bellhop")), dict[str, None]()
     with reading.locating(source):
-        some = frame_numbers(frames or "0:1", made_from.frames) or ()
+        numbers = frame_numbers(frames or "0:1", made_from.frames) or ()
         plan = planning.plan(made_from)
-        for index in some:
+        for index in numbers:
             files, unsaid = write_bellhop(plan, index, folder, recipe.stem)
             notes |= dict.fromkeys(unsaid)
             for file in files:

@@ -26,8 +26,8 @@ SECONDS_BETWEEN_LINES: Final = 10.0
 
 def console(*, stderr: bool = False) -> Console:
     """A console: as wide as the terminal, or 140 columns where there is none."""
-    there = (sys.stderr if stderr else sys.stdout).isatty()
-    return Console(stderr=stderr, width=None if there else 140, highlight=False, soft_wrap=not there)
+    terminal = (sys.stderr if stderr else sys.stdout).isatty()
+    return Console(stderr=stderr, width=None if terminal else 140, highlight=False, soft_wrap=not terminal)
 
 
 @contextmanager
@@ -51,19 +51,19 @@ def progress(waiting: str = "starting workers") -> Iterator[Report]:
 
 
 @contextmanager
-def planning(what: str = "planning") -> Iterator[None]:
+def planning(activity: str = "planning") -> Iterator[None]:
     """Shows that something is being made: a spinner on a terminal, else a line now and then."""
     began, done = time.monotonic(), threading.Event()
     if sys.stderr.isatty():
-        columns = SpinnerColumn(), TextColumn(what), TimeElapsedColumn()
+        columns = SpinnerColumn(), TextColumn(activity), TimeElapsedColumn()
         with Progress(*columns, console=console(stderr=True), transient=True) as bar:
-            bar.add_task(what, total=None)
+            bar.add_task(activity, total=None)
             yield
         return
 
     def say() -> None:
         while not done.wait(SECONDS_BETWEEN_LINES):
-            sys.stderr.write(f"{what}, {time.monotonic() - began:.0f} s\n")
+            sys.stderr.write(f"{activity}, {time.monotonic() - began:.0f} s\n")
             sys.stderr.flush()
 
     thread = threading.Thread(target=say, daemon=True)
@@ -127,12 +127,12 @@ def build_report(report: BuildReport) -> None:
             f"({rate:.3g} frames/s, {format_bytes(report.bytes)}), {report.there} of {report.wanted} were already built"
         )
         times = ", ".join(f"{stage} {_milliseconds(s / report.written)}" for stage, s in report.stage_cpu.items())
-        where = (
+        workers = (
             f"{counted(report.workers, 'worker')} with at most {format_bytes(report.worker_peak_bytes)} of memory each"
             if report.workers
             else "no worker processes"
         )
-        out.print(f"CPU time per frame: {times}; {where}, {format_bytes(report.client_peak_bytes)} in this process")
+        out.print(f"CPU time per frame: {times}; {workers}, {format_bytes(report.client_peak_bytes)} in this process")
     elif not report.failures:
         out.print(f"{report.store}: all {report.wanted} frames were already built")
     if report.prediction and report.written:
@@ -150,12 +150,12 @@ def build_report(report: BuildReport) -> None:
         )
 
 
-def _compared(found: dict[str, Any]) -> Iterator[str]:
+def _compared(prediction: dict[str, Any]) -> Iterator[str]:
     """Prediction and measurement of a build, a line each."""
-    for name, what, said in (("seconds", "took", duration), ("bytes", "the store takes", format_bytes)):
-        if found[f"{name}_ratio"] is not None:
-            measured, predicted = (said(found[f"{which}_{name}"]) for which in ("measured", "predicted"))
-            yield f"{what} {measured} (predicted {predicted})"
+    for name, verb, shown in (("seconds", "took", duration), ("bytes", "the store takes", format_bytes)):
+        if prediction[f"{name}_ratio"] is not None:
+            measured, predicted = (shown(prediction[f"{which}_{name}"]) for which in ("measured", "predicted"))
+            yield f"{verb} {measured} (predicted {predicted})"
 
 
 def plan_report(plan: Plan, prediction: Prediction) -> None:
@@ -192,8 +192,8 @@ def _spanned(plan: dict[str, Any]) -> Iterator[str]:
     grid = [f"{' with '.join(entry['names'])} ({entry['values']})" for entry in plan["grid"]]
     grid += [f"{plan['repeats']} repeats"] if plan["repeats"] > 1 else []
     spans = f": {' x '.join(grid)}" if grid else ""
-    least, most = plan["frames_of_a_sequence"]
-    yield f"{plan['sequences']} sequences of {least if least == most else f'{least} to {most}'} frames{spans}"
+    low, high = plan["frames_of_a_sequence"]
+    yield f"{plan['sequences']} sequences of {low if low == high else f'{low} to {high}'} frames{spans}"
     if plan["variations"]:
         yield "drawn for each: " + ", ".join(f"{v['name']} ({v['kind']})" for v in plan["variations"])
     yield "splits: " + ", ".join(f"{name} {count}" for name, count in plan["splits"].items()) + " sequences"

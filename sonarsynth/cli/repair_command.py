@@ -84,5 +84,5 @@ def _print(report: RepairReport) -> None:
     for problem in report.problems[:50]:
         out.print(f"DAMAGE {problem.where}: {problem.what}", markup=False)
     if report.ok:
-        made = report.restored or report.shards or report.moved
-        out.print(f"{report.store}: store is intact" + ("" if made else "; nothing to repair"), markup=False)
+        repaired = report.restored or report.shards or report.moved
+        out.print(f"{report.store}: store is intact" + ("" if repaired else "; nothing to repair"), markup=False)

@@ -47,12 +47,12 @@ def run(app: typer.Typer, arguments: list[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, before)
 
 
-def _show_note(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+def _show_note(message: Warning | str, category: type[Warning], *location: Any, **more: Any) -> None:
     """A warning about a recipe as one line; those of libraries as Python shows them."""
     if category.__name__ == "RenamedKey":
         _say(f"note: {message}", 0)
     else:
-        _SHOW(message, category, *where, **more)
+        _SHOW(message, category, *location, **more)
 
 
 _SHOW = warnings.showwarning
@@ -82,8 +82,8 @@ def _explain(error: Exception, shown: bool) -> int:
     if isinstance(error, (BadOption, FieldError)):
         return _say(str(error), INPUT)
     if isinstance(error, OSError) and error.strerror:
-        where = f"{error.filename}: " if error.filename else ""
-        return _say(f"{where}{error.strerror}", OURS)
+        file = f"{error.filename}: " if error.filename else ""
+        return _say(f"{file}{error.strerror}", OURS)
     line = f"{type(error).__name__}: {error}"
     return _say(line if shown else f"{line} (traceback in {_keep_traceback(error)})", OURS)
 

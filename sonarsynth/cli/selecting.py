@@ -21,33 +21,33 @@ def chosen_frames(frames: str | None, sequences: str | None, first: Sequence[int
 
     Raises BadOption.
     """
-    some = frame_numbers(frames, first[-1])
+    numbers = frame_numbers(frames, first[-1])
     of = _numbers("--sequences", "sequence", sequences, len(first) - 1)
     if of is None:
-        return some
-    if some is None:
+        return numbers
+    if numbers is None:
         return tuple(frame for n in of for frame in range(first[n], first[n + 1]))
     wanted = {frame for n in of for frame in range(first[n], first[n + 1])}
-    both = tuple(frame for frame in some if frame in wanted)
+    both = tuple(frame for frame in numbers if frame in wanted)
     if not both:
         raise BadOption("--frames and --sequences have no frame in common")
     return both
 
 
-def _numbers(option: str, what: str, text: str | None, count: int) -> tuple[int, ...] | None:
+def _numbers(option: str, noun: str, text: str | None, count: int) -> tuple[int, ...] | None:
     if text is None:
         return None
     chosen: set[int] = set()
-    for part in text.split(","):
-        found = re.fullmatch(r"\s*(\d*)(:?)(\d*)\s*", part)
-        if found is None or not part.strip() or not (found[2] or found[1]):
-            raise BadOption(f"{option}: '{part}' is neither a {what} number nor a range such as 0:8")
-        first = int(found[1] or 0)
-        stop = (int(found[3]) if found[3] else count) if found[2] else first + 1
+    for term in text.split(","):
+        match = re.fullmatch(r"\s*(\d*)(:?)(\d*)\s*", term)
+        if match is None or not term.strip() or not (match[2] or match[1]):
+            raise BadOption(f"{option}: '{term}' is neither a {noun} number nor a range such as 0:8")
+        first = int(match[1] or 0)
+        stop = (int(match[3]) if match[3] else count) if match[2] else first + 1
         if stop > count:
-            raise BadOption(f"{option}: '{part}' ends past the last {what}, {count - 1}")
+            raise BadOption(f"{option}: '{term}' ends past the last {noun}, {count - 1}")
         if stop <= first:
-            raise BadOption(f"{option}: '{part}' contains no {what}; they are numbered 0 to {count - 1}")
+            raise BadOption(f"{option}: '{term}' contains no {noun}; they are numbered 0 to {count - 1}")
         chosen.update(range(first, stop))
     return tuple(sorted(chosen))
 
@@ -57,7 +57,7 @@ def product_names(text: str) -> frozenset[str]:
     from sonarsynth.planning import chosen_products
 
     try:
-        return chosen_products(part.strip() for part in text.split(",") if part.strip())
+        return chosen_products(name.strip() for name in text.split(",") if name.strip())
     except ValueError as error:
         raise BadOption(f"--products: {error}") from None
 

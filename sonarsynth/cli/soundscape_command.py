@@ -55,7 +55,7 @@ def soundscape(
     if not SHORTEST <= seconds <= LONGEST:
         raise BadOption(f"--seconds: must be from {SHORTEST:g} to {LONGEST:g}")
     of_recording = (full_scale, sensitivity, dataset, sampling_frequency)
-    if compare is None and (channel or any(given is not None for given in of_recording)):
+    if compare is None and (channel or any(option is not None for option in of_recording)):
         raise BadOption(
             "--full-scale, --sensitivity, --channel, --dataset and --sampling-frequency are those of a recording: name "
             "one with --compare"
@@ -67,18 +67,18 @@ def soundscape(
     if Path(source).is_file():
         read = reading.read(Path(source), settings)
         with reading.locating(read), printing.planning("making sound"):
-            found = pictures.soundscape_of_recipe(reading.recipe_of(read), seconds, beside)
+            drawn = pictures.soundscape_of_recipe(reading.recipe_of(read), seconds, beside)
     elif Path(source).suffix.lower() in {".yaml", ".yml"}:
         raise BadOption(f"{source}: no such file")
     elif settings:
         raise BadOption("--set is for recipes: a store is what it is")
     else:
-        found = pictures.soundscape_of_store(source, files, beside)
-    file = pictures.draw_soundscape(found, out)
+        drawn = pictures.soundscape_of_store(source, files, beside)
+    file = pictures.draw_soundscape(drawn, out)
     if as_json:
-        typer.echo(json.dumps(found.as_json(), allow_nan=False))
+        typer.echo(json.dumps(drawn.as_json(), allow_nan=False))
         return
-    for line in found.summary():
+    for line in drawn.summary():
         typer.echo(line)
     typer.echo(str(file))
 

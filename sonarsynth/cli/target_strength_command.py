@@ -90,8 +90,8 @@ def _shape(text: str, unit: str) -> Shape:
     if text.lstrip().startswith("{"):
         if unit != "auto":
             raise BadOption(f"--unit: is for a mesh file; write units in the shape, such as 'radius: 25 {unit}'")
-        found: Shape = described(text, "shape", Shape)
-        return found
+        shape: Shape = described(text, "shape", Shape)
+        return shape
     if not Path(text).is_file():
         raise BadOption(f"{text}: no such file, and no shape such as '{{kind: sphere, radius: 0.25 m}}'")
     return MeshFile(path=text, unit=unit)  # type: ignore[arg-type]
@@ -102,14 +102,14 @@ def _values(text: str, option: str) -> Floats:
     import numpy as np
 
     try:
-        parts = [float(part) for part in text.split(":")]
+        numbers = [float(number) for number in text.split(":")]
     except ValueError:
-        parts = []
-    if len(parts) not in (1, 3) or not np.isfinite(parts).all():
+        numbers = []
+    if len(numbers) not in (1, 3) or not np.isfinite(numbers).all():
         raise BadOption(f"{option}: '{text}' is neither a number nor a range such as 0:90:5")
-    if len(parts) == 1:
-        return np.array(parts)
-    first, last, step = parts
+    if len(numbers) == 1:
+        return np.array(numbers)
+    first, last, step = numbers
     count = (last - first) / step if step != 0.0 else np.nan
     if not 0 <= count < MOST:
         raise BadOption(f"{option}: '{text}' contains no value, or more than {MOST}")

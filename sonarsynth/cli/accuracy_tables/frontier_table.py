@@ -103,8 +103,8 @@ def show(measured: AccuracyReport) -> None:
         cells = (point.knob, point.setting, *_numbers(point), _mark(point), _also(point))
         table.add_row("" if point.stage == stage else point.stage, *cells, style="bold" if point.chosen else None)
         stage = point.stage
-    for one in (table, _verdict_table(measured.verdicts)):
-        console().print(one, markup=False, soft_wrap=False, width=min(console().width, WIDEST))
+    for part_of_report in (table, _verdict_table(measured.verdicts)):
+        console().print(part_of_report, markup=False, soft_wrap=False, width=min(console().width, WIDEST))
     frames = ", ".join(str(n) for n in measured.frames)
     console().print(
         f"frames {frames}, {measured.hydrophones} hydrophones; {'all within their bounds' if measured.ok else 'FAILED'}"
@@ -123,8 +123,8 @@ def _mark(point: Point) -> str:
         return ""
     if point.role == "check":
         return "ok" if point.meets else "FAILED"
-    kept = ("within" if point.meets else "exceeds") if isfinite(point.allowed) else ""
-    return ", ".join(word for word in ("chosen" if point.chosen else "", kept) if word)
+    verdict = ("within" if point.meets else "exceeds") if isfinite(point.allowed) else ""
+    return ", ".join(word for word in ("chosen" if point.chosen else "", verdict) if word)
 
 
 def _also(point: Point) -> str:

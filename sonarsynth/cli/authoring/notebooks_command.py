@@ -27,9 +27,9 @@ def notebooks(
     if not texts:
         raise BadOption("the notebooks did not come with this installation")
     texts |= {folder / "configs" / file.name: file.read_text(encoding="utf-8") for file in shipped().values()}
-    there = [file for file in texts if file.exists() or file.is_symlink()]
-    if there:
-        raise BadOption(f"{there[0]} exists already: nothing was written")
+    existing = [file for file in texts if file.exists() or file.is_symlink()]
+    if existing:
+        raise BadOption(f"{existing[0]} exists already: nothing was written")
     (folder / "configs").mkdir(parents=True, exist_ok=True)
     for file, text in texts.items():
         with file.open("x", encoding="utf-8") as new:
@@ -41,8 +41,8 @@ def notebooks(
 def as_notebook(text: str) -> dict[str, Any]:
     """A notebook (nbformat 4.5) of Python with cell marks, jupytext's percent format."""
     cells: list[dict[str, Any]] = []
-    for part in re.split(r"^# %%", text, flags=re.MULTILINE)[1:]:
-        mark, _, body = part.partition("\n")
+    for cell in re.split(r"^# %%", text, flags=re.MULTILINE)[1:]:
+        mark, _, body = cell.partition("\n")
         kind = "markdown" if "[markdown]" in mark else "code"
         body = body.strip("\n")
         if kind == "markdown":

@@ -79,7 +79,7 @@ def array_of(text: str) -> tuple[int, int] | None:
     """An array as Answers has it, of "romanis" or "20x16". Raises ValueError."""
     if text.strip().lower() == "romanis":
         return None
-    columns, rows = (int(part) for part in text.lower().split("x"))
+    columns, rows = (int(number) for number in text.lower().split("x"))
     if not (1 <= columns <= 256 and 1 <= rows <= 256):
         raise ValueError("from 1x1 to 256x256")
     return columns, rows

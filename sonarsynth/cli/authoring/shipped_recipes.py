@@ -23,8 +23,8 @@ def shipped_notebooks() -> dict[str, Path]:
 
 
 def _shipped(name: str, pattern: str, in_clone: Path) -> dict[str, Path]:
-    found = (sorted(folder.glob(pattern)) for folder in (in_clone, PACKAGE / name))
-    return {file.stem: file for file in next((files for files in found if files), [])}
+    candidates = (sorted(folder.glob(pattern)) for folder in (in_clone, PACKAGE / name))
+    return {file.stem: file for file in next((files for files in candidates if files), [])}
 
 
 def text_of(name: str, file: Path) -> tuple[str, list[Path], list[str]]:
@@ -35,17 +35,17 @@ def text_of(name: str, file: Path) -> tuple[str, list[Path], list[str]]:
     from sonarsynth.recipe import reading
     from sonarsynth.store.provenance import paths
 
-    known = shipped()
+    files = shipped()
     name = Path(name).stem
-    if name not in known:
-        raise BadOption(f"--from: '{name}' is none of {', '.join(known) or 'the shipped recipes, which are not there'}")
-    text = known[name].read_text(encoding="utf-8")
+    if name not in files:
+        raise BadOption(f"--from: '{name}' is none of {', '.join(files) or 'the shipped recipes, which are not there'}")
+    text = files[name].read_text(encoding="utf-8")
     text = re.sub(r"\A# yaml-language-server: .*\n", "", text)  # the schema is beside the shipped ones alone
     text = re.sub(rf"configs/{name}\.yaml", lambda _: str(file), text)
     text = re.sub(rf"\b{name}\.zarr", f"{file.stem}.zarr", text)
-    beside = [known[name].parent / path for path in paths(reading.read(known[name]).data)]
-    there = [path for path in beside if path.is_file()]
-    return text, there, [path.name for path in beside if path not in there]
+    beside = [files[name].parent / path for path in paths(reading.read(files[name]).data)]
+    existing = [path for path in beside if path.is_file()]
+    return text, existing, [path.name for path in beside if path not in existing]
 
 
 def copy_beside(files: list[Path], folder: Path) -> None:

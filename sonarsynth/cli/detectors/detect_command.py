@@ -35,7 +35,7 @@ def detect(
         else detection.by_kind(method)
     )
     with printing.progress("reading") as progress:
-        found = detection.detect(store, chosen, split=split, progress=progress)
+        detections = detection.detect(store, chosen, split=split, progress=progress)
     beside = named_after(store)
-    file = found.write(out or beside.with_name(f"{beside.name}.{chosen.kind}.json"))
-    typer.echo(f"{file}: {len(found)} detections")
+    file = detections.write(out or beside.with_name(f"{beside.name}.{chosen.kind}.json"))
+    typer.echo(f"{file}: {len(detections)} detections")

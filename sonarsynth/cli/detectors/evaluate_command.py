@@ -41,43 +41,43 @@ def evaluate(
     if chosen != evaluation.TRUTH and not Path(chosen).is_file():
         raise BadOption(f"{chosen}: no such file")
     with printing.planning("reading"):
-        found = evaluation.evaluate(store, chosen, split=split).as_json()
+        figures = evaluation.evaluate(store, chosen, split=split).as_json()
     if as_json:
-        typer.echo(json.dumps(without_nan(found), indent=2))
+        typer.echo(json.dumps(without_nan(figures), indent=2))
     else:
-        _print(found, printing.console())
+        _print(figures, printing.console())
 
 
 def without_nan(value: Any) -> Any:
     """Figures with null where there is no number: JSON has no NaN."""
     if isinstance(value, dict):
-        return {name: without_nan(part) for name, part in value.items()}
+        return {name: without_nan(item) for name, item in value.items()}
     if isinstance(value, list):
-        return [without_nan(part) for part in value]
+        return [without_nan(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _print(found: dict[str, Any], console: Console) -> None:
+def _print(score: dict[str, Any], console: Console) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    console.print(f"{found['detections']} detections of {found['objects']} objects in {found['frames']} frames")
+    console.print(f"{score['detections']} detections of {score['objects']} objects in {score['frames']} frames")
     table = Table("", "objects", "AP by boxes", "AP50", "AP by distance", "AP 2 m", "found at 1 false alarm a frame")
-    table.add_row("all", *_cells({**found, **next(r for r in found["detection"] if r["false_alarms_a_frame"] == 1.0)}))
-    for name in (name for name in found if name.startswith("by_")):
+    table.add_row("all", *_cells({**score, **next(r for r in score["detection"] if r["false_alarms_a_frame"] == 1.0)}))
+    for name in (name for name in score if name.startswith("by_")):
         table.add_section()
-        for text, row in found[name].items():
+        for text, row in score[name].items():
             table.add_row(escape(text) if name == "by_category" else f"{name[3:]} {text}", *_cells(row))
     console.print(table)
-    for rate in found["detection"]:
+    for rate in score["detection"]:
         console.print(f"found at {rate['false_alarms_a_frame']:g} false alarms a frame: {_share(rate)}")
-    for name, row in found["errors"].items():
+    for name, row in score["errors"].items():
         if row["count"]:
-            known = f"; {100 * row['share_within_3']:.3g} % within 3 predicted errors" if "predicted" in row else ""
+            share = f"; {100 * row['share_within_3']:.3g} % within 3 predicted errors" if "predicted" in row else ""
             unit = "deg" if row["unit"] == "degree" else row["unit"]
             console.print(
                 f"error of {name}: median {row['median_abs']:.2g} {unit}, mean {row['mean']:.2g} {unit}, rms "
-                f"{row['rms']:.2g} {unit}, of {row['count']}{known}"
+                f"{row['rms']:.2g} {unit}, of {row['count']}{share}"
             )
 
 
