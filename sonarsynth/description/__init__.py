@@ -52,7 +52,7 @@ def description(cls: type[T]) -> type[T]:
     wrong.
     """
     written = cls.__doc__
-    made = cast(type[T], dataclass(frozen=True, kw_only=True, config=_CONFIG)(cls))
+    described = cast(type[T], dataclass(frozen=True, kw_only=True, config=_CONFIG)(cls))
     if written:
-        made.__doc__ = HelpText(written)  # type: ignore[assignment]  # Python asks it for the text
-    return made
+        described.__doc__ = HelpText(written)  # type: ignore[assignment]  # Python asks it for the text
+    return described

@@ -22,23 +22,23 @@ LEAST: Final = 4
 
 def size_of(*values: object) -> int:
     """Bytes of all arrays that results hold, each counted once; what says its `nbytes` is believed."""
-    total, seen, left = 0, set[int](), list(values)
-    held: list[object] = []  # so that no two have the same id
-    while left:
-        value = left.pop()
-        if id(value) in seen:
+    total, counted, pending = 0, set[int](), list(values)
+    alive: list[object] = []  # so that no two have the same id
+    while pending:
+        value = pending.pop()
+        if id(value) in counted:
             continue
-        seen.add(id(value))
-        held.append(value)
+        counted.add(id(value))
+        alive.append(value)
         if isinstance(value, np.ndarray) and isinstance(value.base, np.ndarray):
-            left.append(value.base)
+            pending.append(value.base)
         elif isinstance(value, (tuple, list)):
-            left += value
+            pending += value
         elif isinstance(value, dict):
-            left += value.values()
+            pending += value.values()
         elif is_dataclass(value):
-            left += [getattr(value, field.name, None) for field in fields(value)]
-            left += getattr(value, "__dict__", {}).values()
+            pending += [getattr(value, field.name, None) for field in fields(value)]
+            pending += getattr(value, "__dict__", {}).values()
         else:
             total += int(getattr(value, "nbytes", 0))
     return total
@@ -51,8 +51,8 @@ class ByteBoundedCache:
     that ask for the same at once may both make it.
     """
 
-    def __init__(self, function: Callable[..., Any], most: int) -> None:
-        self._function, self._most = function, most
+    def __init__(self, function: Callable[..., Any], limit: int) -> None:
+        self._function, self._most = function, limit
         self._results: OrderedDict[Hashable, tuple[Any, Any]] = OrderedDict()
         self._lock = Lock()
         update_wrapper(self, function)
@@ -64,15 +64,15 @@ class ByteBoundedCache:
             if key in self._results:
                 self._results.move_to_end(key)
                 return self._results[key][1]
-        made = self._function(*args, **named)
+        result = self._function(*args, **named)
         with self._lock:
-            self._results[key] = (key, made)
+            self._results[key] = (key, result)
             self._results.move_to_end(key)
             while len(self._results) > self._most or (
                 len(self._results) > LEAST and size_of(*self._results.values()) > MOST_BYTES
             ):
                 self._results.popitem(last=False)
-        return made
+        return result
 
     @property
     def nbytes(self) -> int:
@@ -88,10 +88,10 @@ class ByteBoundedCache:
             self._results.clear()
 
 
-def byte_bounded_cache(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def byte_bounded_cache(limit: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Decorator: keep results by arguments, at most so many, bounded in bytes (`ByteBoundedCache`)."""
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        return ByteBoundedCache(function, most)
+        return ByteBoundedCache(function, limit)
 
     return decorate

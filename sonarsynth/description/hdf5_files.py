@@ -40,7 +40,7 @@ def refuse_other_files(data: bytes) -> None:
         file.visititems(check)  # follows no link to another file
 
 
-def read_dataset(data: bytes, name: str | None, most: int) -> tuple[np.ndarray, dict[str, float]]:
+def read_dataset(data: bytes, name: str | None, limit: int) -> tuple[np.ndarray, dict[str, float]]:
     """The numbers of a dataset of at most so many, and its attributes that are numbers: its own before those of the
     groups that hold it.
 
@@ -52,7 +52,7 @@ def read_dataset(data: bytes, name: str | None, most: int) -> tuple[np.ndarray, 
         refuse_other_files(data)
         with h5py.File(io.BytesIO(data), "r") as file:
             dataset = _dataset(h5py, file, name)
-            _check_size(dataset, most)
+            _check_size(dataset, limit)
             values = np.asarray(dataset[()])
             holders = [dataset]
             while holders[-1].name != "/":
@@ -70,17 +70,17 @@ def read_dataset(data: bytes, name: str | None, most: int) -> tuple[np.ndarray, 
 
 def _dataset(h5py: Any, file: Any, name: str | None) -> Any:
     """The dataset of that name, or the only one of numbers. Raises FileError."""
-    found: list[str] = []
-    file.visititems(lambda path, item: found.append(path) if _numeric(h5py, item) else None)
-    shown = ", ".join(f"'{path[:60]}'" for path in found[:8]) + (", ..." if len(found) > 8 else "")
+    datasets: list[str] = []
+    file.visititems(lambda path, item: datasets.append(path) if _numeric(h5py, item) else None)
+    shown = ", ".join(f"'{path[:60]}'" for path in datasets[:8]) + (", ..." if len(datasets) > 8 else "")
     if name is None:
-        if len(found) != 1:
+        if len(datasets) != 1:
             raise FileError(
-                f"has {len(found)} datasets of numbers: name the `dataset`" + (f" ({shown})" if found else "")
+                f"has {len(datasets)} datasets of numbers: name the `dataset`" + (f" ({shown})" if datasets else "")
             )
-        return file[found[0]]
-    if name.strip("/") not in found:
-        raise FileError(f"has no dataset of numbers '{name[:60]}'" + (f", only {shown}" if found else ""))
+        return file[datasets[0]]
+    if name.strip("/") not in datasets:
+        raise FileError(f"has no dataset of numbers '{name[:60]}'" + (f", only {shown}" if datasets else ""))
     return file[name.strip("/")]
 
 
@@ -88,23 +88,23 @@ def _numeric(h5py: Any, item: Any) -> bool:
     return isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf" and item.shape is not None
 
 
-def _check_size(dataset: Any, most: int) -> None:
+def _check_size(dataset: Any, limit: int) -> None:
     """Refuses a shape, or pieces of it, that no file of numbers needs. Raises FileError."""
-    for what, shape in (("numbers", dataset.shape), ("numbers in a piece", dataset.chunks or ())):
+    for noun, shape in (("numbers", dataset.shape), ("numbers in a piece", dataset.chunks or ())):
         count = 1
         for size in shape:
             count *= int(size)
-        if count > most:
-            raise FileError(f"'{dataset.name}' has {count} {what}, more than {most}")
+        if count > limit:
+            raise FileError(f"'{dataset.name}' has {count} {noun}, more than {limit}")
 
 
 def _numbers(attributes: Any) -> dict[str, float]:
-    found = {}
+    numbers = {}
     for name in list(attributes)[:1000]:
         value = attributes[name]
         if np.size(value) == 1 and np.asarray(value).dtype.kind in "iuf":
-            found[str(name).lower()] = float(np.ravel(value)[0])
-    return found
+            numbers[str(name).lower()] = float(np.ravel(value)[0])
+    return numbers
 
 
 def _h5py() -> Any:

@@ -39,14 +39,14 @@ def stamp(path: Path | str) -> tuple[int, int]:
     return status.st_mtime_ns, status.st_size
 
 
-def read(path: Path | str, most: int) -> bytes:
+def read(path: Path | str, limit: int) -> bytes:
     """The bytes of a plain file of at most so many. Raises FileError."""
     with opened(path) as file:
         size = os.fstat(file.fileno()).st_size
-        data = b"" if size > most else file.read(size)
-        larger = size > most or bool(file.read(1))  # it may have grown; in /proc all sizes are 0
+        data = b"" if size > limit else file.read(size)
+        larger = size > limit or bool(file.read(1))  # it may have grown; in /proc all sizes are 0
     if larger:
-        raise FileError(f"is larger than {_size(most)}" if size > most else "is larger than it says")
+        raise FileError(f"is larger than {_size(limit)}" if size > limit else "is larger than it says")
     return data
 
 

@@ -45,11 +45,11 @@ def schema_of(described: Any) -> dict[str, Any]:
     """JSON schema of a description, or a union of such: texts, kinds, and the unit of each number (`x-unit`)."""
     before = _PLAIN.set(True)
     try:
-        found = TypeAdapter(described).json_schema(schema_generator=_Schema)
+        schema = TypeAdapter(described).json_schema(schema_generator=_Schema)
     finally:
         _PLAIN.reset(before)
-    _write_defaults(found)
-    return found
+    _write_defaults(schema)
+    return schema
 
 
 def kind_of(field: dict[str, Any]) -> str:
@@ -65,7 +65,7 @@ def kind_of(field: dict[str, Any]) -> str:
         if "x-unit" in field:
             bounds = next((text for text in map(_limits, several) if text), "")
             return f"number{bounds} in {field['x-unit']}"
-        kinds = dict.fromkeys(kind_of(one) for one in several)
+        kinds = dict.fromkeys(kind_of(option) for option in several)
         return " | ".join(kinds)
     if field.get("type") == "array":
         return _of_array(field)
@@ -74,7 +74,7 @@ def kind_of(field: dict[str, Any]) -> str:
 
 def _of_array(field: dict[str, Any]) -> str:
     if "prefixItems" in field:
-        return f"({', '.join(one.get('x-unit') or kind_of(one) for one in field['prefixItems'])})"
+        return f"({', '.join(item.get('x-unit') or kind_of(item) for item in field['prefixItems'])})"
     return f"list of {kind_of(field.get('items', {}))}"
 
 
@@ -82,18 +82,18 @@ def _limits(field: dict[str, Any]) -> str:
     """The bounds of a number in words; of two on one side the stricter."""
     words = []
     for at_least, beyond, best in (("minimum", "exclusiveMinimum", max), ("maximum", "exclusiveMaximum", min)):
-        given = [name for name in (at_least, beyond) if name in field]
-        if given:
-            strictest = best(field[name] for name in given)
-            name = next(name for name in reversed(given) if field[name] == strictest)
+        bounds = [name for name in (at_least, beyond) if name in field]
+        if bounds:
+            strictest = best(field[name] for name in bounds)
+            name = next(name for name in reversed(bounds) if field[name] == strictest)
             words.append(f" {_BOUNDS[name].format(f'{strictest:g}')}")
     return "".join(words)
 
 
 def _parameters(owner: type) -> str:
     """The fields of a description as the section Parameters of a docstring."""
-    found = schema_of(owner)
-    own = found.get("$defs", {}).get(found["$ref"].rpartition("/")[2]) if "$ref" in found else found
+    schema = schema_of(owner)
+    own = schema.get("$defs", {}).get(schema["$ref"].rpartition("/")[2]) if "$ref" in schema else schema
     required, lines = own.get("required", []), ["Parameters", "----------"]
     for name, field in own["properties"].items():
         if name == "kind":
@@ -114,21 +114,21 @@ def shown(default: Any) -> str:
     return f"{default:g}" if isinstance(default, float) else str(default)
 
 
-def _write_defaults(part: Any) -> str | None:
+def _write_defaults(node: Any) -> str | None:
     """Give defaults that are angles their unit, as people write it. Returns the unit of a number, None for others."""
-    if isinstance(part, list):
-        return next((unit for unit in [_write_defaults(one) for one in part] if unit), None)
-    if not isinstance(part, dict):
+    if isinstance(node, list):
+        return next((unit for unit in [_write_defaults(item) for item in node] if unit), None)
+    if not isinstance(node, dict):
         return None
-    inner = {name: _write_defaults(value) for name, value in part.items()}
-    unit = part.get("x-unit") or inner.get("anyOf")
-    value = part.get("default")
+    inner = {name: _write_defaults(value) for name, value in node.items()}
+    unit = node.get("x-unit") or inner.get("anyOf")
+    value = node.get("default")
     if unit in ("rad", "rad/s") and isinstance(value, float) and value != 0:
-        part["default"] = _in_degrees(value, unit)
+        node["default"] = _in_degrees(value, unit)
     elif isinstance(value, list):
-        units = [one.get("x-unit") for one in part.get("prefixItems", ())]
+        units = [item.get("x-unit") for item in node.get("prefixItems", ())]
         of_angles = zip(value, units, strict=False)
-        part["default"] = [_in_degrees(x, u) if x and u in ("rad", "rad/s") else x for x, u in of_angles] or value
+        node["default"] = [_in_degrees(x, u) if x and u in ("rad", "rad/s") else x for x, u in of_angles] or value
     return unit
 
 
@@ -147,12 +147,12 @@ class _Schema(GenerateJsonSchema):
         return super().encode_default(dft.item() if isinstance(dft, np.generic) else dft)
 
     def dataclass_schema(self, schema: Any) -> dict[str, Any]:
-        found = super().dataclass_schema(schema)
+        result = super().dataclass_schema(schema)
         for cls in schema["cls"].__mro__:
             for name, text in _field_texts(cls).items():
-                if name in found["properties"]:
-                    found["properties"][name].setdefault("description", text)
-        return found
+                if name in result["properties"]:
+                    result["properties"][name].setdefault("description", text)
+        return result
 
 
 @lru_cache(maxsize=512)
@@ -162,8 +162,8 @@ def _field_texts(cls: type) -> dict[str, str]:
         (declared,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
     except (OSError, TypeError):
         return {}
-    found = {}
+    texts = {}
     for field, below in pairwise(getattr(declared, "body", [])):
         if isinstance(field, ast.AnnAssign) and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
-            found[ast.unparse(field.target)] = inspect.cleandoc(str(below.value.value))
-    return found
+            texts[ast.unparse(field.target)] = inspect.cleandoc(str(below.value.value))
+    return texts

@@ -30,7 +30,7 @@ def waveform(
     *,
     sampling_frequency: float | None = None,
     dataset: str | None = None,
-    most: int = MOST_NUMBERS,
+    limit: int = MOST_NUMBERS,
     long: bool = False,
     longest: int | None = None,
 ) -> tuple[float, Floats]:
@@ -38,12 +38,12 @@ def waveform(
 
     The full scale of whole numbers in a WAV is 1. Numbers of an HDF5 are as they stand, times the attribute
     `scale_factor` and plus `add_offset` where there are such; of a table the longer side is time. sampling_frequency:
-    for an HDF5 that does not say it; dataset: of an HDF5 of several, of at most `most` numbers; long: a recording of
+    for an HDF5 that does not say it; dataset: of an HDF5 of several, of at most `limit` numbers; long: a recording of
     the sea, of which a WAV that ends before its header says (of a recorder that was switched off) is taken as far as it
     goes; longest: samples that are taken, at most. Raises FileError, whose text does not name the file.
     """
     if is_hdf5(data):
-        rate, values = _hdf5(data, channel, sampling_frequency, dataset, most, longest)
+        rate, values = _hdf5(data, channel, sampling_frequency, dataset, limit, longest)
     elif sampling_frequency is not None:
         raise FileError("a WAV has its own sampling frequency: leave out sampling_frequency")
     elif dataset is not None:
@@ -66,17 +66,17 @@ def _wav(data: bytes, channel: int, long: bool, longest: int | None) -> tuple[fl
             warnings.filterwarnings("ignore", "Chunk .* not understood")
             if long:
                 warnings.filterwarnings("ignore", "Reached EOF prematurely")
-            rate, found = wavfile.read(io.BytesIO(data))
+            rate, samples = wavfile.read(io.BytesIO(data))
     except Exception as error:  # whatever a damaged file may bring
         text = " ".join(str(error).split())[:120]
         raise FileError(f"cannot be read as WAV ({type(error).__name__}: {text})") from None
-    if not found.size:
+    if not samples.size:
         raise FileError("holds no samples")
-    values = _column(found.reshape(len(found), -1), channel, longest)
-    if found.dtype == np.uint8:
+    values = _column(samples.reshape(len(samples), -1), channel, longest)
+    if samples.dtype == np.uint8:
         values = (values - 128.0) / 128.0
-    elif found.dtype.kind == "i":
-        values /= -float(np.iinfo(found.dtype).min)
+    elif samples.dtype.kind == "i":
+        values /= -float(np.iinfo(samples.dtype).min)
     return float(rate), values
 
 
@@ -85,13 +85,13 @@ def _hdf5(
     channel: int,
     sampling_frequency: float | None,
     dataset: str | None,
-    most: int,
+    limit: int,
     longest: int | None,
 ) -> tuple[float, Floats]:
-    found, attributes = hdf5_files.read_dataset(data, dataset, most)
-    if found.ndim not in (1, 2) or not found.size:
-        raise FileError(f"its dataset has the shape {found.shape}, and is no waveform")
-    table = found.reshape(len(found), -1)
+    numbers, attributes = hdf5_files.read_dataset(data, dataset, limit)
+    if numbers.ndim not in (1, 2) or not numbers.size:
+        raise FileError(f"its dataset has the shape {numbers.shape}, and is no waveform")
+    table = numbers.reshape(len(numbers), -1)
     values = _column(table if len(table) >= table.shape[1] else table.T, channel, longest)
     own = next((attributes[name] for name in RATES if name in attributes), None)
     if own is None and sampling_frequency is None:

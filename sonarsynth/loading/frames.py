@@ -73,8 +73,8 @@ class Frames:
 
     def __getitems__(self, rows: Sequence[int]) -> list[Sample]:
         """Several, as torch asks for them: each file is read in its order."""
-        found = {row: self[row] for row in sorted(rows, key=lambda row: int(self.frames[row]))}
-        return [found[row] for row in rows]
+        samples = {row: self[row] for row in sorted(rows, key=lambda row: int(self.frames[row]))}
+        return [samples[row] for row in rows]
 
 
 class RenderedFrames:
@@ -99,11 +99,11 @@ class RenderedFrames:
     ) -> None:
         self._form = SampleForm(image, targets, signals)
         self._plan = plan(recipe, products=self._form.products)
-        some = np.arange(recipe.frames)
+        candidates = np.arange(recipe.frames)
         if split is not None:
             number = _number(split)
-            some = np.array([frame for frame in some.tolist() if recipe.split(frame) == number], int)
-        self.frames = stream(seed, "training order").permutation(_some(some, split))[part[0] :: part[1]]
+            candidates = np.array([frame for frame in candidates.tolist() if recipe.split(frame) == number], int)
+        self.frames = stream(seed, "training order").permutation(_some(candidates, split))[part[0] :: part[1]]
         """(row,) the number in the recipe of each, in the order that they come."""
         self.categories = recipe.categories
 

@@ -26,11 +26,11 @@ def points_table(tree: xr.DataTree, frames: int | Iterable[int] | None) -> pd.Da
         raise ValueError("the store has no cloud: it was built without that product")
     cloud = _of_frames(tree, tree.children["cloud"].to_dataset(inherit=True), frames)
     own = [name for name, values in cloud.data_vars.items() if values.dims == ("frame", "point")]
-    held = cloud["count"].values
-    cloud = cloud[own].isel(point=slice(0, int(held.max(initial=0)))).load()
-    there = np.arange(cloud.sizes["point"]) < held[:, None]
+    counts = cloud["count"].values
+    cloud = cloud[own].isel(point=slice(0, int(counts.max(initial=0)))).load()
+    filled = np.arange(cloud.sizes["point"]) < counts[:, None]
     table = cloud.assign_coords(point=np.arange(cloud.sizes["point"])).to_dataframe(dim_order=["frame", "point"])
-    table = _with_words(table[there.ravel()], cloud)
+    table = _with_words(table[filled.ravel()], cloud)
     names = [str(name) for name in tree["truth/targets"].coords["target"].values]
     return table.assign(target=_named(table["target"], range(len(names)), names))
 
@@ -54,15 +54,15 @@ def as_table(
     count = prod(dataset.sizes[name] for name in wanted)
     if count > MOST_ROWS:
         raise ValueError(f"{group}: {count} rows are more than {MOST_ROWS}; choose frames, or use xarray")
-    kept = [name for name, own in axes.items() if set(own) <= set(wanted)]
+    included = [name for name, own in axes.items() if set(own) <= set(wanted)]
     columns: dict[str, xr.DataArray] = {}
-    for name in kept:
+    for name in included:
         columns |= _columns(str(name), dataset[name])
     chosen = xr.Dataset(columns, attrs=dataset.attrs).drop_vars(COMPONENTS, errors="ignore")
     chosen = chosen.expand_dims({name: dataset[name] for name in wanted if name not in chosen.dims})
     chosen = chosen.assign_coords({name: _labels(dataset[name]) for name in wanted})
     table = _with_words(chosen.to_dataframe(dim_order=list(wanted)), chosen)
-    table.attrs["left_out"] = sorted(str(name) for name in axes if name not in kept)
+    table.attrs["left_out"] = sorted(str(name) for name in axes if name not in included)
     return table
 
 
@@ -81,10 +81,10 @@ def _columns(name: str, values: xr.DataArray) -> dict[str, xr.DataArray]:
     axis = next((str(axis) for axis in values.dims if axis in COMPONENTS), None)
     if axis is None:
         return {name: values.reset_coords(drop=True)}
-    found: dict[str, xr.DataArray] = {}
+    columns: dict[str, xr.DataArray] = {}
     for i, word in enumerate(values[axis].values):
-        found |= _columns(f"{name}_{word}", values.isel({axis: i}, drop=True))
-    return found
+        columns |= _columns(f"{name}_{word}", values.isel({axis: i}, drop=True))
+    return columns
 
 
 def _of_frames(tree: xr.DataTree, dataset: xr.Dataset, frames: int | Iterable[int] | None) -> xr.Dataset:
@@ -113,6 +113,6 @@ def _named(numbers: pd.Series, values: Iterable[int], names: list[str]) -> Any:
     """Numbers as categories by name; missing where they have none."""
     import pandas as pd
 
-    place = {value: i for i, value in enumerate(values)}
-    codes = [place.get(int(n), -1) if np.isfinite(n) else -1 for n in numbers]
+    code_of = {value: i for i, value in enumerate(values)}
+    codes = [code_of.get(int(n), -1) if np.isfinite(n) else -1 for n in numbers]
     return pd.Categorical.from_codes(codes, pd.Index(names))

@@ -53,15 +53,15 @@ class SampleForm:
 
     def sample(self, frame: int, of: Callable[[str], np.ndarray]) -> Sample:
         """The sample of a frame; `of` gives its arrays by path."""
-        made: Sample = {"frame": frame}
+        sample: Sample = {"frame": frame}
         if self.image != "none":
             energy = of("image/energy")
-            made["image"] = decibels(energy) if self.image == "db" else energy
+            sample["image"] = decibels(energy) if self.image == "db" else energy
         if self.signals:
-            made["pressure"] = of("signals/pressure")
+            sample["pressure"] = of("signals/pressure")
         for word in self.targets:
-            made |= _MAKERS[word](of)
-        return made
+            sample |= _MAKERS[word](of)
+        return sample
 
 
 def decibels(energy: np.ndarray) -> np.ndarray:
@@ -75,12 +75,12 @@ def decibels(energy: np.ndarray) -> np.ndarray:
 
 def _boxes(of: Callable[[str], np.ndarray]) -> Sample:
     box, view = of("truth/targets/pixel_box"), of("truth/targets/view")
-    there = (of("truth/targets/present") == 1) & (of("truth/targets/clutter") == 0)
-    there &= np.isin(view, (View.IN_VIEW, View.PARTLY_IN_VIEW)) & np.isfinite(box).all(axis=-1)
+    wanted = (of("truth/targets/present") == 1) & (of("truth/targets/clutter") == 0)
+    wanted &= np.isin(view, (View.IN_VIEW, View.PARTLY_IN_VIEW)) & np.isfinite(box).all(axis=-1)
     return {
-        "boxes": box[there].astype(np.float32),
-        "categories": of("truth/targets/category")[there].astype(np.int64),
-        "targets": np.flatnonzero(there),
+        "boxes": box[wanted].astype(np.float32),
+        "categories": of("truth/targets/category")[wanted].astype(np.int64),
+        "targets": np.flatnonzero(wanted),
     }
 
 
@@ -96,8 +96,8 @@ def _range(of: Callable[[str], np.ndarray]) -> Sample:
 
 def _points(of: Callable[[str], np.ndarray]) -> Sample:
     count = max(int(of("cloud/count")), 0)
-    place = np.stack([of(f"cloud/{axis}")[:count] for axis in "xyz"], axis=-1)
-    return {"points": place, "point_targets": of("cloud/target")[:count].astype(np.int64)}
+    position = np.stack([of(f"cloud/{axis}")[:count] for axis in "xyz"], axis=-1)
+    return {"points": position, "point_targets": of("cloud/target")[:count].astype(np.int64)}
 
 
 _MAKERS: Final[dict[str, Callable[[Callable[[str], np.ndarray]], Sample]]] = {

@@ -126,8 +126,8 @@ class DrawnErrors:
 def drawn_errors(errors: SensorErrors, sensors: int, seed: int, key: int | str) -> DrawnErrors:
     """The errors of a sequence of this seed and key. Each kind has a stream of its own: one changes no other."""
 
-    def normal(what: str, *shape: int) -> Floats:
-        return stream(seed, "sensors", key, what).standard_normal(shape)
+    def normal(quantity: str, *shape: int) -> Floats:
+        return stream(seed, "sensors", key, quantity).standard_normal(shape)
 
     even = stream(seed, "sensors", key, "state").random(sensors)
     edges = np.cumsum([errors.dead, errors.stuck, errors.noisy])

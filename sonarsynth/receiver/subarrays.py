@@ -50,14 +50,14 @@ def subarray(elements: Elements, sensor: Ints) -> Subarray:
 
 
 def with_rim(part: Subarray, own: Ints) -> tuple[Elements, Ints]:
-    """Some elements of a part (own,), and after them the one that is farthest out: so that polynomials over the
-    aperture mean the same. With their rows in the part."""
+    """Elements `own` (rows of a part), and after them the one farthest out, so that polynomials over the aperture keep
+    their scale; and the rows (element,) of all of these."""
     elements = part.elements
     rim = int(np.argmax(np.linalg.norm(elements.position, axis=1)))
     rows = np.append(own, rim)
     column, row = elements.column[rows], elements.row[rows]
-    some = replace(elements, position=elements.position[rows], gain=elements.gain[rows], column=column, row=row)
-    return some, rows
+    rimmed = replace(elements, position=elements.position[rows], gain=elements.gain[rows], column=column, row=row)
+    return rimmed, rows
 
 
 def _middle(position: Floats) -> Floats:

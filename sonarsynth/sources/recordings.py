@@ -130,7 +130,7 @@ def _instrument(path: Path, data: bytes, snap: RecordedSnap) -> tuple[float, flo
     """Start (s), sampling frequency (Hz) and numbers (sample,) of a WAV or an HDF5."""
     rate, name = snap.sampling_frequency, snap.dataset
     try:
-        sound = waveform_files.waveform(data, snap.channel, sampling_frequency=rate, dataset=name, most=MOST_NUMBERS)
+        sound = waveform_files.waveform(data, snap.channel, sampling_frequency=rate, dataset=name, limit=MOST_NUMBERS)
         return 0.0, *sound
     except named_files.FileError as error:
         raise RecordingError(f"{path}: {error}") from None
