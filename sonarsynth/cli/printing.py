@@ -180,7 +180,7 @@ def plan_report(plan: Plan, prediction: Prediction) -> None:
         f"at most {p.files} files and folders for all frames, {plan.shard_frames} frames in a file; "
         f"a worker takes up to {format_bytes(plan.memory_bytes)} of memory"
     )
-    out.print(f"estimated from {p.how}", markup=False)
+    out.print(f"estimated from {p.basis}", markup=False)
     if p.odds.line:
         out.print(f"in these: {p.odds.line}", markup=False)
 

@@ -7,10 +7,10 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, fields, replace
 from typing import Final
 
-from sonarsynth import store
+from sonarsynth import planning, store
 from sonarsynth.conventions import format_bytes
 from sonarsynth.description.memory import free_bytes
-from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products, plan
+from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.reading import Source
 from sonarsynth.schedule import connecting
@@ -30,7 +30,7 @@ LEAST_MEMORY: Final = 300_000_000
 
 
 def build(
-    what: Recipe | Plan,
+    recipe: Recipe | Plan,
     path: Folder | str,
     *,
     frames: Iterable[int] | None = None,
@@ -60,7 +60,7 @@ def build(
 
     Parameters
     ----------
-    what: a recipe, or the plan of one.
+    recipe: a recipe, or the plan of one.
     path: folder of the store, or a URL that fsspec knows, such as s3://bucket/remus.zarr.
     frames: numbers of the frames (default: all).
     products: of signals, image and cloud, those that are stored; a plan has its own.
@@ -91,35 +91,35 @@ def build(
     that cannot be used, RuntimeError where workers do not start, ValueError for options that cannot be. After any of
     these, and after an interruption, the same call resumes where it ended.
     """
-    made = what if isinstance(what, Plan) else plan(what, chosen_products(products))
+    plan = recipe if isinstance(recipe, Plan) else planning.plan(recipe, chosen_products(products))
     _check(workers, scheduler, frame_timeout, worker_memory, insecure)
-    _check_memory(made, scheduler, workers, worker_memory, agreed)
+    _check_memory(plan, scheduler, workers, worker_memory, agreed)
     path = reachable_by_workers(store.absolute(path), workers)
-    chosen = range(made.recipe.frames) if frames is None else sorted(set(frames))
+    chosen = range(plan.recipe.frames) if frames is None else sorted(set(frames))
     if not path.exists() and not agreed:
-        check_space(path, _room(made, len(chosen)))
-    report = BuildReport(str(path), made.recipe.frames, len(chosen), 0)
-    still = lambda: _room(made, max(len(chosen) - report.there - report.written, 1))  # noqa: E731
+        check_space(path, _room(plan, len(chosen)))
+    report = BuildReport(str(path), plan.recipe.frames, len(chosen), 0)
+    still = lambda: _room(plan, max(len(chosen) - report.there - report.written, 1))  # noqa: E731
     with told_when_full(path, still), store.lock(path) as name:
-        made = made if restart else _as_begun(path, made)
-        store.create(path, made, restart=restart, source=source, mixed_versions=mixed_versions)
-        report.notes = (*made.warnings, *_notes(path, scheduler))
+        plan = plan if restart else _as_begun(path, plan)
+        store.create(path, plan, restart=restart, source=source, mixed_versions=mixed_versions)
+        report.notes = (*plan.warnings, *_notes(path, scheduler))
         if workers != 0:
-            _check_files(path, made)
+            _check_files(path, plan)
         earlier = {} if restart else _failed(path)
-        left = set() if retry_failed else earlier.keys() & set(chosen)
-        todo = store.missing(path, made, [frame for frame in chosen if frame not in left])
-        lacking = {frame for some in todo.values() for frame in some}
+        skipped = set() if retry_failed else earlier.keys() & set(chosen)
+        todo = store.missing(path, plan, [frame for frame in chosen if frame not in skipped])
+        lacking = {frame for of_shard in todo.values() for frame in of_shard}
         if not agreed:
-            check_space(path, _room(made, len(lacking)))
-        report.there = sum(frame not in lacking and frame not in left for frame in chosen)
-        report.failures = [earlier[frame] for frame in sorted(left)]
+            check_space(path, _room(plan, len(lacking)))
+        report.there = sum(frame not in lacking and frame not in skipped for frame in chosen)
+        report.failures = [earlier[frame] for frame in sorted(skipped)]
         _tidy(path, lacking, earlier, restart)
         course = BuildProgress(path, report, len(lacking), progress, announce)
-        with course.logged(made), _dashboard(dashboard):
-            job = job_of(path, made, name, frame_timeout)
+        with course.logged(plan), _dashboard(dashboard):
+            job = job_of(path, plan, name, frame_timeout)
             make_shards(
-                job, made, todo, course.done, workers=workers, scheduler=scheduler, memory=worker_memory,
+                job, plan, todo, course.done, workers=workers, scheduler=scheduler, memory=worker_memory,
                 started=course.started, lost=course.lost,
             )  # fmt: skip
         _describe(path, report, prediction)
@@ -145,10 +145,10 @@ def _notes(path: Folder, scheduler: str | None) -> list[str]:
     return notes
 
 
-def _check_files(path: Folder, made: Plan) -> None:
+def _check_files(path: Folder, plan: Plan) -> None:
     """Raise Mismatch where a store's recipe, which worker processes follow, names files that this one does not."""
     stored = set(provenance.paths(plain_recipe(store.root_attributes(path))))
-    odd = sorted(stored - set(provenance.paths(made.recipe.as_json())))
+    odd = sorted(stored - set(provenance.paths(plan.recipe.as_json())))
     if odd:
         raise Mismatch(
             f"{path}: its recipe names {odd[0]}, which this one does not: use --workers 0 to go on without opening it, "
@@ -162,13 +162,13 @@ def _dashboard(shown: bool) -> AbstractContextManager[None]:
     return connecting.dashboard_shown()
 
 
-def _as_begun(path: Folder, made: Plan) -> Plan:
+def _as_begun(path: Folder, plan: Plan) -> Plan:
     """The plan, with the choices that a store of the same recipe was begun with: another machine may choose others."""
-    there = store.root_attributes(path)
-    if there.get("recipe_digest") != made.digest or "choices" not in there:
-        return made
+    stored = store.root_attributes(path)
+    if stored.get("recipe_digest") != plan.digest or "choices" not in stored:
+        return plan
     try:
-        return replace(made, choices=choices_from(there["choices"]))
+        return replace(plan, choices=choices_from(stored["choices"]))
     except ValueError:
         raise Damage(f"{path}: its choices cannot be read: use --restart to overwrite it") from None
 
@@ -192,32 +192,32 @@ def _check(
 
 
 def _check_memory(
-    made: Plan, scheduler: str | None, workers: int | None, worker_memory: int | None, agreed: bool
+    plan: Plan, scheduler: str | None, workers: int | None, worker_memory: int | None, agreed: bool
 ) -> None:
     """Raise TooLarge where a frame does not fit in the memory of a worker of this machine."""
     workers = usable_cores() if workers is None else max(workers, 1)
-    each = free_bytes() / workers if worker_memory is None else worker_memory
-    if scheduler is None and not agreed and made.memory_bytes > each:
+    share = free_bytes() / workers if worker_memory is None else worker_memory
+    if scheduler is None and not agreed and plan.memory_bytes > share:
         raise TooLarge(
-            f"a frame takes up to {format_bytes(made.memory_bytes)} of memory, and each of {workers} workers has "
-            f"{format_bytes(each)}: "
+            f"a frame takes up to {format_bytes(plan.memory_bytes)} of memory, and each of {workers} workers has "
+            f"{format_bytes(share)}: "
             "fewer --workers, or more --worker-memory (use --yes to build anyway)"
         )
 
 
-def _room(made: Plan, frames: int) -> DiskRoom:
+def _room(plan: Plan, frames: int) -> DiskRoom:
     """What so many frames need at most."""
-    bytes_ = made.predicted_bytes * frames / max(made.recipe.frames, 1)
-    return DiskRoom(bytes_, store.layout_of(made).files(-(-frames // made.shard_frames)))
+    bytes_ = plan.predicted_bytes * frames / max(plan.recipe.frames, 1)
+    return DiskRoom(bytes_, store.layout_of(plan).files(-(-frames // plan.shard_frames)))
 
 
 def _failed(path: Folder) -> dict[int, Failure]:
     """Frames that failed in earlier builds and are still missing."""
     names = {field.name for field in fields(Failure)}
     rows = [row for row in read_lines(store.beside(path, "failed.jsonl")) if names <= row.keys()]
-    there = set(store.frames_there(path)) if rows else set()
-    found = [Failure(**{name: row[name] for name in names}) for row in rows]
-    return {failure.frame: failure for failure in found if failure.frame not in there}
+    complete = set(store.frames_there(path)) if rows else set()
+    failures = [Failure(**{name: row[name] for name in names}) for row in rows]
+    return {failure.frame: failure for failure in failures if failure.frame not in complete}
 
 
 def _tidy(path: Folder, again: set[int], earlier: Mapping[int, Failure], restart: bool) -> None:
@@ -228,6 +228,6 @@ def _tidy(path: Folder, again: set[int], earlier: Mapping[int, Failure], restart
         for old in ("card.md", "croissant.json"):  # of what was there before
             store.beside(path, old).unlink(missing_ok=True)
     file = store.beside(path, "failed.jsonl")
-    kept = [asdict(failure) for frame, failure in earlier.items() if frame not in again]
+    remaining = [asdict(failure) for frame, failure in earlier.items() if frame not in again]
     if file.exists():
-        write_lines(file, kept)
+        write_lines(file, remaining)

@@ -105,24 +105,24 @@ def try_frames(plan: Plan, folder: Path | None = None) -> Trial:
     if not pairs:
         raise RuntimeError(failures[0])
     failures = list(dict.fromkeys(failures))
-    made = [warm for _, warm in pairs]
+    timed = [warm for _, warm in pairs]
     fresh = [max(first.seconds - warm.seconds, 0.0) for first, warm in pairs]
-    waiting = sum(one.wall for one in made) / max(sum(one.spent for one in made), 1e-9)
-    laying_out, fixed, writing, shard = _write(plan, [one.values for one in made], folder)
+    waiting = sum(frame.wall for frame in timed) / max(sum(frame.spent for frame in timed), 1e-9)
+    laying_out, fixed, writing, shard = _write(plan, [frame.values for frame in timed], folder)
     return Trial(
-        frames=tuple(one.frame for one in made),
+        frames=tuple(frame.frame for frame in timed),
         every=every,
         cpu=_mean(costs),
         loading=fresh[0],
         fresh=tuple(fresh[1:]),
         waiting=max(waiting, 1.0),
-        others=float(np.mean([one.others for pair in pairs for one in pair])),
+        others=float(np.mean([frame.others for pair in pairs for frame in pair])),
         writing=writing,
         laying_out=laying_out,
         fixed=fixed,
         shard=shard,
         failures=tuple(failures),
-        odds=sum((_odds(plan, one.values) for one in made), NO_ODDS) if every == 1 else NO_ODDS,
+        odds=sum((_odds(plan, frame.values) for frame in timed), NO_ODDS) if every == 1 else NO_ODDS,
     )
 
 
@@ -162,8 +162,8 @@ def _try_whole(plan: Plan, failures: list[str]) -> Tried:
 
 def _try_small(plan: Plan, failures: list[str], predicted: float) -> Tried:
     """A frame with two smaller numbers of facets, each twice, heard at some parts of the array where these are many."""
-    parts = max(plan.choices.subarrays, PARTS)
-    every = max(1, int(np.ceil(predicted * PARTS / parts / THIN)))
+    count = max(plan.choices.subarrays, PARTS)
+    every = max(1, int(np.ceil(predicted * PARTS / count / THIN)))
     for index in _spread(plan.recipe.frames):
         try:
             pair = (_make(plan, index, every), _make(plan, index, every))
@@ -188,8 +188,8 @@ def _failure(index: int, error: Exception) -> str:
 
 
 def _mean(costs: Sequence[Stages]) -> Stages:
-    names = dict.fromkeys(name for one in costs for name in one)
-    return {name: sum(one.get(name, 0.0) for one in costs) / len(costs) for name in names}
+    names = dict.fromkeys(name for cost in costs for name in cost)
+    return {name: sum(cost.get(name, 0.0) for cost in costs) / len(costs) for name in names}
 
 
 def _make(plan: Plan, index: int, every: int = 1) -> _TimedFrame:
@@ -204,16 +204,16 @@ def _make(plan: Plan, index: int, every: int = 1) -> _TimedFrame:
         check_unsampled_frame(plan, frame)
         if every > 1:
             frame = _thinned(frame, every)
-        parts = plan.choices.subarrays
-        one = replace(plan, choices=replace(plan.choices, subarrays=1)) if parts > PARTS else plan
-        values = layout_of(one).check(_stages(one, frame) if plan.products else truth_at(one, frame))
-    if one is not plan and plan.products:
-        every_part = subarrays(plan.elements, parts)
-        some = every_part[:: -(-len(every_part) // PARTS)]
+        count = plan.choices.subarrays
+        undivided = replace(plan, choices=replace(plan.choices, subarrays=1)) if count > PARTS else plan
+        values = layout_of(undivided).check(_stages(undivided, frame) if plan.products else truth_at(undivided, frame))
+    if undivided is not plan and plan.products:
+        every_part = subarrays(plan.elements, count)
+        timed = every_part[:: -(-len(every_part) // PARTS)]
         start = time.thread_time()
-        for part in some:
-            subarray_signals(plan, frame, part)
-        cpu["synthesise"] += (time.thread_time() - start) * len(every_part) / len(some)
+        for subarray in timed:
+            subarray_signals(plan, frame, subarray)
+        cpu["synthesise"] += (time.thread_time() - start) * len(every_part) / len(timed)
     return _TimedFrame(index, values, dict(cpu), time.perf_counter() - began, time.thread_time() - before, _others())
 
 
@@ -251,8 +251,8 @@ def _write(plan: Plan, tried: Sequence[Values], folder: Path | None) -> tuple[Ti
         fixed = disk_use(path)
         frames = {frame: tried[frame % len(tried)] for frame in layout_of(plan).region(0)}
         writing = min(_timed(partial(store.write_shard, path, plan, 0, frames)) for _ in range(2))
-        whole = disk_use(path)
-        return laying_out, fixed, writing, whole + fixed * -1.0
+        disk = disk_use(path)
+        return laying_out, fixed, writing, disk + fixed * -1.0
 
 
 def _timed(work: Callable[[], object]) -> Times:
@@ -262,16 +262,16 @@ def _timed(work: Callable[[], object]) -> Times:
     return time.process_time() - cpu, time.perf_counter() - wall
 
 
-def disk_use(where: store.Folder | str) -> Sizes:
+def disk_use(location: store.Folder | str) -> Sizes:
     """Bytes below a folder, itself too: those of files, and as `du` counts them; at a URL both are those of objects."""
-    path = store.folder_of(where)
+    path = store.folder_of(location)
     if isinstance(path, store.Remote):
         objects = float(sum(path.sizes().values()))
         return Sizes(objects, objects)
     files = disk = 0
     for folder, _, names in os.walk(path):
         for entry in (Path(folder), *(Path(folder) / name for name in names)):
-            found = entry.lstat()
-            disk += found.st_blocks * 512
-            files += found.st_size if entry != Path(folder) else 0
+            status = entry.lstat()
+            disk += status.st_blocks * 512
+            files += status.st_size if entry != Path(folder) else 0
     return Sizes(float(files), float(disk))

@@ -72,5 +72,5 @@ class Log:
         if now - self.said >= PROGRESS_EVERY:
             self.said = now
             rate = (done + failed) / (now - self.began)
-            left = (total - done - failed) / rate if rate else None
-            self.event("progress", done=done, of=total, failed=failed, frames_per_second=rate, seconds_left=left)
+            eta = (total - done - failed) / rate if rate else None
+            self.event("progress", done=done, of=total, failed=failed, frames_per_second=rate, seconds_left=eta)

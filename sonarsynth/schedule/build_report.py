@@ -114,23 +114,23 @@ class BuildProgress:
         self.log.event("worker lost", worker=worker, doing=why)
 
     @contextmanager
-    def logged(self, made: Plan) -> Iterator[None]:
+    def logged(self, plan: Plan) -> Iterator[None]:
         """Put the beginning and the end of the build into the log."""
         r = self.report
         self.log.event(
-            "build", digest=made.digest, frames=r.frames, wanted=r.wanted, there=r.there, to_do=self.total,
+            "build", digest=plan.digest, frames=r.frames, wanted=r.wanted, there=r.there, to_do=self.total,
             process=os.getpid(), host=socket.gethostname(),
         )  # fmt: skip
-        how, began = "done", time.perf_counter()
+        outcome, began = "done", time.perf_counter()
         try:
             yield
         except BaseException as error:
-            how = "interrupted" if isinstance(error, KeyboardInterrupt) else f"{type(error).__name__}: {error}"
+            outcome = "interrupted" if isinstance(error, KeyboardInterrupt) else f"{type(error).__name__}: {error}"
             raise
         finally:
             r.seconds, r.client_peak_bytes = time.perf_counter() - began, tasks.peak_memory()
             with suppress(OSError):
                 self.log.event(
-                    "end", how=how, written=r.written, failed=len(r.failures), workers_lost=r.workers_lost,
+                    "end", how=outcome, written=r.written, failed=len(r.failures), workers_lost=r.workers_lost,
                     seconds=r.seconds,
                 )  # fmt: skip

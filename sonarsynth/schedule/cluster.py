@@ -48,8 +48,8 @@ def _without(flight: _Flight, entry: worker_status.Entry | None) -> _Flight:
     if entry is None or not entry.error:
         return replace(flight, losses=flight.losses + 1)
     failure = Failure(entry.frame, entry.stage, entry.error, entry.traceback)
-    left = tuple(frame for frame in flight.frames if frame != entry.frame)
-    return replace(flight, frames=left, failed=(*flight.failed, failure))
+    frames = tuple(frame for frame in flight.frames if frame != entry.frame)
+    return replace(flight, frames=frames, failed=(*flight.failed, failure))
 
 
 class _Builder:
@@ -173,15 +173,15 @@ class _Builder:
         """The tasks of a shard, all on its worker, later stages of earlier frames first."""
         self.submitted += 1
         token, blocks = f"{self.token}.{self.submitted}", []
-        made: Any
+        results: Any
         for at in range(0, len(flight.frames), self.job.block):
-            made = flight.frames[at : at + self.job.block]
-            self.frames += len(made)
-            first, number = -len(tasks.STAGES) * self.frames, made[0]
+            results = flight.frames[at : at + self.job.block]
+            self.frames += len(results)
+            first, number = -len(tasks.STAGES) * self.frames, results[0]
             for n, stage in enumerate(tasks.tasks_of(self.job.products)):
                 key = f"{stage}-{token}-{number}"
-                made = self._task(tasks.RUN[stage], made, key=key, priority=first + n, flight=flight)
-            blocks.append(made)
+                results = self._task(tasks.RUN[stage], results, key=key, priority=first + n, flight=flight)
+            blocks.append(results)
         key = f"shard-{token}-{flight.shard}"
         return self._task(tasks.write, flight.shard, blocks, key=key, priority=1, flight=flight)
 
@@ -207,13 +207,13 @@ class _Builder:
             return None
         if not isinstance(error, KilledWorker):
             raise error
-        found = [
+        entries = [
             entry for worker in before if (entry := worker_status.read(self.job.path, worker)) and entry.frame == frame
         ]
-        for entry in found:
+        for entry in entries:
             if entry.error:
                 return Failure(frame, entry.stage, entry.error, entry.traceback)
-        stage = found[0].stage if found else "frame"
+        stage = entries[0].stage if entries else "frame"
         return Failure(frame, stage, "it ends its worker process: out of memory, or a crash", str(error))
 
 

@@ -115,10 +115,10 @@ def check_address(address: str, insecure: bool) -> None:
     """Raise ValueError for a scheduler on another machine without TLS, on which whoever reaches it may run code, and
     for one with TLS where this process has no certificates.
     """
-    parts = urlsplit(address if "://" in address else f"tcp://{address}")
-    if parts.scheme in ("tls", "wss"):
+    url = urlsplit(address if "://" in address else f"tcp://{address}")
+    if url.scheme in ("tls", "wss"):
         _check_certificates(address)
-    elif not insecure and parts.scheme != "inproc" and not _loopback(parts.hostname or ""):
+    elif not insecure and url.scheme != "inproc" and not _loopback(url.hostname or ""):
         raise ValueError(
             f"{address} is not on this machine and not encrypted: use tls://, or --insecure in a network that you trust"
         )
@@ -154,14 +154,14 @@ def connected(workers: int, scheduler: str | None = None, memory: int | None = N
         with _client_of(scheduler) as client:
             yield client
         return
-    each = memory or MEMORY_LIMIT // max(workers, 1)
+    limit = memory or MEMORY_LIMIT // max(workers, 1)
     shown = _dashboard.get()
     with dask.config.set(_SETTINGS | ({} if shown else NO_PAGES)):
         with _interrupts_put_off() as interrupted:
             try:
-                cluster = _local_cluster(workers, each, shown)
+                cluster = _local_cluster(workers, limit, shown)
             except RuntimeError:  # a worker was killed while it started; or none can, and the second says so
-                cluster = _local_cluster(workers, each, shown)
+                cluster = _local_cluster(workers, limit, shown)
             kind: Any = Client if shown else _Client
             client = kind(cluster, set_as_default=False)
         patience = CLOSING_IN_HASTE

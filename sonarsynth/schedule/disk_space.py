@@ -40,11 +40,11 @@ def free_room(path: Folder) -> DiskRoom:
     """What is free where a path is, or is to be; nobody knows of an object store, or where files are not counted."""
     if isinstance(path, Remote):
         return DiskRoom(math.inf, math.inf)
-    place = path
-    while not place.exists() and place != place.parent:
-        place = place.parent
-    found = os.statvfs(place)
-    return DiskRoom(shutil.disk_usage(place).free, found.f_favail if found.f_files else math.inf)
+    existing = path
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    status = os.statvfs(existing)
+    return DiskRoom(shutil.disk_usage(existing).free, status.f_favail if status.f_files else math.inf)
 
 
 def check_space(path: Folder, needed: DiskRoom) -> None:
@@ -55,8 +55,8 @@ def check_space(path: Folder, needed: DiskRoom) -> None:
     elif needed.files > free.files:
         line = f"needs up to {needed.files:.0f} files and folders and {free.files:.0f} more fit there"
     elif needed.bytes > LARGE:
-        known = f" ({format_bytes(free.bytes)} are free)" if math.isfinite(free.bytes) else ""
-        line = f"needs up to {format_bytes(needed.bytes)}{known}"
+        available = f" ({format_bytes(free.bytes)} are free)" if math.isfinite(free.bytes) else ""
+        line = f"needs up to {format_bytes(needed.bytes)}{available}"
     else:
         return
     raise TooLarge(f"{path}: {line}: use --yes to build anyway")

@@ -28,22 +28,22 @@ def reachable_by_workers(path: Folder, workers: int | None) -> Folder:
     return path
 
 
-def job_of(path: Folder, made: Plan, build: str, frame_timeout: float | None = None) -> Job:
+def job_of(path: Folder, plan: Plan, build: str, frame_timeout: float | None = None) -> Job:
     """What workers need to know of a build that holds the lock of its store under the name `build`.
 
     A stage of a frame may take `frame_timeout` seconds (None: many times what the plan predicts; 0: no limit).
     """
-    predicted = made.predicted_seconds / max(made.recipe.frames, 1)
+    predicted = plan.predicted_seconds / max(plan.recipe.frames, 1)
     limit = PATIENCE + 20 * predicted if frame_timeout is None else frame_timeout
-    signals = 8 * made.sizes["sensor"] * made.sizes["sample"]  # float32, and as they are without reflections
-    frames = min(BLOCK_SECONDS / max(predicted, 1e-6), BLOCK_BYTES / max(signals, 1), made.shard_frames)
-    products = tuple(sorted(made.products))
-    return Job(str(path), made.digest, products, build, limit, made.shard_frames, max(int(frames), 1))
+    signals = 8 * plan.sizes["sensor"] * plan.sizes["sample"]  # float32, and as they are without reflections
+    frames = min(BLOCK_SECONDS / max(predicted, 1e-6), BLOCK_BYTES / max(signals, 1), plan.shard_frames)
+    products = tuple(sorted(plan.products))
+    return Job(str(path), plan.digest, products, build, limit, plan.shard_frames, max(int(frames), 1))
 
 
 def make_shards(
     job: Job,
-    made: Plan,
+    plan: Plan,
     todo: Mapping[int, tuple[int, ...]],
     done: Callable[[WrittenShard], None],
     *,
@@ -59,7 +59,7 @@ def make_shards(
     """
     if not todo:
         return
-    tasks.remember(job, made)
+    tasks.remember(job, plan)
     worker_status.close_folder(job.path)  # of a build that was killed
     if scheduler is None and workers == 0:
         for shard, frames in todo.items():

@@ -52,7 +52,7 @@ class Prediction:
     workers: int  # 0: in the process that builds
     cores: int  # that these have
     shard_frames: int
-    how: str  # how it is known, in words
+    basis: str  # what it is known from, in words
     stages: Mapping[str, float]  # s of one core a frame, by stage; `write` with it
     raw_bytes_a_frame: int  # before compression
     loading: float  # s of one core, before the first frame of a process is at the pace of the others
@@ -83,8 +83,8 @@ class Prediction:
     @property
     def frames_seconds(self) -> float:
         """Seconds of one core for all frames: making (what is done for the first time with it), without writing."""
-        each = self.frame_seconds - self.stages.get("write", 0.0)
-        return self.frames * each + max(self.workers, 1) * self._first_times + self.workers * LOADED * self.prepared
+        making = self.frame_seconds - self.stages.get("write", 0.0)
+        return self.frames * making + max(self.workers, 1) * self._first_times + self.workers * LOADED * self.prepared
 
     @property
     def core_seconds(self) -> float:
@@ -99,8 +99,8 @@ class Prediction:
         """Seconds of the wall clock, from the call of `build` to its end, with the machine as busy as it is now."""
         if not self.frames:
             return self.laying_out[1]
-        side = max(min(self.workers, self.cores), 1)  # that run side by side
-        crowded = max(self.workers, 1) / side
+        parallel = max(min(self.workers, self.cores), 1)  # workers that run at the same time
+        crowded = max(self.workers, 1) / parallel
         shards = -(-self.frames // self.shard_frames)
         busiest = min(self.frames, -(-shards // max(self.workers, 1)) * self.shard_frames)
         work, waiting = busiest * self.frame_seconds + self._first_times, self._waiting
@@ -131,8 +131,8 @@ class Prediction:
     @property
     def _waiting(self) -> float:
         """Wall-clock time over processor time of a worker: they wait for each other and for all else that runs."""
-        side = max(min(self.workers, self.cores), 1)
-        return self.waiting * max(1.0, (side + self.others) / self.cores) / max(1.0, (1 + self.others) / self.cores)
+        parallel = max(min(self.workers, self.cores), 1)
+        return self.waiting * max(1.0, (parallel + self.others) / self.cores) / max(1.0, (1 + self.others) / self.cores)
 
     @property
     def _first_times(self) -> float:
@@ -161,25 +161,25 @@ class Prediction:
             "predicted_raw_bytes": self.raw_bytes,
             "predicted_files": self.files,
             "predicted_for": {"frames": self.frames, "workers": self.workers, "cores": self.cores},
-            "predicted_from": self.how,
+            "predicted_from": self.basis,
             "not_tried": list(self.failures),
             "odds": {"frames": self.odds.frames, "found": self.odds.found, "snr": list(self.odds.snr)},
         }
 
     def against(self, report: BuildReport) -> dict[str, Any]:
         """Prediction and measurement of a build that has ended: for what it did, and for the store as it is."""
-        built, whole = self.of(frames=report.written, workers=report.workers), self.of(frames=_there(report))
+        built, full = self.of(frames=report.written, workers=report.workers), self.of(frames=_there(report))
         size = disk_use(report.store)
         measured = {
             "seconds": (built.seconds, report.seconds),
             "frames_core_seconds": (built.frames_seconds, sum(report.stage_cpu.values())),
-            "bytes": (float(whole.bytes), size.disk),
-            "file_bytes": (float(whole.file_bytes), size.files),
+            "bytes": (float(full.bytes), size.disk),
+            "file_bytes": (float(full.file_bytes), size.files),
         }
-        rows: dict[str, Any] = {"frames": report.written, "workers": report.workers, "predicted_from": self.how}
-        for name, (predicted, found) in measured.items():
-            rows[f"predicted_{name}"], rows[f"measured_{name}"] = predicted, found
-            rows[f"{name}_ratio"] = predicted / found if found > 0.0 else None
+        rows: dict[str, Any] = {"frames": report.written, "workers": report.workers, "predicted_from": self.basis}
+        for name, (predicted, actual) in measured.items():
+            rows[f"predicted_{name}"], rows[f"measured_{name}"] = predicted, actual
+            rows[f"{name}_ratio"] = predicted / actual if actual > 0.0 else None
         return rows
 
 
@@ -201,18 +201,18 @@ def predict(
     removed again (left out: that of temporary files); `prepared`: seconds of the processor that a process like this
     one takes until it has the plan, where that was measured (much more of it was for choices, that workers are
     given, or for a compiler, whose work is kept). Never raises for a frame or a disk that fails: costs are
-    by counts of work then, and `how` says why.
+    by counts of work then, and `basis` says why.
     """
     cores = usable_cores()
     counted = {stage.stage: stage.seconds for stage in plan.stages}
     usual = PREPARED * machine_factor()
     raw = sum(stage.bytes for stage in plan.stages)
-    made = Prediction(
+    result = Prediction(
         frames=plan.recipe.frames,
         workers=cores,
         cores=cores,
         shard_frames=min(plan.shard_frames, plan.recipe.frames),
-        how="counts of operations",
+        basis="counts of operations",
         stages=counted,
         raw_bytes_a_frame=raw,
         loading=0.0,
@@ -231,27 +231,27 @@ def predict(
         trial = try_frames(plan, None if folder is None else Path(folder))
     except Exception as error:
         line = " ".join(f"{error}".split()) or type(error).__name__
-        made = replace(made, how=f"counts of operations: no frame could be timed ({line})", failures=(line,))
+        result = replace(result, basis=f"counts of operations: no frame could be timed ({line})", failures=(line,))
     else:
-        made = _from(made, trial)
-    return made.of(frames=frames, workers=workers)
+        result = _from(result, trial)
+    return result.of(frames=frames, workers=workers)
 
 
-def _from(made: Prediction, trial: Trial) -> Prediction:
+def _from(prediction: Prediction, trial: Trial) -> Prediction:
     """A prediction with what a trial has shown."""
     stages = {name: seconds for name, seconds in trial.cpu.items() if name != "collect"}
-    stages["write"] = trial.writing[0] / made.shard_frames + trial.cpu.get("collect", 0.0)
+    stages["write"] = trial.writing[0] / prediction.shard_frames + trial.cpu.get("collect", 0.0)
     few = "" if trial.every == 1 else f"; with one facet in {trial.every}"
     return replace(
-        made,
-        how=f"timing frames on this machine (number {', '.join(map(str, sorted(trial.frames)))}{few})",
+        prediction,
+        basis=f"timing frames on this machine (number {', '.join(map(str, sorted(trial.frames)))}{few})",
         stages=stages,
-        loading=min(trial.loading, 0.2 * made.prepared),  # not what a compiler did, which is kept
+        loading=min(trial.loading, 0.2 * prediction.prepared),  # not what a compiler did, which is kept
         fresh=trial.fresh,
         waiting=trial.waiting,
         others=trial.others,
-        writing_wait=max(trial.writing[1] - trial.waiting * trial.writing[0], 0.0) / made.shard_frames,
-        sharing=sharing(made.cores),
+        writing_wait=max(trial.writing[1] - trial.waiting * trial.writing[0], 0.0) / prediction.shard_frames,
+        sharing=sharing(prediction.cores),
         laying_out=trial.laying_out,
         sizes=(trial.fixed, trial.shard),
         failures=trial.failures,

@@ -7,9 +7,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sonarsynth import store
+from sonarsynth import planning, store
 from sonarsynth.description import FieldError
-from sonarsynth.planning import Plan, choices_from, plan
+from sonarsynth.planning import Plan, choices_from
 from sonarsynth.schedule.build_log import append_lines
 from sonarsynth.schedule.build_report import Progress
 from sonarsynth.schedule.connecting import check_address
@@ -97,48 +97,48 @@ def repair(
     with store.lock(path) as name:
         if not isinstance(path, Remote):
             scratch.sweep(path, links=True)
-        found = store.examine(path)
-        laid = found.layout is not None and not found.fixed
-        unlike = _unlike(path, found) if laid and not quick else []
-        made = _plan_of(path, found, force, files) if not laid or found.shards or unlike else None
+        findings = store.examine(path)
+        laid = findings.layout is not None and not findings.fixed
+        unlike = _unlike(path, findings) if laid and not quick else []
+        plan = _plan_of(path, findings, force, files) if not laid or findings.shards or unlike else None
         report = RepairReport(str(path))
-        report.moved = move_out(path, found.foreign)
-        report.restored, in_the_way = restore(path, found, made)
+        report.moved = move_out(path, findings.foreign)
+        report.restored, in_the_way = restore(path, findings, plan)
         report.moved += in_the_way
-        if made is not None:
-            unlike = unlike if laid or quick else _unlike(path, found)
-            todo = _todo(path, found, made, unlike)
-            report.moved += move_out(path, _in_the_way(path, found, made, todo))
+        if plan is not None:
+            unlike = unlike if laid or quick else _unlike(path, findings)
+            todo = _todo(path, findings, plan, unlike)
+            report.moved += move_out(path, _in_the_way(path, findings, plan, todo))
             report.shards, report.frames = tuple(todo), tuple(f for frames in todo.values() for f in frames)
-            written = {n: mark for n, mark in found.marks.items() if n not in unlike}
-            here = 0 if (workers is None and len(todo) == 1) or _elsewhere(path, made) else workers
+            written = {n: mark for n, mark in findings.marks.items() if n not in unlike}
+            own_workers = 0 if (workers is None and len(todo) == 1) or _elsewhere(path, plan) else workers
             done = _counter(path, written, report, progress)
-            make_shards(job_of(path, made, name), made, todo, done, workers=here, scheduler=scheduler)
+            make_shards(job_of(path, plan, name), plan, todo, done, workers=own_workers, scheduler=scheduler)
         _finish(path, report)
     return report
 
 
 def _finish(path: Folder, report: RepairReport) -> None:
     """Look at the store once more, and put what is left to say into the report; its card, if it has one, anew."""
-    left = store.examine(path)
-    if left.foreign:  # known only now, if the layout was not
-        report.moved += move_out(path, left.foreign)
-        left = store.examine(path)
+    findings = store.examine(path)
+    if findings.foreign:  # known only now, if the layout was not
+        report.moved += move_out(path, findings.foreign)
+        findings = store.examine(path)
     drop_empty_folders(path)
-    report.problems = left.problems
-    if not left.problems and there(store.beside(path, "card.md")):
+    report.problems = findings.problems
+    if not findings.problems and there(store.beside(path, "card.md")):
         cards.write(path)
 
 
-def _elsewhere(path: Folder, made: Plan) -> bool:
+def _elsewhere(path: Folder, plan: Plan) -> bool:
     """Whether files are elsewhere than where the recipe in the store, which worker processes follow, has them."""
     stored = provenance.paths(plain_recipe(store.root_attributes(path)))
-    return set(stored) != set(provenance.paths(made.recipe.as_json()))
+    return set(stored) != set(provenance.paths(plan.recipe.as_json()))
 
 
-def _plan_of(path: Folder, found: Findings, force: bool, files: Path | str | None) -> Plan:
+def _plan_of(path: Folder, findings: Findings, force: bool, files: Path | str | None) -> Plan:
     """The plan that the store was built by. Raises Mismatch where it cannot be had again, Damage without a recipe."""
-    attrs = found.attributes or store.root_attributes(path)
+    attrs = findings.attributes or store.root_attributes(path)
     try:
         text, digest, products = str(attrs["recipe"]), attrs["recipe_digest"], frozenset(attrs["products"])
     except (KeyError, TypeError):
@@ -147,16 +147,16 @@ def _plan_of(path: Folder, found: Findings, force: bool, files: Path | str | Non
         ) from None
     try:
         choices = choices_from(attrs["choices"]) if "choices" in attrs else None
-        made = plan(recipe_with(text, str(path), files_of(path, attrs, files)), products, choices)
+        plan = planning.plan(recipe_with(text, str(path), files_of(path, attrs, files)), products, choices)
     except Mismatch:
         raise
     except OSError as error:
         raise Mismatch(f"{path}: {error.filename}, which its recipe names, cannot be read: {error.strerror}") from None
     except (ValueError, TypeError, FieldError, MemoryError) as error:
         raise Mismatch(f"{path}: its recipe cannot be followed any more: {error}") from None
-    if made.digest != digest:
+    if plan.digest != digest:
         raise Mismatch(f"{path}: a file that its recipe names has changed since the store was built")
-    now = identity(made)
+    now = identity(plan)
     if attrs.get("shard_frames") != now["shard_frames"]:
         raise Mismatch(
             f"{path} has {attrs.get('shard_frames')} frames in a shard, and would now have {now['shard_frames']}"
@@ -169,35 +169,36 @@ def _plan_of(path: Folder, found: Findings, force: bool, files: Path | str | Non
     odd = provenance.other_versions(attrs)
     if odd and not force:
         raise Mismatch(f"{path} was built with other libraries ({spelled(odd)}): use those, or --force")
-    return made
+    return plan
 
 
-def _unlike(path: Folder, found: Findings) -> list[int]:
+def _unlike(path: Folder, findings: Findings) -> list[int]:
     """Shards whose files are as their mark says, and whose numbers are not. The layout must be whole."""
-    alike = sorted(found.marks.keys() - found.shards)
-    return [n for n in alike if any("not finite" not in p.what for p in read_back(path, found.marks[n]))]
+    alike = sorted(findings.marks.keys() - findings.shards)
+    return [n for n in alike if any("not finite" not in p.what for p in read_back(path, findings.marks[n]))]
 
 
-def _todo(path: Folder, found: Findings, made: Plan, unlike: Iterable[int]) -> dict[int, tuple[int, ...]]:
+def _todo(path: Folder, findings: Findings, plan: Plan, unlike: Iterable[int]) -> dict[int, tuple[int, ...]]:
     """Shards to make again, with the frames that they had."""
     todo = {}
-    for shard in sorted(found.shards | set(unlike)):
-        mark = found.marks.get(shard)
-        frames = frames_written(path, made, shard) if mark is None else mark.frames
+    for shard in sorted(findings.shards | set(unlike)):
+        mark = findings.marks.get(shard)
+        frames = frames_written(path, plan, shard) if mark is None else mark.frames
         if frames:
             todo[shard] = frames
     return todo
 
 
-def _in_the_way(path: Folder, found: Findings, made: Plan, todo: Mapping[int, tuple[int, ...]]) -> list[str]:
+def _in_the_way(path: Folder, findings: Findings, plan: Plan, todo: Mapping[int, tuple[int, ...]]) -> list[str]:
     """What cannot be written over, and what is named as of a shard of which the arrays of all shards have no sign."""
-    layout = layout_of(made)
+    layout = layout_of(plan)
     rewritten = {a.file(shard) for shard in todo for a in layout.arrays if not a.empty}
-    marks = {number: f"{MARKS}/{number}.json" for number in found.shards}
-    lost = found.shards - todo.keys()
+    marks = {number: f"{MARKS}/{number}.json" for number in findings.shards}
+    lost = findings.shards - todo.keys()
     laid = load_layout(path)
     ours = rewritten | (set() if laid is None else set(laid.files))
-    data = [n for n in all_files(path) if n not in ours and shard_of(path, n) in found.shards - found.marks.keys()]
+    unmarked = findings.shards - findings.marks.keys()
+    data = [n for n in all_files(path) if n not in ours and shard_of(path, n) in unmarked]
     return [*obstacles(path, rewritten | {marks[n] for n in todo if n in marks}), *data, *(marks[n] for n in lost)]
 
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from sonarsynth import pipeline, store
-from sonarsynth.planning import Plan, choices_from, plan
+from sonarsynth import pipeline, planning, store
+from sonarsynth.planning import Plan, choices_from
 from sonarsynth.recipe import reading
 from sonarsynth.schedule import worker_status
 from sonarsynth.store.layout import layout_of
@@ -67,7 +67,7 @@ class StageResult:
     """A stage of a frame: what it made, or the failure of this or an earlier stage; and what all stages so far cost."""
 
     frame: int
-    made: Any = None
+    value: Any = None
     failure: Failure | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)  # by stage, wall clock
     cpu: Mapping[str, float] = field(default_factory=dict)  # by stage, of the thread
@@ -91,10 +91,10 @@ def trace(job: Job, frames: Sequence[int]) -> list[StageResult]:
     """Task trace-<token>-<first frame>. Gives what was traced; truth where nothing else is wanted."""
 
     def work(before: StageResult) -> Any:
-        made = plan_of(job)
+        plan = plan_of(job)
         if job.products:
-            return pipeline.trace_frame(made, before.frame)
-        return layout_of(made).check(pipeline.truth_frame(made, before.frame))
+            return pipeline.trace_frame(plan, before.frame)
+        return layout_of(plan).check(pipeline.truth_frame(plan, before.frame))
 
     return [_stage(job, "trace", StageResult(frame), work) for frame in frames]
 
@@ -103,24 +103,24 @@ def beamform(job: Job, traced: Sequence[StageResult]) -> list[StageResult]:
     """Task beamform-<token>-<first frame>. Gives what was heard with what was traced; values without a cloud."""
 
     def work(before: StageResult) -> Any:
-        beamformed = pipeline.beamform_frame(plan_of(job), before.frame, before.made)
+        beamformed = pipeline.beamform_frame(plan_of(job), before.frame, before.value)
         if len(tasks_of(job.products)) == 3:
-            return before.made, beamformed
-        return _values(job, before.frame, before.made, beamformed)
+            return before.value, beamformed
+        return _values(job, before.frame, before.value, beamformed)
 
     return [_stage(job, "beamform", before, work) for before in traced]
 
 
 def range_(job: Job, beamformed: Sequence[StageResult]) -> list[StageResult]:
     """Task range-<token>-<first frame>: the values of the frames, in the types of the store."""
-    return [_stage(job, "range", before, lambda step: _values(job, step.frame, *step.made)) for before in beamformed]
+    return [_stage(job, "range", before, lambda step: _values(job, step.frame, *step.value)) for before in beamformed]
 
 
 def _values(
     job: Job, frame: int, traced: pipeline.TracedFrame, beamformed: pipeline.BeamformedFrame
 ) -> pipeline.Values:
-    made = plan_of(job)
-    return layout_of(made).check(pipeline.range_frame(made, frame, traced, beamformed))
+    plan = plan_of(job)
+    return layout_of(plan).check(pipeline.range_frame(plan, frame, traced, beamformed))
 
 
 RUN: Mapping[str, Callable[[Job, Any], list[StageResult]]] = {"trace": trace, "beamform": beamform, "range": range_}
@@ -129,10 +129,10 @@ RUN: Mapping[str, Callable[[Job, Any], list[StageResult]]] = {"trace": trace, "b
 
 def render_frame(job: Job, frame: int) -> StageResult:
     """All stages of a frame, here and now."""
-    made: Any = [frame]
+    results: Any = [frame]
     for name in tasks_of(job.products):
-        made = RUN[name](job, made)
-    step: StageResult = made[0]
+        results = RUN[name](job, results)
+    step: StageResult = results[0]
     return step
 
 
@@ -140,7 +140,7 @@ def write(job: Job, shard: int, blocks: Sequence[Sequence[StageResult]]) -> Writ
     """Task shard-<token>-<shard>: one whole shard of every array, from the frames that came out well."""
     start = time.perf_counter()
     steps = [step for block in blocks for step in block]
-    good = {step.frame: step.made for step in steps if step.failure is None}
+    good = {step.frame: step.value for step in steps if step.failure is None}
     size = 0
     if good:
         with store.shared_lock(job.path, job.build) if job.build else nullcontext(lambda: None) as still:
@@ -167,17 +167,17 @@ def plan_of(job: Job) -> Plan:
     if job not in _plans:
         stored = store.root_attributes(job.path)
         recipe = reading.loads(stored.get("recipe", ""), job.path, resolved=True)
-        made = plan(recipe, frozenset(job.products), choices_from(stored.get("choices")))
-        if made.digest != job.digest:
+        plan = planning.plan(recipe, frozenset(job.products), choices_from(stored.get("choices")))
+        if plan.digest != job.digest:
             raise store.Damage(f"{job.path}: a file that the recipe names is not the same on this worker")
-        remember(job, replace(made, shard_frames=job.shard_frames or made.shard_frames))
+        remember(job, replace(plan, shard_frames=job.shard_frames or plan.shard_frames))
     return _plans[job]
 
 
-def remember(job: Job, made: Plan) -> None:
+def remember(job: Job, plan: Plan) -> None:
     """Keep the plan of a job in this process, in place of the last one."""
     _plans.clear()
-    _plans[job] = made
+    _plans[job] = plan
 
 
 _plans: dict[Job, Plan] = {}
@@ -201,17 +201,17 @@ def _stage(job: Job, name: str, before: StageResult, work: Callable[[StageResult
     if before.failure is not None:
         return before
     wall, cpu = time.perf_counter(), time.thread_time()
-    with pipeline.stage_timer() as parts:
+    with pipeline.stage_timer() as laps:
         try:
             with worker_status.noted(job.path, before.frame, name, _limit(job, name)):
-                made, failure = work(before), None
+                value, failure = work(before), None
             _warm.add(name)
         except Exception as error:
-            made, failure = None, failure_of(before.frame, name, error)
+            value, failure = None, failure_of(before.frame, name, error)
     seconds = {**before.seconds, name: time.perf_counter() - wall}
     spent = {**before.cpu, name: time.thread_time() - cpu}
-    parts = {n: before.parts.get(n, 0.0) + parts.get(n, 0.0) for n in {**before.parts, **parts}}  # labels come twice
-    return StageResult(before.frame, made, failure, seconds, spent, parts)
+    laps = {n: before.parts.get(n, 0.0) + laps.get(n, 0.0) for n in {**before.parts, **laps}}  # labels come twice
+    return StageResult(before.frame, value, failure, seconds, spent, laps)
 
 
 _warm: set[str] = set()

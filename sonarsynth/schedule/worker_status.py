@@ -50,9 +50,9 @@ def read(store: str, worker: str) -> Entry | None:
     """What the worker at an address was doing, None where it was doing nothing that it noted."""
     try:
         text = _file(store, worker).read_text("utf-8", errors="replace")
-        head, _, rest = text.partition("\n")
+        head, _, trace = text.partition("\n")
         noted = json.loads(head)
-        return Entry(int(noted["frame"]), str(noted["stage"]), _reason(rest, noted["limit"]), rest[:LONGEST])
+        return Entry(int(noted["frame"]), str(noted["stage"]), _reason(trace, noted["limit"]), trace[:LONGEST])
     except (OSError, ValueError, KeyError, TypeError):
         return None
 

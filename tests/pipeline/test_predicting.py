@@ -84,7 +84,7 @@ def test_the_size_of_a_store_is_foreseen(small_plan: Plan, prediction: schedule.
 def test_nothing_is_left_of_a_trial(small_plan: Plan, tmp_path: Path) -> None:
     made = schedule.predict(small_plan, folder=tmp_path)
     assert list(tmp_path.iterdir()) == []
-    assert made.how.startswith("timing frames on this machine (number")
+    assert made.basis.startswith("timing frames on this machine (number")
     assert made.failures == ()
 
 
@@ -103,7 +103,7 @@ def test_where_nothing_can_be_tried_counts_serve(
     small_plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = schedule.predict(small_plan, folder=tmp_path / "not there")
-    assert made.how.startswith("counts of operations: no frame could be timed")
+    assert made.basis.startswith("counts of operations: no frame could be timed")
     assert made.frame_seconds == pytest.approx(sum(stage.seconds for stage in small_plan.stages))
     assert made.bytes > 0
     assert math.isfinite(made.seconds)
@@ -127,8 +127,8 @@ def test_a_frame_that_fails_is_named_and_the_others_serve(small_plan: Plan, monk
     monkeypatch.setattr(benchmark_frames, "trace_at", fails)
     made = schedule.predict(small_plan)
     assert made.failures == ("frame 12: ValueError: no water",)
-    assert made.how.startswith("timing frames on this machine (number")
-    assert "12" not in made.how
+    assert made.basis.startswith("timing frames on this machine (number")
+    assert "12" not in made.basis
 
 
 def test_predictions_grow_as_they_must(prediction: schedule.Prediction) -> None:
