@@ -60,12 +60,12 @@ def absorption_notes(absorption: Absorption, frequency: npt.ArrayLike, depth: np
         _formula(absorption, frequency, depth)
     if not notes:
         return ()
-    other: Literal["francois_garrison", "ainslie_mccolm"] = (
+    alternative: Literal["francois_garrison", "ainslie_mccolm"] = (
         "ainslie_mccolm" if absorption.formula == "francois_garrison" else "francois_garrison"
     )
     with noted() as others:
-        _formula(replace(absorption, formula=other), frequency, depth)
-    return tuple(note if others else f"{note}; {other} holds there" for note in notes)
+        _formula(replace(absorption, formula=alternative), frequency, depth)
+    return tuple(note if others else f"{note}; {alternative} holds there" for note in notes)
 
 
 def _formula(absorption: Absorption, frequency: npt.ArrayLike, depth: npt.ArrayLike) -> Floats:

@@ -96,21 +96,21 @@ def boundary_notes(boundary: SeaSurface | SeaBottom, low: float, high: float) ->
     """Field and line for each formula of a boundary that is used outside its range, in a band low to high (Hz)."""
     notes: list[tuple[str, str]] = []
     reflection = boundary.reflection
-    with formula_ranges.noted() as found:
+    with formula_ranges.noted() as lines:
         if isinstance(reflection, Sediment):
             formula_ranges.APL_SEDIMENTS.check(frequency=[low, high])
             formula_ranges.FLUID_BED.check(speed_ratio=boundary_reflection.SEDIMENTS[reflection.name][1])
         elif isinstance(reflection, FluidHalfSpace):
             formula_ranges.FLUID_BED.check(speed_ratio=reflection.speed_ratio)
-    notes += [("reflection", line) for line in found]
+    notes += [("reflection", line) for line in lines]
     if isinstance(boundary, SeaSurface) and boundary.wind_speed is not None:
-        with formula_ranges.noted() as found:
+        with formula_ranges.noted() as lines:
             boundary_reflection.wind_wave_height(boundary.wind_speed)
-        notes += [("wind_speed", line) for line in found]
+        notes += [("wind_speed", line) for line in lines]
         if boundary.bubbles:
-            with formula_ranges.noted() as found:
+            with formula_ranges.noted() as lines:
                 boundary_reflection.bubble_loss(boundary.wind_speed, 0.5 * (low + high), 0.5 * np.pi)
-            notes += [("bubbles", line) for line in found]
+            notes += [("bubbles", line) for line in lines]
     return tuple(notes)
 
 

@@ -83,39 +83,39 @@ def _profile(depth: npt.ArrayLike, speed: npt.ArrayLike, notes: tuple[str, ...] 
     return Profile(*nodes, notes)
 
 
-def _place(where: TemperatureSalinity | Cast, table: CastTable | None = None) -> tuple[float, float | None]:
+def _place(source: TemperatureSalinity | Cast, table: CastTable | None = None) -> tuple[float, float | None]:
     """Latitude and longitude in degrees, as they are written, else as the file says, else 45 degrees and None."""
     latitude, longitude = (None, None) if table is None else (table.latitude, table.longitude)
-    latitude = latitude if where.latitude is None else float(np.degrees(where.latitude))
-    longitude = longitude if where.longitude is None else float(np.degrees(where.longitude))
+    latitude = latitude if source.latitude is None else float(np.degrees(source.latitude))
+    longitude = longitude if source.longitude is None else float(np.degrees(source.longitude))
     return LATITUDE if latitude is None else latitude, longitude
 
 
 def _cast_profile(cast: Cast) -> Profile:
     """The profile of a file: read, chosen from, and said what of."""
-    given = [None if angle is None else float(np.degrees(angle)) for angle in (cast.latitude, cast.longitude)]
-    table = read_cast(Path(cast.path), cast.profile, *given)
-    place = _place(cast, table)
+    own_place = [None if angle is None else float(np.degrees(angle)) for angle in (cast.latitude, cast.longitude)]
+    table = read_cast(Path(cast.path), cast.profile, *own_place)
+    site = _place(cast, table)
     water = {name: column.values for name, column in table.columns.items()}
     if "sound speed" in water:
         water["sound speed"] = np.where(water["sound speed"] == 0.0, np.nan, water["sound speed"])  # out of the water
     needed = _needed(cast, table)
     with noted() as notes, np.errstate(invalid="ignore"):
-        depth = water["depth"] if "depth" in needed else depth_of_pressure(np.maximum(water["pressure"], 0.0), place[0])
+        depth = water["depth"] if "depth" in needed else depth_of_pressure(np.maximum(water["pressure"], 0.0), site[0])
     if "pressure" in needed:
         depth = np.where(water["pressure"] < 0.0, water["pressure"], depth)  # in the air
-    kept = select(table, {name: water[name] for name in needed if name in water}, depth)
-    water = {name: values[kept.rows] for name, values in water.items()}
-    z = depth[kept.rows]
+    selection = select(table, {name: water[name] for name in needed if name in water}, depth)
+    water = {name: values[selection.rows] for name, values in water.items()}
+    z = depth[selection.rows]
     if "sound speed" not in needed and "salinity" not in water:
-        water["salinity"] = _salinity(cast, water, z, place[0])
+        water["salinity"] = _salinity(cast, water, z, site[0])
     if "sound speed" in needed:
         speed = water["sound speed"]
-        said = _unused(cast, table)
+        lines = _unused(cast, table)
     else:
-        speed, said = sea_water_speed(cast.formula, water["temperature"], water["salinity"], z, *place)
-    said = (*notes, *said, *table.notes, *_selection(table, kept, z), *_comparison(water, z, place))
-    profile = _profile(*averaged(z, speed), said)
+        speed, lines = sea_water_speed(cast.formula, water["temperature"], water["salinity"], z, *site)
+    lines = (*notes, *lines, *table.notes, *_selection(table, selection, z), *_comparison(water, z, site))
+    profile = _profile(*averaged(z, speed), lines)
     return profile if cast.smoothing is None else smoothed(profile, cast.smoothing)
 
 
@@ -135,11 +135,11 @@ def _needed(cast: Cast, table: CastTable) -> tuple[str, ...]:
     if "temperature" in has and "conductivity" in has:
         _check_unit(table)
         return level, "temperature", "conductivity"
-    what = "" if cast.quantity == "temperature_salinity" else "sound speed, or of "
-    comma = "," if what else ""
+    missing = "" if cast.quantity == "temperature_salinity" else "sound speed, or of "
+    comma = "," if missing else ""
     hint = "; give the `salinity`" if "temperature" in has else ""
     raise CastError(
-        f"{table.where()}: no columns of {what}temperature and salinity{comma} among {table.shown_names}{hint}"
+        f"{table.where()}: no columns of {missing}temperature and salinity{comma} among {table.shown_names}{hint}"
     )
 
 
@@ -157,10 +157,10 @@ def _salinity(cast: Cast, water: dict[str, Floats], depth: Floats, latitude: flo
         return np.full(len(depth), cast.salinity)
     standard = pressure_of_depth(depth, latitude)
     pressure = water.get("pressure", standard)
-    found = practical_salinity(
+    salinity = practical_salinity(
         water["conductivity"], water["temperature"], np.where(np.isfinite(pressure), pressure, standard)
     )
-    return np.where(water["conductivity"] > 0.0, found, 0.0)
+    return np.where(water["conductivity"] > 0.0, salinity, 0.0)
 
 
 def _unused(cast: Cast, table: CastTable) -> tuple[str, ...]:
@@ -170,36 +170,36 @@ def _unused(cast: Cast, table: CastTable) -> tuple[str, ...]:
     return (unused,) if cast.formula != "mackenzie" else ()
 
 
-def _selection(table: CastTable, kept: Selection, depth: Floats) -> tuple[str, ...]:
+def _selection(table: CastTable, selection: Selection, depth: Floats) -> tuple[str, ...]:
     """One note of what was left out of a cast, and of rows at one depth (m); none where all is used as it is."""
     alike = len(depth) - len(np.unique(depth))
-    if not kept.left_out and not alike:
+    if not selection.left_out and not alike:
         return ()
-    way = ", taken on the way up" if kept.upward else ""
-    less = f"; left out: {left_out(kept)}" if kept.left_out else ""
+    direction = ", taken on the way up" if selection.upward else ""
+    less = f"; left out: {left_out(selection)}" if selection.left_out else ""
     mean = f"; {alike} at the depth of another are averaged with it" if alike else ""
-    return (f"cast ({table.layout}): {len(kept.rows)} of {len(table.lines)} rows used{way}{less}{mean}",)
+    return (f"cast ({table.layout}): {len(selection.rows)} of {len(table.lines)} rows used{direction}{less}{mean}",)
 
 
-def _comparison(water: dict[str, Floats], depth: Floats, place: tuple[float, float | None]) -> tuple[str, ...]:
+def _comparison(water: dict[str, Floats], depth: Floats, site: tuple[float, float | None]) -> tuple[str, ...]:
     """A note of how far the file's own sound speed is from that of its temperature and salinity."""
     if not {"sound speed", "temperature", "salinity"} <= set(water):
         return ()
-    some = np.all([np.isfinite(water[name]) for name in ("sound speed", "temperature", "salinity")], axis=0)
+    good = np.all([np.isfinite(water[name]) for name in ("sound speed", "temperature", "salinity")], axis=0)
     with np.errstate(invalid="ignore"):
-        some &= (water["temperature"] > -3.0) & (water["temperature"] < 45.0)
-        some &= (water["salinity"] >= 0.0) & (water["salinity"] <= PLAUSIBLE["salinity"][1])
-    if not some.any() or not water["salinity"][some].any():
+        good &= (water["temperature"] > -3.0) & (water["temperature"] < 45.0)
+        good &= (water["salinity"] >= 0.0) & (water["salinity"] <= PLAUSIBLE["salinity"][1])
+    if not good.any() or not water["salinity"][good].any():
         return ()
     off = {}
     for formula in OWN_FORMULAS:
-        ours = sea_water_speed(formula, water["temperature"][some], water["salinity"][some], depth[some], *place)[0]
-        off[formula] = float(np.abs(water["sound speed"][some] - ours).max())
+        ours = sea_water_speed(formula, water["temperature"][good], water["salinity"][good], depth[good], *site)[0]
+        off[formula] = float(np.abs(water["sound speed"][good] - ours).max())
     best = min(off, key=lambda formula: off[formula])
-    how = "is within" if off[best] < ALIKE else "differs by up to"
+    verdict = "is within" if off[best] < ALIKE else "differs by up to"
     by = "of" if off[best] < ALIKE else "from"
     return (
-        f"the file's own sound speed {how} {off[best]:.2g} m/s {by} that of {best} by its temperature and salinity",
+        f"the file's own sound speed {verdict} {off[best]:.2g} m/s {by} that of {best} by its temperature and salinity",
     )
 
 

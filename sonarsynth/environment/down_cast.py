@@ -55,32 +55,32 @@ def select(table: CastTable, needed: dict[str, Floats], depth: Floats) -> Select
     impossible value, those in the air, one of the two ways where a cast has both, and those less deep than one before
     (heave loops). Raises CastError where nothing is left, or where most of a column is impossible.
     """
-    kept = Selection(np.arange(len(depth)))
-    there = np.all([np.isfinite(values) for values in needed.values()], axis=0)
-    kept.keep(there, "with a missing value")
-    _nonempty(table, kept)
-    _check(table, {name: values[kept.rows] for name, values in needed.items()}, kept.rows)
+    selection = Selection(np.arange(len(depth)))
+    complete = np.all([np.isfinite(values) for values in needed.values()], axis=0)
+    selection.keep(complete, "with a missing value")
+    _nonempty(table, selection)
+    _check(table, {name: values[selection.rows] for name, values in needed.items()}, selection.rows)
     for name, values in needed.items():
         low, high, _ = PLAUSIBLE[name]
-        some = values[kept.rows]
-        kept.keep((some >= low) & (some <= high), "with an impossible value")
-    _nonempty(table, kept)
-    kept.keep(~_in_air(needed, depth, kept.rows), "in the air")
-    _nonempty(table, kept)
-    _one_way(kept, depth)
-    z = depth[kept.rows]
+        column = values[selection.rows]
+        selection.keep((column >= low) & (column <= high), "with an impossible value")
+    _nonempty(table, selection)
+    selection.keep(~_in_air(needed, depth, selection.rows), "in the air")
+    _nonempty(table, selection)
+    _one_way(selection, depth)
+    z = depth[selection.rows]
     deepest = np.maximum.accumulate(z)
-    kept.keep(np.append(True, z[1:] >= deepest[:-1]), "of heave loops")
-    if len(kept.rows) < FEW < len(table.lines):
+    selection.keep(np.append(True, z[1:] >= deepest[:-1]), "of heave loops")
+    if len(selection.rows) < FEW < len(table.lines):
         raise CastError(
-            f"{table.path}: is no cast: {len(kept.rows)} of {len(table.lines)} rows go down, {left_out(kept)}"
+            f"{table.path}: is no cast: {len(selection.rows)} of {len(table.lines)} rows go down, {left_out(selection)}"
         )
-    return kept
+    return selection
 
 
-def left_out(kept: Selection) -> str:
+def left_out(selection: Selection) -> str:
     """What was left out, for people."""
-    return ", ".join(f"{count} {reason}" for reason, count in kept.left_out.items())
+    return ", ".join(f"{count} {reason}" for reason, count in selection.left_out.items())
 
 
 def averaged(depth: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -89,9 +89,9 @@ def averaged(depth: Floats, values: Floats) -> tuple[Floats, Floats]:
     return (depth, values) if len(z) == len(depth) else (z, np.bincount(back, values) / count)
 
 
-def _nonempty(table: CastTable, kept: Selection) -> None:
-    if not len(kept.rows):
-        raise CastError(f"{table.path}: no row can be used ({left_out(kept)})")
+def _nonempty(table: CastTable, selection: Selection) -> None:
+    if not len(selection.rows):
+        raise CastError(f"{table.path}: no row can be used ({left_out(selection)})")
 
 
 def _check(table: CastTable, needed: dict[str, Floats], rows: Ints) -> None:
@@ -116,26 +116,26 @@ def _in_air(needed: dict[str, Floats], depth: Floats, rows: Ints) -> np.ndarray:
     air = z < 0.0
     for name in ("salinity", "conductivity"):
         if name in needed:
-            some = needed[name][rows]
-            median = float(np.median(some))
-            air |= (median > SALT) & (some < IN_AIR * median) & (z < SURFACE)
+            column = needed[name][rows]
+            median = float(np.median(column))
+            air |= (median > SALT) & (column < IN_AIR * median) & (z < SURFACE)
     return np.asarray(air)
 
 
-def _one_way(kept: Selection, depth: Floats) -> None:
+def _one_way(selection: Selection, depth: Floats) -> None:
     """The way down from the last time that it was highest before the deepest row; the way up where that is longer."""
-    z = depth[kept.rows]
+    z = depth[selection.rows]
     deepest = int(np.argmax(z))
     down, up = z[: deepest + 1], z[deepest:]
     if np.ptp(up) > 2.0 * np.ptp(down):
-        kept.upward = True
+        selection.upward = True
         end = deepest + int(np.argmin(up))
-        part = np.arange(end, deepest - 1, -1)
+        rows = np.arange(end, deepest - 1, -1)
         name = "of the way down"
     else:
         start = len(down) - 1 - int(np.argmin(down[::-1]))
-        part = np.arange(start, deepest + 1)
+        rows = np.arange(start, deepest + 1)
         name = "of the way up"
-    if len(part) < len(z):
-        kept.left_out[name] = len(z) - len(part)
-    kept.rows = kept.rows[part]
+    if len(rows) < len(z):
+        selection.left_out[name] = len(z) - len(rows)
+    selection.rows = selection.rows[rows]

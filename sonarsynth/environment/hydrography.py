@@ -61,7 +61,7 @@ def sea_water_speed(
         speed = _speed(formula, *water)
     if not notes:
         return speed, ()
-    better = [other for other in get_args(SpeedFormula) if other != formula and _holds(other, *water)]
+    better = [candidate for candidate in get_args(SpeedFormula) if candidate != formula and _holds(candidate, *water)]
     hint = f"; {', '.join(better)} {'hold' if len(better) > 1 else 'holds'} there" if better else ""
     return speed, tuple(note + hint for note in notes)
 

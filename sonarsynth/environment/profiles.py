@@ -104,11 +104,11 @@ def nearest(node: Floats, edge: Floats, speed: Callable[[Floats], Floats]) -> Fl
     x = (edge[:-1, None] + 0.5 * thickness[:, None] * (GAUSS[0] + 1.0)).ravel()
     weight = (0.5 * thickness[:, None] * GAUSS[1]).ravel()
     base = speed(node)
-    left = weight * (speed(x) - np.interp(x, node, base))
+    off = weight * (speed(x) - np.interp(x, node, base))
     layer = np.clip(np.searchsorted(node, x, side="right") - 1, 0, len(node) - 2)
     h = np.diff(node)
-    part = (x - node[layer]) / h[layer]
-    moment = np.bincount(layer, left * (1.0 - part), len(node)) + np.bincount(layer + 1, left * part, len(node))
+    share = (x - node[layer]) / h[layer]
+    moment = np.bincount(layer, off * (1.0 - share), len(node)) + np.bincount(layer + 1, off * share, len(node))
     diagonal = (np.append(h, 0.0) + np.append(0.0, h)) / 3.0
     return np.asarray(base + solveh_banded(np.stack([np.append(0.0, h / 6.0), diagonal]), moment))
 

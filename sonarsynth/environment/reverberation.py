@@ -34,8 +34,8 @@ class Reverberation:
     @property
     def owners(self) -> tuple[str, ...]:
         """What scatters."""
-        given = {"bottom": self.bottom, "surface": self.surface, "volume": self.volume}
-        return tuple(name for name, law in given.items() if law is not None)
+        laws = {"bottom": self.bottom, "surface": self.surface, "volume": self.volume}
+        return tuple(name for name, law in laws.items() if law is not None)
 
     def row(self) -> str:
         """What `plan` shows of it."""

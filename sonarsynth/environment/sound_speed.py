@@ -283,9 +283,9 @@ class Profile:
         return np.asarray(np.interp(depth, self.depth, self.speed))
 
 
-def mean_gradient(profile: Profile, depth: float, other: float, least: float) -> float:
+def mean_gradient(profile: Profile, depth: float, other_depth: float, least: float) -> float:
     """Mean of |dc/dz| (1/s) between two depths (m), over no less than `least` (m) about them; jumps count."""
-    middle, half = 0.5 * (depth + other), 0.5 * max(abs(depth - other), least)
+    middle, half = 0.5 * (depth + other_depth), 0.5 * max(abs(depth - other_depth), least)
     between = np.abs(profile.depth - middle) < half
     speed = [profile.at(middle - half), *profile.speed[between], profile.at(middle + half)]
     return float(np.sum(np.abs(np.diff(speed)))) / (2 * half)

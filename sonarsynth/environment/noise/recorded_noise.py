@@ -45,8 +45,8 @@ class RecordedNoise(NoiseField):
     def density(self, frequency: Floats) -> Floats:
         """As `NoiseField.density`: straight lines between the bins of the spectrum. Raises ValueError for a file that
         cannot be read, is silent or too short."""
-        known, density, _ = self._spectrum()
-        return np.asarray(np.interp(frequency, known, density, right=0.0))
+        bins, density, _ = self._spectrum()
+        return np.asarray(np.interp(frequency, bins, density, right=0.0))
 
     def validity(self, low: float, high: float) -> tuple[str, ...]:
         """As `NoiseField.validity`."""

@@ -41,13 +41,13 @@ class Net(ScatteringField):
     def scatterers(self, bottom: float, random: np.random.Generator) -> Scatterers:
         """As `ScatteringField.scatterers`. Raises ValueError where a knot is out of the water."""
         across, deep = np.meshgrid(np.linspace(0.0, 1.0, self.columns), np.linspace(0.0, 1.0, self.rows))
-        place = np.array(self.corner) + across.reshape(-1, 1) * self.along + deep.reshape(-1, 1) * self.down
-        if place[:, 2].max() >= 0.0 or place[:, 2].min() < -bottom:
-            raise ValueError(f"a net from z {place[:, 2].min():g} to {place[:, 2].max():g} m is out of the water")
+        position = np.array(self.corner) + across.reshape(-1, 1) * self.along + deep.reshape(-1, 1) * self.down
+        if position[:, 2].max() >= 0.0 or position[:, 2].min() < -bottom:
+            raise ValueError(f"a net from z {position[:, 2].min():g} to {position[:, 2].max():g} m is out of the water")
         return Scatterers(
             owner="volume",
             law=PointScatterer(10.0 ** (self.strength / 20.0)),
-            position=place,
+            position=position,
             normal=np.zeros((self.count, 3)),
             area=np.ones(self.count),
             sign=np.ones(self.count),

@@ -34,11 +34,11 @@ class Stones(ScatteringField):
 
     def scatterers(self, bottom: float, random: np.random.Generator) -> Scatterers:
         """As `ScatteringField.scatterers`."""
-        place = np.array(self.positions)
+        position = np.array(self.positions)
         return Scatterers(
             owner="bottom",
             law=PointScatterer(0.5 * self.radius),
-            position=np.column_stack([place, np.full(self.count, self.radius - bottom)]),
+            position=np.column_stack([position, np.full(self.count, self.radius - bottom)]),
             normal=np.zeros((self.count, 3)),
             area=np.full(self.count, np.pi * self.radius**2),
             sign=random.choice([-1.0, 1.0], self.count),

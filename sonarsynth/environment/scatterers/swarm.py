@@ -42,15 +42,15 @@ class Swarm(ScatteringField):
         _, _, up = self.centre
         if up - self.axes[2] >= 0.0 or up + self.axes[2] <= -bottom:
             raise ValueError(f"a swarm at z {up:g} m is out of the water, which is {bottom:g} m deep")
-        place = np.zeros((0, 3))
-        while len(place) < self.members:
-            some = random.uniform(-1.0, 1.0, (4 * self.members, 3))
-            some = some[np.sum(some**2, axis=1) < 1.0] * self.axes + self.centre
-            place = np.concatenate([place, some[(some[:, 2] < 0.0) & (some[:, 2] > -bottom)]])
+        position = np.zeros((0, 3))
+        while len(position) < self.members:
+            drawn = random.uniform(-1.0, 1.0, (4 * self.members, 3))
+            drawn = drawn[np.sum(drawn**2, axis=1) < 1.0] * self.axes + self.centre
+            position = np.concatenate([position, drawn[(drawn[:, 2] < 0.0) & (drawn[:, 2] > -bottom)]])
         return Scatterers(
             owner="volume",
             law=PointScatterer(10.0 ** (self.strength / 20.0)),
-            position=place[: self.members],
+            position=position[: self.members],
             normal=np.zeros((self.members, 3)),
             area=np.ones(self.members),
             sign=random.choice([-1.0, 1.0], self.members),
