@@ -58,7 +58,7 @@ __all__ = [
 ]
 
 FILE_KINDS = frozenset(
-    {each.kind for each in (MeshFile, Cast, RecordedSnap, NoiseRecording, RecordedNoise, RecordedTrack)}
+    {cls.kind for cls in (MeshFile, Cast, RecordedSnap, NoiseRecording, RecordedNoise, RecordedTrack)}
 )
 """Descriptions whose `path` names a file."""
 
@@ -159,10 +159,10 @@ class Recipe:
     def categories(self) -> tuple[str, ...]:
         """What targets are called, in the order of the recipe."""
         world = self.described.world
-        said = [target.category for target in world.targets]
-        said += [str(v) for _, entry in self.spanned.entries for v in _listed(entry) if _sets(entry, "category")]
-        said += [p.category(n) for p in world.populations for n in range(len(p.models))]
-        return tuple(dict.fromkeys(said))
+        names = [target.category for target in world.targets]
+        names += [str(v) for _, entry in self.spanned.entries for v in _listed(entry) if _sets(entry, "category")]
+        names += [p.category(n) for p in world.populations for n in range(len(p.models))]
+        return tuple(dict.fromkeys(names))
 
     def frame(self, index: int) -> tuple[Scene, Frame]:
         """Scene and frame number `index`; raises IndexError outside 0..frames-1, FieldError where it cannot be."""
@@ -187,7 +187,7 @@ class Recipe:
         Where the files lie does not matter.
         """
         deciding = {name: value for name, value in self.as_json().items() if name not in ("rays", "dataset")}
-        meshes = {name: [mesh.digest for mesh in some] for name, some in self.meshes.items()}
+        meshes = {name: [mesh.digest for mesh in variants] for name, variants in self.meshes.items()}
         text = json.dumps([_by_content(deciding), meshes], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -199,16 +199,16 @@ def _sets(entry: Axis | Variation, field: str) -> bool:
 
 def _listed(entry: Axis | Variation) -> list[Any]:
     """The values of what varies, where they are listed."""
-    some = entry.taken if isinstance(entry, Axis) else entry.values if isinstance(entry, Choice) else ()
-    return [plain.value for plain in some]
+    values = entry.taken if isinstance(entry, Axis) else entry.values if isinstance(entry, Choice) else ()
+    return [plain.value for plain in values]
 
 
 def _by_content(value: Any) -> Any:
     """The same JSON value with the path of each file replaced by the digest of what it holds."""
     if isinstance(value, dict):
         path = value.get("path") if value.get("kind") in FILE_KINDS else None
-        held = {"path": named_files.digest(path)} if isinstance(path, str) else {}
-        return {name: _by_content(v) for name, v in value.items()} | held
+        content = {"path": named_files.digest(path)} if isinstance(path, str) else {}
+        return {name: _by_content(v) for name, v in value.items()} | content
     return [_by_content(v) for v in value] if isinstance(value, list) else value
 
 

@@ -27,14 +27,14 @@ def most_emissions(spanned: Sequences) -> int:
     for i, source in enumerate(scene.world.sources):
         times = ("scene", "world", "sources", i, source.times_field)
         setting = [
-            [Setting(place, name_of(entry), entry.path, value) for value in _listed(entry)]
-            for place, entry in spanned.entries
+            [Setting(at, name_of(entry), entry.path, value) for value in _listed(entry)]
+            for at, entry in spanned.entries
             if any(where(path) == times[: len(where(path))] for path in entry.path)
         ]
         if prod(map(len, setting)) > MOST_COMBINATIONS:
             raise FieldError(times, f"has more than {MOST_COMBINATIONS} combinations of what sets it")
-        several = [with_settings(scene, plain, some) for some in product(*setting) if some]
-        count += max(len(one.world.sources[i].times) for one in (scene, spanned.base, *several))
+        several = [with_settings(scene, plain, combination) for combination in product(*setting) if combination]
+        count += max(len(described.world.sources[i].times) for described in (scene, spanned.base, *several))
     return count
 
 

@@ -73,15 +73,15 @@ class SampledGeometry:
     def how(self) -> str:
         """What was looked at, in a sentence."""
         recipe, sequences = self.recipe, len(np.unique(self.sequence))
-        longest, most = np.bincount(self.sequence).max(), int(recipe.spanned.steps.max())
-        of = [(sequences, recipe.sequences, "sequence"), (int(longest), most, "step")]
-        texts = [f"{n} of {counted(every, what)}" if n < every else counted(n, what) for n, every, what in of]
+        longest, steps = np.bincount(self.sequence).max(), int(recipe.spanned.steps.max())
+        of = [(sequences, recipe.sequences, "sequence"), (int(longest), steps, "step")]
+        texts = [f"{n} of {counted(every, noun)}" if n < every else counted(n, noun) for n, every, noun in of]
         spread = ", evenly sampled" if len(self.sequence) < recipe.frames else ""
         return f"{' x '.join(texts)}{spread}"
 
     def as_json(self) -> dict[str, Any]:
         """Numbers of each quantity, of all targets in view, by group and by split; frames by targets in view."""
-        seen = self.columns["visible"] > 0.0
+        view = self.columns["visible"] > 0.0
         splits = self.split[self.frame]
         value: dict[str, Any] = {
             "title": self.recipe.title,
@@ -90,7 +90,7 @@ class SampledGeometry:
             "sampled_sequences": len(np.unique(self.sequence)),
             "sampled_frames": len(self.sequence),
             "targets": {
-                name: {"frames": int(np.sum(self.group == i)), "frames_in_view": int(np.sum(seen & (self.group == i)))}
+                name: {"frames": int(np.sum(self.group == i)), "frames_in_view": int(np.sum(view & (self.group == i)))}
                 for i, name in enumerate(self.groups)
             },
             "sequences_by_split": dict(
@@ -101,7 +101,7 @@ class SampledGeometry:
         }
         for name, (unit, meaning) in QUANTITIES.items():
             numbers = self.columns[name]
-            counted_rows = np.ones(len(seen), bool) if name == "visible" else seen
+            counted_rows = np.ones(len(view), bool) if name == "visible" else view
             value[name] = {
                 "unit": unit,
                 "meaning": meaning,
@@ -129,9 +129,9 @@ def sample_geometry(
     groups = list(dict.fromkeys([*(group_of(target) for target in world.targets), *drawn]))
     rows: list[tuple[float, ...]] = []
     frames = [(int(n), step) for n in chosen for step in _even(recipe.steps(n), count)]
-    for number, place in enumerate(frames):
-        scene = recipe.scene_of(place[0])
-        for name, values in _targets_of(scene, frame_of(recipe, scene, *place)):
+    for number, frame in enumerate(frames):
+        scene = recipe.scene_of(frame[0])
+        for name, values in _targets_of(scene, frame_of(recipe, scene, *frame)):
             groups += [] if name in groups else [name]
             rows.append((number, groups.index(name), *values))
         progress(number + 1, len(frames), 0)
@@ -148,17 +148,17 @@ def sample_geometry(
     )
 
 
-def _even(count: int, most: int) -> list[int]:
+def _even(count: int, limit: int) -> list[int]:
     """At most so many of 0 to count - 1, evenly, both ends among them."""
-    return [int(n) for n in np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))]
+    return [int(n) for n in np.unique(np.linspace(0, count - 1, min(count, limit)).astype(int))]
 
 
-def spread(count: int, most: int) -> Ints:
-    """At most so many of `count` numbers: all, or one at random from each of `most` equal parts."""
-    if count <= most:
+def spread(count: int, limit: int) -> Ints:
+    """At most so many of `count` numbers: all, or one at random from each of `limit` equal parts."""
+    if count <= limit:
         return np.arange(count)
-    part = count / most
-    return np.array([int((i + share(0, "preview", i)) * part) for i in range(most)])
+    width = count / limit
+    return np.array([int((i + share(0, "preview", i)) * width) for i in range(limit)])
 
 
 def frame_of(recipe: Recipe, scene: Scene, sequence: int, step: int) -> Frame:
@@ -178,7 +178,7 @@ def _targets_of(scene: Scene, frame: Frame) -> list[tuple[str, tuple[float, ...]
     """Group and QUANTITIES of each target of a frame."""
     targets = {target.name: target for target in scene.world.targets}
     bodies, sonar = frame.moment.bodies, frame.sonar_pose
-    found: list[tuple[str, tuple[float, ...]]] = []
+    targets_in_frame: list[tuple[str, tuple[float, ...]]] = []
     for body in bodies:
         own = sonar.to_body(body.pose.position)
         azimuth, elevation = np.rad2deg(azimuth_elevation(own))
@@ -186,29 +186,29 @@ def _targets_of(scene: Scene, frame: Frame) -> list[tuple[str, tuple[float, ...]
         others = [other for other in bodies if other is not body]
         visible = _visible(body, others, sonar, scene.sonar.beams)
         values = (float(np.linalg.norm(own)), float(azimuth), float(elevation), float(aspect), visible)
-        found.append((group_of(targets[body.name]), values))
-    return found
+        targets_in_frame.append((group_of(targets[body.name]), values))
+    return targets_in_frame
 
 
 def _visible(body: PlacedTarget, others: list[PlacedTarget], sonar: Pose, beams: BeamGrid) -> float:
     """Share of the facing area in the spans of the beams and not behind the boxes of others, by some facets."""
     mesh = body.mesh
-    some = np.unique(np.linspace(0, len(mesh.faces) - 1, FACETS).astype(int))
-    points = body.pose.to_world(mesh.centroid[some])
-    facing = np.einsum("ij,ij->i", sonar.position - points, body.pose.turn_to_world(mesh.normal[some])) > 0.0
-    area = np.where(facing, mesh.area[some], 0.0)
+    facets = np.unique(np.linspace(0, len(mesh.faces) - 1, FACETS).astype(int))
+    points = body.pose.to_world(mesh.centroid[facets])
+    facing = np.einsum("ij,ij->i", sonar.position - points, body.pose.turn_to_world(mesh.normal[facets])) > 0.0
+    area = np.where(facing, mesh.area[facets], 0.0)
     azimuth, elevation = azimuth_elevation(sonar.to_body(points))
-    seen = (np.abs(azimuth) <= 0.5 * beams.azimuth_span) & (np.abs(elevation) <= 0.5 * beams.elevation_span)
+    visible = (np.abs(azimuth) <= 0.5 * beams.azimuth_span) & (np.abs(elevation) <= 0.5 * beams.elevation_span)
     for other in others:
-        seen &= ~_behind_box(other, sonar.position, points)
-    return float(area[seen].sum() / area.sum()) if area.any() else 0.0
+        visible &= ~_behind_box(other, sonar.position, points)
+    return float(area[visible].sum() / area.sum()) if area.any() else 0.0
 
 
 def _behind_box(body: PlacedTarget, start: Floats, points: Floats) -> Bools:
     """Whether the straight lines from a place (xyz) to points (point, xyz) pass through the oriented box of a body."""
     origin, ends = body.pose.to_body(start), body.pose.to_body(points)
     with np.errstate(divide="ignore", invalid="ignore"):
-        first, second = ((side - origin) / (ends - origin) for side in body.mesh.box)
+        first, second = ((corner - origin) / (ends - origin) for corner in body.mesh.box)
     near, far = np.fmin(first, second).max(axis=1), np.fmax(first, second).min(axis=1)
     return np.asarray((near < far) & (far > 0.0) & (near < 1.0))
 
@@ -218,8 +218,8 @@ def _numbers(values: Floats) -> dict[str, float | int | None]:
     names = ("least", "lower_quartile", "median", "upper_quartile", "greatest", "mean")
     if not len(values):
         return {"count": 0} | dict.fromkeys(names)
-    found = [*np.quantile(values, [0.0, 0.25, 0.5, 0.75, 1.0]).tolist(), float(values.mean())]
-    return {"count": len(values)} | dict(zip(names, found, strict=True))
+    figures = [*np.quantile(values, [0.0, 0.25, 0.5, 0.75, 1.0]).tolist(), float(values.mean())]
+    return {"count": len(values)} | dict(zip(names, figures, strict=True))
 
 
 def _counts(values: Ints) -> dict[str, int]:

@@ -72,16 +72,16 @@ class World:
 
     @field_validator("populations")
     @classmethod
-    def _check_population_names(cls, some: tuple[Population, ...], info: ValidationInfo) -> tuple[Population, ...]:
+    def _check_population_names(cls, listed: tuple[Population, ...], info: ValidationInfo) -> tuple[Population, ...]:
         taken = {target.name: target.name for target in info.data.get("targets", ())} | {DIRECT: DIRECT}
-        for population in some:
+        for population in listed:
             for name in (population.name, *population.slots):
                 if name in taken:
                     raise ValueError(f"'{name}' of population '{population.name}' is the name of '{taken[name]}' too")
                 taken[name] = population.name
-        if len(info.data.get("targets", ())) + sum(population.most for population in some) > MOST:
+        if len(info.data.get("targets", ())) + sum(population.most for population in listed) > MOST:
             raise ValueError(f"more than {MOST} targets with those of the recipe")
-        return some
+        return listed
 
     @property
     def target_names(self) -> tuple[str, ...]:
@@ -93,10 +93,10 @@ class World:
     @classmethod
     def _check_count(cls, several: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
         sources = info.field_name == "sources"
-        count = sum(len(one.times) for one in several) if sources else len(several)
+        count = sum(len(source.times) for source in several) if sources else len(several)
         if count > MOST:
-            what = "snaps" if sources else "targets"
-            raise ValueError(f"{count} {what} are more than {MOST}")
+            noun = "snaps" if sources else "targets"
+            raise ValueError(f"{count} {noun} are more than {MOST}")
         return several
 
 
@@ -220,9 +220,9 @@ class Scene:
         for i, source in enumerate(self.world.sources):
             snaps += source.emissions(bottom, stream(seed, "snap", key, step, i), time)
         loose = list[Scatterers]()
-        for i, some in enumerate(self.world.scatterers):
+        for i, field in enumerate(self.world.scatterers):
             try:
-                loose.append(some.scatterers(bottom, stream(seed, "scatterers", key, i)))
+                loose.append(field.scatterers(bottom, stream(seed, "scatterers", key, i)))
             except ValueError as error:
                 raise FieldError(("scene", "world", "scatterers", i), str(error)) from None
         return WorldState(time, bodies, tuple(snaps), scatterers=tuple(loose))

@@ -19,14 +19,14 @@ def check_spanned(spanned: Sequences) -> None:
         raise FieldError(("grid",), f"spans {spanned.count:.8g} sequences, more than {MOST_SEQUENCES}")
     names: dict[str, str] = {}
     paths: dict[str, str] = {}
-    for place, entry in spanned.entries:
+    for at, entry in spanned.entries:
         name = name_of(entry)
         if name in RESERVED or name in names:
-            raise FieldError((*place, "name"), f"'{name}' is the name of another coordinate: give another name")
+            raise FieldError((*at, "name"), f"'{name}' is the name of another coordinate: give another name")
         names[name] = name
         for path in entry.path:
             if path in paths:
-                raise FieldError((*place, "path"), f"'{path}' is set by '{paths[path]}' as well")
+                raise FieldError((*at, "path"), f"'{path}' is set by '{paths[path]}' as well")
             paths[path] = name
     _check_dependent(spanned)
     if sum(isinstance(v, Sobol) for v in spanned.variations) > OF_VARIATIONS:
@@ -35,20 +35,20 @@ def check_spanned(spanned: Sequences) -> None:
         raise FieldError(("grid",), f"spans {spanned.count} sequences: more than {MOST_FRAMES} frames")
     if spanned.splits is not None:
         stratify = [] if spanned.splits.stratify is None else [(("splits", "stratify"), spanned.splits.stratify)]
-        for at, name in [*stratify, *((("splits", "undivided"), n) for n in spanned.splits.undivided)]:
-            _check_name(spanned, at, name)
+        for in_splits, name in [*stratify, *((("splits", "undivided"), n) for n in spanned.splits.undivided)]:
+            _check_name(spanned, in_splits, name)
 
 
 def _check_dependent(spanned: Sequences) -> None:
     """What goes with another, or only where another has some value: that must be there, and come before."""
     ranged = {name_of(v): v for v in spanned.variations if isinstance(v, NumberVariation)}
-    listed = {name_of(entry) for place, entry in spanned.entries if place[0] == "grid"}
+    listed = {name_of(entry) for at, entry in spanned.entries if at[0] == "grid"}
     for i, variation in enumerate(spanned.variations):
         if variation.when is not None and variation.when.entry not in listed:
-            known = ", ".join(sorted(listed)) or "there are none"
+            names = ", ".join(sorted(listed)) or "there are none"
             raise FieldError(
                 ("variations", i, "when", "entry"),
-                f"'{variation.when.entry}' is no entry of the grid, nor a choice that comes before; known: {known}",
+                f"'{variation.when.entry}' is no entry of the grid, nor a choice that comes before; known: {names}",
             )
         if isinstance(variation, Choice):
             listed.add(name_of(variation))
@@ -60,8 +60,8 @@ def _check_dependent(spanned: Sequences) -> None:
 
 def _check_name(spanned: Sequences, at: Where, name: str) -> None:
     """A name must be that of an entry with values that several sequences can have."""
-    known = {name_of(e): isinstance(e, (Axis, Choice)) for _, e in spanned.entries}
-    if name not in known:
-        raise FieldError(at, f"'{name}' names nothing that varies; known: {', '.join(known) or 'nothing varies'}")
-    if not known[name]:
+    divides = {name_of(e): isinstance(e, (Axis, Choice)) for _, e in spanned.entries}
+    if name not in divides:
+        raise FieldError(at, f"'{name}' names nothing that varies; known: {', '.join(divides) or 'nothing varies'}")
+    if not divides[name]:
         raise FieldError(at, f"'{name}' has another value in each sequence: name an entry of the grid or a choice")

@@ -72,7 +72,7 @@ class Sequences:
     @property
     def entries(self) -> list[tuple[Where, Axis | Variation]]:
         """Everything that varies, and where it stands in the recipe."""
-        grid: list[tuple[Where, Axis | Variation]] = [(place, axis) for some in self._axes for place, axis, _ in some]
+        grid: list[tuple[Where, Axis | Variation]] = [(at, axis) for zipped in self._axes for at, axis, _ in zipped]
         return grid + [(("variations", i), variation) for i, variation in enumerate(self.variations)]
 
     @cached_property
@@ -84,8 +84,8 @@ class Sequences:
             for sequence in range(self.count):
                 value = (setting := self.settings(sequence)[varying]).value.value
                 if setting.paths and (type(value) is not int or not 1 <= value <= MOST_FRAMES):
-                    said = f"must be a whole number from 1 to {MOST_FRAMES}, not {value}"
-                    raise FieldError(setting.source, f"{FRAMES} {said}")
+                    problem = f"must be a whole number from 1 to {MOST_FRAMES}, not {value}"
+                    raise FieldError(setting.source, f"{FRAMES} {problem}")
                 frames[sequence] = value if setting.paths else frames[sequence]
         return frames
 
@@ -98,11 +98,11 @@ class Sequences:
         """Number of the value of each entry of the grid, and of the repeat. Raises IndexError."""
         if not 0 <= sequence < self.count:
             raise IndexError(f"sequence {sequence} is outside 0..{self.count - 1}")
-        found = []
+        numbers = []
         for size in reversed(self.sizes):
             sequence, n = divmod(sequence, size)
-            found.append(n)
-        return tuple(reversed(found))
+            numbers.append(n)
+        return tuple(reversed(numbers))
 
     def grid_settings(self, sequence: int) -> tuple[Setting, ...]:
         """The values of the grid point of a sequence."""
@@ -116,10 +116,10 @@ class Sequences:
 
     def drawn(self, sequence: int) -> tuple[Setting, ...]:
         """The values of the variations of a sequence."""
-        (of_point, repeat), dimension, found = self.repeat(sequence), 0, []
+        (of_point, repeat), dimension, settings = self.repeat(sequence), 0, []
         key = f"{of_point} {repeat}"
         paths = {name_of(variation): variation.path[0] for variation in self.variations}
-        held = {setting.name: setting.value for setting in self.grid_settings(sequence)}
+        values = {setting.name: setting.value for setting in self.grid_settings(sequence)}
         for i, variation in enumerate(self.variations):
             path = as_drawn(variation.path[0])
             if isinstance(variation, Sobol):
@@ -128,13 +128,13 @@ class Sequences:
             elif isinstance(variation, Choice):
                 value = variation.draw(self.seed, key, path)
             else:
-                other = None if variation.like is None else paths[variation.like]
-                value = variation.at(variation.share(self.seed, key, other))
-            applies = variation.when is None or _has(held[variation.when.entry], variation.when.value)
-            held[name_of(variation)] = value if applies else NOTHING
+                partner = None if variation.like is None else paths[variation.like]
+                value = variation.at(variation.share(self.seed, key, partner))
+            applies = variation.when is None or _has(values[variation.when.entry], variation.when.value)
+            values[name_of(variation)] = value if applies else NOTHING
             set_at = variation.path if applies else ()
-            found.append(Setting(("variations", i), name_of(variation), set_at, held[name_of(variation)]))
-        return tuple(found)
+            settings.append(Setting(("variations", i), name_of(variation), set_at, values[name_of(variation)]))
+        return tuple(settings)
 
     def settings(self, sequence: int) -> tuple[Setting, ...]:
         """Every value of a sequence, those of the grid first."""
@@ -146,10 +146,10 @@ class Sequences:
         for i, variation in enumerate(self.variations):
             if isinstance(variation, Choice):
                 continue
-            for part in (0.0, 1.0):
+            for fraction in (0.0, 1.0):
                 changed = list(settings)
                 old = settings[before + i]
-                changed[before + i] = Setting(old.source, old.name, old.paths, variation.at(part))
+                changed[before + i] = Setting(old.source, old.name, old.paths, variation.at(fraction))
                 try:
                     scene = with_settings(self.base, self._plain, changed)
                     yield self._drawn_in(scene, sequence).put_in(scene)
@@ -163,16 +163,16 @@ class Sequences:
     @cached_property
     def _mesh_speed(self) -> float | None:
         """Slowest sound speed (m/s) that any sequence assumes; None where all assume the same."""
-        some = [(place, entry) for place, entry in self.entries if ASSUMED_SPEED in entry.path]
-        if not some or self.base.sonar.mesh_sound_speed is not None:
+        setting_speed = [(at, entry) for at, entry in self.entries if ASSUMED_SPEED in entry.path]
+        if not setting_speed or self.base.sonar.mesh_sound_speed is not None:
             return None
-        ((place, entry),) = some
+        ((at, entry),) = setting_speed
         if isinstance(entry, Axis):
             values = entry.taken
         else:
             values = entry.values if isinstance(entry, Choice) else (entry.at(0.0),)
-        made = [[Setting(place, name_of(entry), (ASSUMED_SPEED,), value)] for value in values]
-        scenes = [self.base, *(with_settings(self.base, self._plain, one) for one in made)]
+        changes = [[Setting(at, name_of(entry), (ASSUMED_SPEED,), value)] for value in values]
+        scenes = [self.base, *(with_settings(self.base, self._plain, change) for change in changes)]
         return min(scene.sonar.assumed_sound_speed for scene in scenes)
 
     def scene(self, sequence: int) -> Scene:
@@ -226,8 +226,8 @@ class Sequences:
             "sequences": self.count,
             "frames_of_a_sequence": [int(self.steps.min()), int(self.steps.max())],
             "grid": [
-                {"names": [name_of(axis) for _, axis, _ in some], "values": size}
-                for some, size in zip(self._axes, self.sizes, strict=False)
+                {"names": [name_of(axis) for _, axis, _ in axes], "values": size}
+                for axes, size in zip(self._axes, self.sizes, strict=False)
             ],
             "repeats": self.repeats,
             "variations": [{"name": name_of(v), "kind": v.kind} for v in self.variations],
@@ -245,10 +245,10 @@ class Sequences:
                 raise
             settings = self.settings(sequence)
             blamed = [s for s in settings if any(_meet(where(path), error.path) for path in s.paths)]
-            said = ", ".join(s.shown for s in blamed or settings)
-            place = max(blamed, key=_closeness).source if blamed else error.path
-            field = "" if place == error.path else f"{'.'.join(map(str, error.path))}: "
-            raise FieldError(place, f"{field}{error.message} (sequence {sequence}: {said})") from None
+            shown = ", ".join(s.shown for s in blamed or settings)
+            at = max(blamed, key=_closeness).source if blamed else error.path
+            field = "" if at == error.path else f"{'.'.join(map(str, error.path))}: "
+            raise FieldError(at, f"{field}{error.message} (sequence {sequence}: {shown})") from None
 
 
 def name_of(entry: Axis | Variation) -> str:
@@ -263,8 +263,8 @@ def _closeness(setting: Setting) -> tuple[int, bool]:
 
 def _has(value: Plain, wanted: Plain) -> bool:
     """Whether an entry has a value, or one of that kind."""
-    held = value.value
-    return value == wanted or (isinstance(held, dict) and held.get("kind") == wanted.value)
+    content = value.value
+    return value == wanted or (isinstance(content, dict) and content.get("kind") == wanted.value)
 
 
 def _meet(a: Where, b: Where) -> bool:
@@ -292,9 +292,9 @@ def _bodies(sequences: Sequences, sequence: int) -> DrawnBodies:
 @lru_cache(maxsize=4096)
 def _point(sequences: Sequences, values: tuple[int, ...]) -> tuple[tuple[Setting, ...], str]:
     """What a point of the grid sets, and its key: the values as written, in whatever order they are entered."""
-    found = []
-    for some, n in zip(sequences._axes, values, strict=True):
-        for place, axis, taken in some:
-            at = (*place, "values", n) if axis.values is not None else place
-            found.append(Setting(at, name_of(axis), axis.path, taken[n]))
-    return tuple(found), json.dumps(sorted([[as_drawn(path) for path in s.paths], s.value.text] for s in found))
+    settings = []
+    for zipped, n in zip(sequences._axes, values, strict=True):
+        for source, axis, taken in zipped:
+            at = (*source, "values", n) if axis.values is not None else source
+            settings.append(Setting(at, name_of(axis), axis.path, taken[n]))
+    return tuple(settings), json.dumps(sorted([[as_drawn(path) for path in s.paths], s.value.text] for s in settings))

@@ -60,17 +60,17 @@ def assign(
     for number, group in enumerate(groups):
         members.setdefault(group, []).append(number)
     order = _strata_in_order(strata)
-    ranked = sorted(members.values(), key=lambda some: (order[strata[some[0]]], min(priority[n] for n in some)))
+    ranked = sorted(members.values(), key=lambda rows: (order[strata[rows[0]]], min(priority[n] for n in rows)))
     used = [i for i, share in enumerate(shares) if share > 0.0]
     slack = 1.0 / (2 * len(used) - 2) if len(used) > 1 else 0.0
     split, taken, passed = np.zeros(len(groups), np.int64), dict.fromkeys(used, 0), 0
-    for some in ranked:
-        passed += len(some)
+    for rows in ranked:
+        passed += len(rows)
         late = {i: shares[i] * passed - taken[i] for i in used}
         ready = [i for i in used if late[i] >= slack] or [max(used, key=lambda i: late[i])]
         chosen = min(ready, key=lambda i: (1.0 - slack - late[i]) / shares[i])
-        split[some] = chosen
-        taken[chosen] += len(some)
+        split[rows] = chosen
+        taken[chosen] += len(rows)
     return split
 
 

@@ -37,24 +37,24 @@ def columns(sequences: Sequences) -> tuple[Column, ...]:
         return ()
     entries, count = sequences.entries, sequences.count
     table = list(zip(*([s.value for s in sequences.settings(n)] for n in range(count)), strict=True))
-    made = [_column(sequences, entry, values) for (_, entry), values in zip(entries, table, strict=True)]
+    columns_of_entries = [_column(sequences, entry, values) for (_, entry), values in zip(entries, table, strict=True)]
     if sequences.repeats > 1:
         repeat = np.arange(count) % sequences.repeats
         attributes = {"units": "1", "long_name": "number of the sequence of its point of the grid"}
-        made.append(Column("repeat", repeat.astype(np.int32), attributes))
-    return tuple(made)
+        columns_of_entries.append(Column("repeat", repeat.astype(np.int32), attributes))
+    return tuple(columns_of_entries)
 
 
 def _column(sequences: Sequences, entry: Axis | Variation, values: Sequence[Plain]) -> Column:
     path = entry.path[0]
     listed = entry.taken if isinstance(entry, Axis) else entry.values if isinstance(entry, Choice) else ()
-    there = next((n for n, value in enumerate(values) if value != NOTHING), None)
+    applying = next((n for n, plain in enumerate(values) if plain != NOTHING), None)
     unit: Unit | None = None
-    found: Any = 0.0
-    if there is not None:
-        scene = sequences.described(there)
-        unit, found = unit_at(scene, path), value_at(scene, path)
-    numeric = isinstance(found, (int, float)) and not isinstance(found, bool)
+    value: Any = 0.0
+    if applying is not None:
+        scene = sequences.described(applying)
+        unit, value = unit_at(scene, path), value_at(scene, path)
+    numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
     parsed = {v: _number(v, unit) for v in set(values) | set(listed) if v != NOTHING} if numeric else {}
     long_name = ", ".join(entry.path)
     if numeric and None not in parsed.values():
@@ -63,7 +63,7 @@ def _column(sequences: Sequences, entry: Axis | Variation, values: Sequence[Plai
         if symbol.startswith("rad"):
             array = np.rad2deg(array)
         return Column(name_of(entry), array, {"units": UDUNITS.get(symbol, symbol), "long_name": long_name})
-    order = {value: n for n, value in enumerate(listed or (v for v in dict.fromkeys(values) if v != NOTHING))}
+    order = {plain: n for n, plain in enumerate(listed or (v for v in dict.fromkeys(values) if v != NOTHING))}
     attributes = {
         "units": "1",
         "long_name": long_name,

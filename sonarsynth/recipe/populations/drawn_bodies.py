@@ -72,8 +72,8 @@ class _MovingBox:
     def gap(self, other: _Ball) -> float:
         """Least distance (m) to a sphere at any time."""
         apart = np.inf
-        for there, centre in zip(self.poses, other.centre, strict=True):
-            local = there.to_body(centre)
+        for at_time, centre in zip(self.poses, other.centre, strict=True):
+            local = at_time.to_body(centre)
             outside = np.maximum(np.maximum(self.box[0] - local, local - self.box[1]), 0.0)
             apart = min(apart, float(np.linalg.norm(outside)))
         return apart - other.radius
@@ -85,13 +85,13 @@ def draw(scene: Scene, seed: int, key: int | str, repeat: tuple[str, int]) -> Dr
     repeat: its grid point, and which repeat of that it is. Raises FieldError where a population has no room.
     """
     sea = _Sea.of(scene, seed, key)
-    found: list[Target] = []
+    bodies: list[Target] = []
     tried = 0
-    for place, population in enumerate(scene.world.populations):
+    for index, population in enumerate(scene.world.populations):
         base = number(seed, "population", key, population.name)
-        even = _Even.of(scene, place, seed, repeat) if population.sobol else None
-        part = even.count if even is not None else share(seed, "population", key, population.name, "count")
-        count = _count(population, part)
+        even = _Even.of(scene, index, seed, repeat) if population.sobol else None
+        fraction = even.count if even is not None else share(seed, "population", key, population.name, "count")
+        count = _count(population, fraction)
         for slot in range(count):
             for attempt in range(TRIES):
                 tried += 1
@@ -100,15 +100,15 @@ def draw(scene: Scene, seed: int, key: int | str, repeat: tuple[str, int]) -> Dr
                     draws = even.of_body(slot)
                 target = sea.tried(population, slot, draws)
                 if target is not None:
-                    found.append(target)
+                    bodies.append(target)
                     break
             else:
                 raise FieldError(
-                    ("scene", "world", "populations", place),
+                    ("scene", "world", "populations", index),
                     f"no room for body {slot + 1} of {count} in {TRIES} tries: it needs a larger region, or fewer or "
                     "smaller bodies",
                 )
-    return DrawnBodies(tuple(found), tried)
+    return DrawnBodies(tuple(bodies), tried)
 
 
 @dataclass(frozen=True)
@@ -121,10 +121,10 @@ class _Even:
     first: int  # dimension
 
     @classmethod
-    def of(cls, scene: Scene, place: int, seed: int, repeat: tuple[str, int]) -> _Even:
-        """Of population number `place`: one that is added after it changes nothing."""
-        before = sum(1 + OF_BODY * other.most for other in scene.world.populations[:place] if other.sobol)
-        return cls(seed, repeat, scene.world.populations[place].name, OF_VARIATIONS + before)
+    def of(cls, scene: Scene, index: int, seed: int, repeat: tuple[str, int]) -> _Even:
+        """Of population number `index`: one that is added after it changes nothing."""
+        before = sum(1 + OF_BODY * earlier.most for earlier in scene.world.populations[:index] if earlier.sobol)
+        return cls(seed, repeat, scene.world.populations[index].name, OF_VARIATIONS + before)
 
     @property
     def count(self) -> float:
@@ -140,10 +140,10 @@ class _Even:
         return sobol_shares(self.seed, f"{point} populations", names, first, repeat)
 
 
-def _count(population: Population, part: float) -> int:
+def _count(population: Population, fraction: float) -> int:
     weights = population.weights or np.ones(population.most - population.least + 1)
     bounds = np.cumsum(weights)
-    return population.least + int(np.searchsorted(bounds, part * bounds[-1], side="right"))
+    return population.least + int(np.searchsorted(bounds, fraction * bounds[-1], side="right"))
 
 
 class _Sea:
@@ -169,26 +169,26 @@ class _Sea:
                 source.emissions(bottom, stream(seed, "snap", key, step, i), t)
                 for step, t in zip(steps, times.tolist(), strict=True)
             ]
-            for each in zip(*snaps, strict=False):
-                others.append(_Ball(np.array([snap.position for snap in each]), 0.0))
+            for same_source in zip(*snaps, strict=False):
+                others.append(_Ball(np.array([snap.position for snap in same_source]), 0.0))
         for target, mesh in zip(scene.world.targets, scene.meshes, strict=True):
             others.append(_MovingBox(tuple(pose(target.motion, t) for t in times), mesh.box))
         return cls(scene, times, others)
 
     def tried(self, population: Population, slot: int, draws: Floats) -> Target | None:
         """The body that draws make, and it is in the water from now on; None where it does not fit."""
-        where = population.region.place(draws[:3], self.view)
-        if where is None:
+        position = population.region.place(draws[:3], self.view)
+        if position is None:
             return None
         weights = np.cumsum([model.weight for model in population.models])
         model = population.models[int(np.searchsorted(weights, draws[-1] * weights[-1], side="right"))]
         smallest, largest = model.scale
         attitude = population.orientation.attitude(draws[3:6])
-        made = population.track.motion(where, attitude, self.span, draws[6 : 6 + DRAWS])
+        motion = population.track.motion(position, attitude, self.span, draws[6 : 6 + DRAWS])
         target = Target(
             name=population.slots[slot],
             shape=model.shape,
-            motion=made,
+            motion=motion,
             scattering=model.scattering,
             category=model.category or population.name,
             clutter=population.clutter,
@@ -199,11 +199,11 @@ class _Sea:
         mesh = target.base_mesh(law, self.scene.sonar.shortest_wavelength)
         hull = target.scale * hull_of(mesh)
         if population.on_bottom:
-            lowest = float(pose(made, self.span.middle).to_world(hull)[:, 2].min())
-            where = where - [0.0, 0.0, lowest + self.scene.world.environment.depth - ABOVE_BOTTOM]
-            made = population.track.motion(where, attitude, self.span, draws[6 : 6 + DRAWS])
-            target = replace(target, motion=made)
-        poses = [pose(made, t) for t in self.times.tolist()]
+            lowest = float(pose(motion, self.span.middle).to_world(hull)[:, 2].min())
+            position = position - [0.0, 0.0, lowest + self.scene.world.environment.depth - ABOVE_BOTTOM]
+            motion = population.track.motion(position, attitude, self.span, draws[6 : 6 + DRAWS])
+            target = replace(target, motion=motion)
+        poses = [pose(motion, t) for t in self.times.tolist()]
         ball = _round(mesh, target.scale, poses)
         apart = population.apart
         if not self._in_water(hull, poses) or any(other.gap(ball) < apart for other in self.others):
@@ -213,14 +213,14 @@ class _Sea:
 
     def _in_water(self, hull: Floats, poses: list[Pose]) -> bool:
         bottom = -self.scene.world.environment.depth
-        heights = [there.to_world(hull)[:, 2] for there in poses]
+        heights = [at_time.to_world(hull)[:, 2] for at_time in poses]
         return all(float(z.min()) > bottom and float(z.max()) < 0.0 for z in heights)
 
 
 def _round(mesh: Mesh, scale: float, poses: list[Pose]) -> _Ball:
     """The sphere round the box of a body at some times."""
     low, high = scale * mesh.box
-    centre = np.array([there.to_world(0.5 * (low + high)) for there in poses])
+    centre = np.array([at_time.to_world(0.5 * (low + high)) for at_time in poses])
     return _Ball(centre, 0.5 * float(np.linalg.norm(high - low)))
 
 

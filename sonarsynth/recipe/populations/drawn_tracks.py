@@ -40,9 +40,9 @@ class SequenceTimes:
         return 0.5 * (self.first + self.last)
 
 
-def between(bounds: tuple[float, float], part: float) -> float:
-    """The value at this part (0 to 1) of the way from the first to the second."""
-    return float(bounds[0] + (bounds[1] - bounds[0]) * part)
+def between(bounds: tuple[float, float], fraction: float) -> float:
+    """The value at this fraction (0 to 1) of the way from the first to the second."""
+    return float(bounds[0] + (bounds[1] - bounds[0]) * fraction)
 
 
 def _ascending(bounds: tuple[float, float]) -> tuple[float, float]:
@@ -99,9 +99,9 @@ class AtRest:
 
     kind: Literal["at_rest"] = "at_rest"
 
-    def motion(self, place: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
-        """Through a place (xyz) m, in the middle of the sequence; draws: (`DRAWS`,) 0 to 1."""
-        return Still(position=_position(place), **vars(attitude))
+    def motion(self, point: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
+        """Through a point (xyz) m, in the middle of the sequence; draws: (`DRAWS`,) 0 to 1."""
+        return Still(position=_position(point), **vars(attitude))
 
 
 @description
@@ -114,11 +114,11 @@ class StraightAhead(_Ranges):
     climb: tuple[MetresPerSecond, MetresPerSecond] = (0.0, 0.0)
     """How fast they rise; they stay level."""
 
-    def motion(self, place: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
+    def motion(self, point: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
         """As `AtRest.motion`."""
         speed, climb = between(self.speed, draws[0]), between(self.climb, draws[1])
         course = ConstantVelocity(start=(0.0, 0.0, 0.0), speed=speed, climb=climb, **vars(attitude))
-        return replace(course, start=_position(place - velocity(course, 0.0) * span.middle))
+        return replace(course, start=_position(point - velocity(course, 0.0) * span.middle))
 
 
 @description
@@ -137,10 +137,10 @@ class Hovering(_Ranges):
     period: tuple[PositiveSeconds, PositiveSeconds] = (5.0, 10.0)
     """Of the swing, the same for all of a body's."""
 
-    def motion(self, place: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
-        """As `AtRest.motion`, about the place."""
+    def motion(self, point: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
+        """As `AtRest.motion`, about the point."""
         return Hover(
-            position=_position(place),
+            position=_position(point),
             heading=attitude.heading,
             pitch=attitude.pitch,
             roll=attitude.roll,
@@ -165,25 +165,25 @@ class Wandering(_Ranges):
     turn: Annotated[Radians, Ge(0), Le(np.pi)]
     """By how much headings change from leg to leg, at most, to either side."""
 
-    def motion(self, place: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
+    def motion(self, point: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
         """As `AtRest.motion`."""
         speed = between(self.speed, draws[0])
-        legs = int(min(max(np.ceil((span.last - span.first) / self.leg), 1), 1000))
-        turns = np.random.default_rng(int(draws[1] * 2**53)).uniform(-self.turn, self.turn, legs)
+        count = int(min(max(np.ceil((span.last - span.first) / self.leg), 1), 1000))
+        turns = np.random.default_rng(int(draws[1] * 2**53)).uniform(-self.turn, self.turn, count)
         headings = attitude.heading + np.concatenate([[0.0], np.cumsum(turns)[:-1]])
-        steps = speed * self.leg * np.stack([np.sin(headings), np.cos(headings), np.zeros(legs)], axis=1)
+        steps = speed * self.leg * np.stack([np.sin(headings), np.cos(headings), np.zeros(count)], axis=1)
         points = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-        times = span.first + self.leg * np.arange(legs + 1)
+        times = span.first + self.leg * np.arange(count + 1)
         middle = [np.interp(span.middle, times, column) for column in points.T]
-        made = tuple(
-            Waypoint(time=float(t), position=_position(p)) for t, p in zip(times, place + points - middle, strict=True)
+        path = tuple(
+            Waypoint(time=float(t), position=_position(p)) for t, p in zip(times, point + points - middle, strict=True)
         )
-        return Waypoints(points=made, pitch=attitude.pitch, roll=attitude.roll)
+        return Waypoints(points=path, pitch=attitude.pitch, roll=attitude.roll)
 
 
 DrawnTrack = Annotated[AtRest | StraightAhead | Hovering | Wandering, BY_KIND]
 
 
-def _position(place: Floats) -> tuple[float, float, float]:
-    x, y, z = place.tolist()
+def _position(xyz: Floats) -> tuple[float, float, float]:
+    x, y, z = xyz.tolist()
     return x, y, z

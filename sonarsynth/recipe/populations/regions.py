@@ -137,8 +137,8 @@ class PolygonRegion:
 Region = Annotated[FieldOfView | BoxRegion | Annulus | PolygonRegion, BY_KIND]
 
 
-def _between(bounds: tuple[float, float], part: float) -> float:
-    return float(bounds[0] + (bounds[1] - bounds[0]) * part)
+def _between(bounds: tuple[float, float], fraction: float) -> float:
+    return float(bounds[0] + (bounds[1] - bounds[0]) * fraction)
 
 
 def _check_heights(heights: Heights) -> None:

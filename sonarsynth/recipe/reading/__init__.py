@@ -154,12 +154,12 @@ def _resolved(source: Source, data: Any, where: Where, check: bool) -> Any:
         return data
     path = data.get("path")
     if isinstance(path, str) and any(data.get("kind") == kind for kind in FILE_KINDS):
-        place = (*where, "path")
-        folder = Path.cwd() if source.place(place) == SET else source.folder
+        field = (*where, "path")
+        folder = Path.cwd() if source.place(field) == SET else source.folder
         file = Path(path) if Path(path).is_absolute() else folder / path
         if check:
-            _check_place(source, place, path)
-            _check_file(source, place, path, folder)
+            _check_place(source, field, path)
+            _check_file(source, field, path, folder)
         return data | {"path": path if Path(path).is_absolute() else str(file)}
     return {key: _resolved(source, value, (*where, key), check) for key, value in data.items()}
 
@@ -167,12 +167,12 @@ def _resolved(source: Source, data: Any, where: Where, check: bool) -> Any:
 def _check_file(source: Source, where: Where, path: str, folder: Path) -> None:
     file = folder / path
     try:
-        found, there = file.exists(), file.is_file()
+        exists, is_file = file.exists(), file.is_file()
     except (OSError, ValueError):  # too long, or a NUL byte
         raise source.error(where, "is not the path of a file") from None
-    if not found:
+    if not exists:
         raise source.error(where, f"no such file: {path}" + ("" if Path(path).is_absolute() else f", in {folder}"))
-    if not there:
+    if not is_file:
         raise source.error(where, f"is not a file: {path or file}")
 
 

@@ -34,43 +34,43 @@ def schema() -> dict[str, Any]:
         A schema of draft 2020-12: titles, descriptions, kinds, defaults, bounds, the unit of each number (`x-unit`, and
         in the text) and an example of it. The same is the file `recipe.schema.json` beside the shipped recipes.
     """
-    found = schema_of(Recipe)
-    for owner in (found, *found["$defs"].values()):
+    recipe_schema = schema_of(Recipe)
+    for owner in (recipe_schema, *recipe_schema["$defs"].values()):
         for field in owner.get("properties", {}).values():
             _exemplify(field)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **recipe_schema}
 
 
 def schema_text() -> str:
     """The schema as the text of a file: a line for each description, so that a change of one changes one line."""
-    found = schema()
-    definitions = found.pop("$defs")
+    whole_schema = schema()
+    definitions = whole_schema.pop("$defs")
     lines = [f"{json.dumps(name)}:{_packed(value)}" for name, value in definitions.items()]
-    return _packed(found)[:-1] + ',"$defs":{\n' + ",\n".join(lines) + "\n}}\n"
+    return _packed(whole_schema)[:-1] + ',"$defs":{\n' + ",\n".join(lines) + "\n}}\n"
 
 
 def _packed(value: Any) -> str:
     return json.dumps(_whole(value), separators=(",", ":"), ensure_ascii=False)
 
 
-def _whole(part: Any) -> Any:
+def _whole(node: Any) -> Any:
     """Whole numbers without a point: of equal bounds, 1000 and 1000.0, `Annotated` gives the one that came first."""
-    if isinstance(part, dict):
-        return {key: _whole(value) for key, value in part.items()}
-    if isinstance(part, (list, tuple)):
-        return [_whole(value) for value in part]
-    return int(part) if isinstance(part, float) and part.is_integer() else part
+    if isinstance(node, dict):
+        return {key: _whole(value) for key, value in node.items()}
+    if isinstance(node, (list, tuple)):
+        return [_whole(value) for value in node]
+    return int(node) if isinstance(node, float) and node.is_integer() else node
 
 
 def _exemplify(field: dict[str, Any]) -> None:
     """Give a field its unit in words, and an example."""
-    number = next((part for part in (field, *field.get("anyOf", ())) if "x-unit" in part), field)
-    parts = field.get("prefixItems", [number | {"default": field.get("default")}])
-    examples = [_example(part) for part in parts]
+    number = next((item for item in (field, *field.get("anyOf", ())) if "x-unit" in item), field)
+    items = field.get("prefixItems", [number | {"default": field.get("default")}])
+    examples = [_example(item) for item in items]
     if None in examples:
         return
     example: Any = examples if "prefixItems" in field else examples[0]
-    units = ", ".join(part["x-unit"].replace("rad", "deg") for part in parts)
+    units = ", ".join(item["x-unit"].replace("rad", "deg") for item in items)
     shown = f"[{', '.join(map(str, examples))}]" if "prefixItems" in field else example
     field["description"] = f"{field.get('description', '')} ({units}, such as {shown})".strip()
     field["examples"] = [example]
@@ -91,7 +91,7 @@ def _example(field: dict[str, Any]) -> str | None:
 
 def _takes(field: dict[str, Any], number: float) -> bool:
     """Whether a number is within the bounds of a field."""
-    (bounds, *_) = (part for part in (*field.get("anyOf", ()), {}) if part.get("type") != "string")
+    (bounds, *_) = (alternative for alternative in (*field.get("anyOf", ()), {}) if alternative.get("type") != "string")
     return bool(
         bounds.get("minimum", number) <= number <= bounds.get("maximum", number)
         and number > bounds.get("exclusiveMinimum", float("-inf"))

@@ -16,22 +16,22 @@ from sonarsynth.targets.target import NAME
 
 def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
     """The first error of a validation, with its place in the file, and how many more there are."""
-    found: dict[Where, str] = {}
+    texts: dict[Where, str] = {}
     for details in error.errors(include_url=False):
         where = _where(details, source.data)
         where, message = _message(details, where, root, source.data)
-        if details["type"] == "dataclass_type" and (found.get(where) or "").startswith("must be '"):
-            found[where] = found[where].replace("' or '", "', '").replace(", not ", " or a mapping, not ", 1)
-        found.setdefault(where, message)
-    words = {where for where, text in found.items() if text.startswith("must be '") and text.endswith("not a mapping")}
+        if details["type"] == "dataclass_type" and (texts.get(where) or "").startswith("must be '"):
+            texts[where] = texts[where].replace("' or '", "', '").replace(", not ", " or a mapping, not ", 1)
+        texts.setdefault(where, message)
+    words = {where for where, text in texts.items() if text.startswith("must be '") and text.endswith("not a mapping")}
     for where in words:  # of a word or a mapping, it is the mapping that was meant
-        if any(len(other) > len(where) and other[: len(where)] == where for other in found):
-            del found[where]
-    guessed = [item for item in found.items() if "did you mean" in item[1]]  # a misspelt field explains a missing one
-    where, message = next(iter(found.items()))
+        if any(len(longer) > len(where) and longer[: len(where)] == where for longer in texts):
+            del texts[where]
+    guessed = [item for item in texts.items() if "did you mean" in item[1]]  # a misspelt field explains a missing one
+    where, message = next(iter(texts.items()))
     if guessed and message == "is required":
         where, message = guessed[0]
-    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    more = f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
     return source.error(where, message + _of_another_kind(where, source) + more)
 
 
@@ -41,22 +41,22 @@ def _of_another_kind(where: Where, source: Source) -> str:
     if not where or where[-1] == "kind" or source.places.get(kind) != SET or source.places.get(where, SET) == SET:
         return ""
     holder = source.data
-    for part in where[:-1]:
-        holder = holder[part]
+    for key in where[:-1]:
+        holder = holder[key]
     return f"; to replace all fields: --set {dotted(where[:-1])}='{{kind: {holder['kind']}}}'"
 
 
 def _where(details: ErrorDetails, data: Any) -> Where:
     """The path of an error in the file: pydantic's, without the parts that name members of unions."""
     path: list[str | int] = []
-    parts = details["loc"]
-    for n, part in enumerate(parts):
-        named = isinstance(data, dict) and part in data and data.get("kind") != part
-        if named or (isinstance(data, list) and isinstance(part, int) and part < len(data)):
-            data = data[part]
-        elif not (details["type"] == "missing" and n == len(parts) - 1):
+    keys = details["loc"]
+    for n, key in enumerate(keys):
+        named = isinstance(data, dict) and key in data and data.get("kind") != key
+        if named or (isinstance(data, list) and isinstance(key, int) and key < len(data)):
+            data = data[key]
+        elif not (details["type"] == "missing" and n == len(keys) - 1):
             continue
-        path.append(part)
+        path.append(key)
     return tuple(path)
 
 
@@ -95,10 +95,10 @@ def _text(details: ErrorDetails) -> str:
     return f"{text[0].lower()}{text[1:]}, not {value}"
 
 
-def _unknown(name: str, known: list[str], what: str = "field") -> str:
+def _unknown(name: str, known: list[str], noun: str = "field") -> str:
     close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(known)}"
-    return f"'{name}' is not a {what} here; {hint}"
+    return f"'{name}' is not a {noun} here; {hint}"
 
 
 def _shown(value: Any) -> str:
@@ -122,21 +122,21 @@ def _fields(cls: type | None) -> list[str]:
 def _class_at(root: Any, where: Where, data: Any) -> type | None:
     """The description that a path leads to; None where it leads elsewhere."""
     kind = _type_at(root, where, data)
-    for part in where:
-        data = data[part]
+    for key in where:
+        data = data[key]
     chosen = _chosen(kind, data)
     return chosen if isinstance(chosen, type) and is_dataclass(chosen) else None
 
 
 def _type_at(kind: Any, where: Where, data: Any) -> Any:
     """The annotation of what a path leads to, choosing members of unions by the `kind` in the data."""
-    for part in where:
-        kind, data = _chosen(kind, data), data[part]
+    for key in where:
+        kind, data = _chosen(kind, data), data[key]
         if get_origin(kind) is tuple:
             members = get_args(kind)
-            kind = members[0] if members[-1] is Ellipsis else members[min(int(part), len(members) - 1)]
+            kind = members[0] if members[-1] is Ellipsis else members[min(int(key), len(members) - 1)]
         else:
-            field = getattr(kind, "__pydantic_fields__", {}).get(part)
+            field = getattr(kind, "__pydantic_fields__", {}).get(key)
             kind = None if field is None else field.annotation
     return kind
 
@@ -170,5 +170,5 @@ def _chosen(kind: Any, data: Any) -> Any:
     if isinstance(data, dict) and tag is None and len(tagged) == 1:  # the kind of the only one may be left out
         return tagged[0]
     fitting = [m for m in members if _tag(m) == tag and hasattr(m, "__pydantic_fields__")]
-    given = set(data) if isinstance(data, dict) else set()
-    return max(fitting, key=lambda m: len(given & set(_fields(m))), default=None)
+    names = set(data) if isinstance(data, dict) else set()
+    return max(fitting, key=lambda m: len(names & set(_fields(m))), default=None)

@@ -26,14 +26,14 @@ def with_models(source: Source) -> Source:
         populations = populations.get(key) if isinstance(populations, dict) else None
     if not isinstance(populations, list):
         return source
-    made, scene = [], source.data["scene"]
+    with_tables_read, scene = [], source.data["scene"]
     for number, population in enumerate(populations):
         models = population.get("models") if isinstance(population, dict) else None
         if isinstance(models, dict) and isinstance(models.get("table"), str):
-            made.append(population | {"models": _listed(source, (*where, number, "models"), models)})
+            with_tables_read.append(population | {"models": _listed(source, (*where, number, "models"), models)})
         else:
-            made.append(population)
-    world = scene["world"] | {"populations": made}
+            with_tables_read.append(population)
+    world = scene["world"] | {"populations": with_tables_read}
     return replace(source, data=source.data | {"scene": scene | {"world": world}})
 
 
@@ -48,17 +48,17 @@ def _listed(source: Source, where: Where, models: dict[str, Any]) -> list[dict[s
     columns = [column.strip() for column in rows.fieldnames or []]
     unknown = [column for column in columns if column not in COLUMNS]
     if unknown or "file" not in columns:
-        said = f"'{unknown[0]}' is no column" if unknown else "has no column 'file'"
-        raise source.error(at, f"{name}: {said}; known: {', '.join(COLUMNS)}")
+        problem = f"'{unknown[0]}' is no column" if unknown else "has no column 'file'"
+        raise source.error(at, f"{name}: {problem}; known: {', '.join(COLUMNS)}")
     rows.fieldnames = columns
-    found = []
+    listed = []
     for row in rows:
         if None in row or None in row.values():
             raise source.error(at, f"{name}: line {rows.line_num}: must have {len(columns)} values")
-        found.append(_model(PurePosixPath(name).parent, {column: str(v).strip() for column, v in row.items()}))
-    if not found:
+        listed.append(_model(PurePosixPath(name).parent, {column: str(v).strip() for column, v in row.items()}))
+    if not listed:
         raise source.error(at, f"{name}: lists no model")
-    return found
+    return listed
 
 
 def _text(source: Source, at: Where, name: str) -> str:

@@ -48,7 +48,7 @@ def with_new_keys(source: Source) -> Source:
         data = _changed(data, (block,), partial(_new_paths, notes))
     if data is source.data:
         return source
-    places = {new_path(where): place for where, place in source.places.items()}
+    places = {new_path(where): line for where, line in source.places.items()}
     return replace(source, data=data, places=places, notes=tuple(dict.fromkeys(notes)))
 
 
@@ -63,7 +63,7 @@ def _with_kinds(sources: Any) -> Any:
     """Sources of a recipe of before they had kinds: all were shrimp."""
     if not isinstance(sources, list):
         return sources
-    return [{"kind": "snapping_shrimp"} | one if isinstance(one, dict) else one for one in sources]
+    return [{"kind": "snapping_shrimp"} | source if isinstance(source, dict) else source for source in sources]
 
 
 def _with_picking(notes: list[str], processing: dict[str, Any]) -> dict[str, Any]:
@@ -72,10 +72,10 @@ def _with_picking(notes: list[str], processing: dict[str, Any]) -> dict[str, Any
     if not isinstance(placing, dict):
         return processing
     picking = {name: placing[name] for name in ("threshold", "locality") if name in placing}
-    left = {name: value for name, value in placing.items() if name not in ("threshold", "locality", "focus")}
+    remaining = {name: value for name, value in placing.items() if name not in ("threshold", "locality", "focus")}
     if "focus" in placing:
         notes.append("scene.processing.ranging.focus is not used: echoes are picked from the beams of the beamformer")
-    changed = processing | {"placing": left}
+    changed = processing | {"placing": remaining}
     if picking and "picking" not in processing:
         notes.append("scene.processing.ranging's threshold and locality are those of picking: {kind: beam_axis} now")
         changed["picking"] = {"kind": "beam_axis"} | picking
@@ -86,22 +86,22 @@ def _sensors(value: Any) -> Any:
     return "sensors" if value == "hydrophones" else value
 
 
-def _new_paths(notes: list[str], part: Any) -> Any:
+def _new_paths(notes: list[str], node: Any) -> Any:
     """Axes of a grid, or variations, with the paths of what they change."""
-    if isinstance(part, list):
-        return [_new_paths(notes, one) for one in part]
-    if not isinstance(part, dict):
-        return part
+    if isinstance(node, list):
+        return [_new_paths(notes, item) for item in node]
+    if not isinstance(node, dict):
+        return node
     changed = {}
-    for key, value in part.items():
+    for key, value in node.items():
         if key != "path":
             changed[key] = _new_paths(notes, value)
             continue
-        one = [value] if isinstance(value, str) else value
-        if not isinstance(one, list) or not all(isinstance(path, str) for path in one):
-            return part  # which is for the schema to refuse
-        paths = [_new_text(path) for path in one]
-        notes.extend(_note(a, b) for a, b in zip(one, paths, strict=True) if a != b)
+        item = [value] if isinstance(value, str) else value
+        if not isinstance(item, list) or not all(isinstance(path, str) for path in item):
+            return node  # which is for the schema to refuse
+        paths = [_new_text(path) for path in item]
+        notes.extend(_note(a, b) for a, b in zip(item, paths, strict=True) if a != b)
         changed[key] = paths[0] if isinstance(value, str) else paths
     return changed
 

@@ -38,7 +38,7 @@ class RecipeError(ValueError):
         self.file, self.place, self.field = file, place, field
         self.message = " ".join(message.split())
         head = f"{file}:{place}" if place else file
-        super().__init__(": ".join(part for part in (head, field, self.message) if part))
+        super().__init__(": ".join(text for text in (head, field, self.message) if text))
 
     def __reduce__(self) -> tuple[type[RecipeError], tuple[str, str, str, str]]:
         return type(self), (self.file, self.place, self.field, self.message)
@@ -136,15 +136,15 @@ def _replaced(source: Source, data: Any, where: Where, depth: int, value: Any) -
     """`data` with the value at where[depth:] replaced; mappings on the way are made where there are none."""
     if depth == len(where):
         return value
-    part = where[depth]
+    key = where[depth]
     if isinstance(data, list):
-        if not isinstance(part, int) or part >= len(data):
-            raise RecipeError(source.name, SET, dotted(where), f"'{part}' is not one of the {len(data)} entries from 0")
-        return [_replaced(source, v, where, depth + 1, value) if i == part else v for i, v in enumerate(data)]
+        if not isinstance(key, int) or key >= len(data):
+            raise RecipeError(source.name, SET, dotted(where), f"'{key}' is not one of the {len(data)} entries from 0")
+        return [_replaced(source, v, where, depth + 1, value) if i == key else v for i, v in enumerate(data)]
     if data is None or isinstance(data, dict):
         data = data or {}
-        key = str(part)
-        return data | {key: _replaced(source, data.get(key), where, depth + 1, value)}
+        text = str(key)
+        return data | {text: _replaced(source, data.get(text), where, depth + 1, value)}
     raise RecipeError(source.name, SET, dotted(where), f"'{dotted(where[:depth])}' has no fields")
 
 
@@ -229,15 +229,15 @@ class _Reader:
         raise self.error(node, where, f"has the tag {node.tag}; tags are not used in recipes")
 
     def _items(self, node: MappingNode, where: Where) -> Iterator[tuple[str, Node, Node]]:
-        seen: set[str] = set()
+        keys: set[str] = set()
         for key, value in node.value:
             if not isinstance(key, ScalarNode):
                 raise self.error(key, where, "a key must be a text")
             if not _is_text(key.value):
                 raise self.error(key, where, "a key holds half a character (a surrogate)")
-            if key.value in seen:
+            if key.value in keys:
                 raise self.error(key, (*where, key.value), "is given twice")
-            seen.add(key.value)
+            keys.add(key.value)
             yield str(key.value), key, value
 
     def _scalar(self, node: ScalarNode, where: Where) -> Any:

@@ -48,11 +48,11 @@ class Axis:
     def _check(self) -> Axis:
         ranged = (self.first, self.last, self.step, self.count)
         if self.values is not None:
-            if any(part is not None for part in ranged):
+            if any(field is not None for field in ranged):
                 raise ValueError("has values and a range: give one")
-            seen: dict[str, int] = {}
+            first_of: dict[str, int] = {}
             for i, value in enumerate(self.values):
-                if seen.setdefault(value.text, i) != i:
+                if first_of.setdefault(value.text, i) != i:
                     raise ValueError(f"value {value.shown} is given twice: use repeats for more sequences of a value")
             return self
         if self.first is None or self.last is None or (self.step is None) == (self.count is None):
@@ -72,8 +72,8 @@ class Axis:
         if self.values is not None:
             return self.values
         unit = number_and_unit(self.first or 0.0)[1]
-        whole = not unit and all(isinstance(part, int) for part in (self.first, self.last, self.step))
-        return tuple(Plain.of(round(n)) if whole else with_unit(n, unit) for n in _numbers(self))
+        integers = not unit and all(isinstance(field, int) for field in (self.first, self.last, self.step))
+        return tuple(Plain.of(round(n)) if integers else with_unit(n, unit) for n in _numbers(self))
 
 
 def _numbers(axis: Axis) -> list[float]:

@@ -35,11 +35,11 @@ def mesh_number(sequences: Sequences, scene: Scene, target: int) -> int:
 def _found(sequences: Sequences) -> tuple[dict[str, tuple[Mesh, ...]], dict[str, dict[str, int]]]:
     """Meshes of each group, and their numbers by their digests."""
     scene = sequences.described(0)
-    kept = {target.name: _of_target(sequences, n) for n, target in enumerate(scene.world.targets)}
-    for place, population in enumerate(scene.world.populations):
-        kept[population.name] = tuple(_of_model(scene, place, n) for n in range(len(population.models)))
-    alone = {name: tuple({mesh.digest: mesh for mesh in some}.values()) for name, some in kept.items()}
-    return alone, {name: {mesh.digest: n for n, mesh in enumerate(some)} for name, some in alone.items()}
+    meshes = {target.name: _of_target(sequences, n) for n, target in enumerate(scene.world.targets)}
+    for index, population in enumerate(scene.world.populations):
+        meshes[population.name] = tuple(_of_model(scene, index, n) for n in range(len(population.models)))
+    alone = {name: tuple({mesh.digest: mesh for mesh in variants}.values()) for name, variants in meshes.items()}
+    return alone, {name: {mesh.digest: n for n, mesh in enumerate(variants)} for name, variants in alone.items()}
 
 
 def _of_target(sequences: Sequences, target: int) -> tuple[Mesh, ...]:
@@ -47,32 +47,32 @@ def _of_target(sequences: Sequences, target: int) -> tuple[Mesh, ...]:
     shaping = _shaping(sequences, target)
     if not shaping:
         return (_mesh(sequences, 0, target),)
-    found: dict[str, Mesh] = {}
-    known = set[tuple[str, ...]]()
+    variants: dict[str, Mesh] = {}
+    signatures = set[tuple[str, ...]]()
     gridded = max(shaping) < len(sequences.grid_settings(0))  # nothing that is drawn matters
     for sequence in range(sequences.count):
         settings = sequences.grid_settings(sequence) if gridded else sequences.settings(sequence)
         signature = tuple(settings[i].value.text for i in shaping)
-        if signature in known:
+        if signature in signatures:
             continue
-        known.add(signature)
+        signatures.add(signature)
         mesh = _mesh(sequences, sequence, target)
-        found.setdefault(mesh.digest, mesh)
-        if len(found) > MOST_VARIANTS:
-            place = sequences.entries[shaping[-1]][0]
-            raise FieldError(place, f"makes more than {MOST_VARIANTS} different meshes: choose among fewer")
-    return tuple(found.values())
+        variants.setdefault(mesh.digest, mesh)
+        if len(variants) > MOST_VARIANTS:
+            at = sequences.entries[shaping[-1]][0]
+            raise FieldError(at, f"makes more than {MOST_VARIANTS} different meshes: choose among fewer")
+    return tuple(variants.values())
 
 
-def _of_model(scene: Scene, place: int, number: int) -> Mesh:
-    population = scene.world.populations[place]
+def _of_model(scene: Scene, index: int, number: int) -> Mesh:
+    population = scene.world.populations[index]
     model = population.models[number]
     law = model.scattering or scene.physics.scattering
     try:
         return base_mesh(model.shape, law, scene.sonar.shortest_wavelength, model.scale[1])
     except (ValueError, OSError) as error:
-        where = ("scene", "world", "populations", place, "models", number, "shape")
-        raise FieldError(where, str(error)) from None
+        field = ("scene", "world", "populations", index, "models", number, "shape")
+        raise FieldError(field, str(error)) from None
 
 
 def _base_mesh(scene: Scene, target: int) -> Mesh:
@@ -93,10 +93,10 @@ def _mesh(sequences: Sequences, sequence: int, target: int) -> Mesh:
 def _shaping(sequences: Sequences, target: int) -> list[int]:
     """Numbers of the entries that may change the mesh of a target."""
     places: tuple[Where, ...] = tuple(
-        ("scene", "world", "targets", target, field) for field in ("shape", "scattering", "mesh_scale")
+        ("scene", "world", "targets", target, name) for name in ("shape", "scattering", "mesh_scale")
     )
     meets = [
-        any(all(a == b for a, b in zip(where(path), place, strict=False)) for path in entry.path for place in places)
+        any(all(a == b for a, b in zip(where(path), field, strict=False)) for path in entry.path for field in places)
         for _, entry in sequences.entries
     ]
     return [i for i, met in enumerate(meets) if met]

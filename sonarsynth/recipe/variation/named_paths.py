@@ -37,11 +37,11 @@ def _numbered(world: World, entry: Entry, where: Where) -> Entry:
 
 
 def _by_number(world: World, path: str, where: Where) -> str:
-    parts = path.split(".")
-    if len(parts) < 4 or parts[1] != "world" or parts[2] not in LISTS or parts[3].isdecimal():
+    keys = path.split(".")
+    if len(keys) < 4 or keys[1] != "world" or keys[2] not in LISTS or keys[3].isdecimal():
         return path
-    names = [one.name for one in getattr(world, parts[2])]
-    if parts[3] not in names:
-        known = ", ".join(names) or "there are none"
-        raise FieldError(where, f"'{path}': none of scene.world.{parts[2]} is called '{parts[3]}'; known: {known}")
-    return ".".join([*parts[:3], str(names.index(parts[3])), *parts[4:]])
+    names = [item.name for item in getattr(world, keys[2])]
+    if keys[3] not in names:
+        listed = ", ".join(names) or "there are none"
+        raise FieldError(where, f"'{path}': none of scene.world.{keys[2]} is called '{keys[3]}'; known: {listed}")
+    return ".".join([*keys[:3], str(names.index(keys[3])), *keys[4:]])

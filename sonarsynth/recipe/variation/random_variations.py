@@ -62,18 +62,18 @@ class NumberVariation(RandomVariation):
     correlation: Annotated[Number, Ge(-1), Le(1)] = 1.0
     """With that: of the normal scores of both (a Gaussian copula), so that each keeps its distribution."""
 
-    def at(self, part: float) -> Plain:
-        """The value that this part (0 to 1) of all draws stays under."""
+    def at(self, fraction: float) -> Plain:
+        """The value that this fraction (0 to 1) of all draws stays under."""
         raise NotImplementedError
 
-    def share(self, seed: int, key: int | str, other: str | None) -> float:
-        """The part that is drawn for a sequence; `other`: the path of what it is like."""
+    def share(self, seed: int, key: int | str, partner: str | None) -> float:
+        """The part that is drawn for a sequence; `partner`: the path of what it is like."""
         own = share(seed, "variation", key, as_drawn(self.path[0]))
-        if other is None:
+        if partner is None:
             return own
         from scipy.special import ndtr, ndtri
 
-        theirs = share(seed, "variation", key, as_drawn(other))
+        theirs = share(seed, "variation", key, as_drawn(partner))
         scores = ndtri(np.array([theirs, own]) + 2.0**-54)
         return float(ndtr(self.correlation * scores[0] + np.sqrt(1.0 - self.correlation**2) * scores[1]))
 
@@ -93,9 +93,9 @@ class Uniform(NumberVariation):
         _check_bounds(self.low, self.high)
         return self
 
-    def at(self, part: float) -> Plain:
-        """The value that this part (0 to 1) of all draws stays under."""
-        return _between(self.low, self.high, part)
+    def at(self, fraction: float) -> Plain:
+        """The value that this fraction (0 to 1) of all draws stays under."""
+        return _between(self.low, self.high, fraction)
 
 
 @description
@@ -115,10 +115,10 @@ class LogUniform(NumberVariation):
             raise ValueError(f"low must be greater than 0, not {self.low}")
         return self
 
-    def at(self, part: float) -> Plain:
+    def at(self, fraction: float) -> Plain:
         """As `NumberVariation.at`."""
         (low, unit), (high, _) = number_and_unit(self.low), number_and_unit(self.high)
-        return with_unit(min(max(low * (high / low) ** part, low), high), unit)
+        return with_unit(min(max(low * (high / low) ** fraction, low), high), unit)
 
 
 @description
@@ -137,9 +137,9 @@ class Integers(NumberVariation):
             raise ValueError(f"low must be less than high: {self.low} to {self.high}")
         return self
 
-    def at(self, part: float) -> Plain:
+    def at(self, fraction: float) -> Plain:
         """As `NumberVariation.at`."""
-        return Plain.of(min(self.low + int(part * (self.high - self.low + 1)), self.high))
+        return Plain.of(min(self.low + int(fraction * (self.high - self.low + 1)), self.high))
 
 
 @description
@@ -180,16 +180,16 @@ class Normal(NumberVariation):
             low, high = -high, -low
         return float(ndtr(low)), float(ndtr(high)), sign
 
-    def at(self, part: float) -> Plain:
-        """The value that this part (0 to 1) of all draws stays under; at most FAR deviations from the mean at 0 and 1
-        where there is no bound.
+    def at(self, fraction: float) -> Plain:
+        """The value that this fraction (0 to 1) of all draws stays under; at 0 and 1, where there is no bound, at
+        most FAR deviations from the mean.
         """
         from scipy.special import ndtri
 
         mean, unit = number_and_unit(self.mean)
         deviation = number_and_unit(self.deviation)[0]
         first, last, sign = self._shares()
-        share = first + (last - first) * (part if sign > 0 else 1.0 - part)
+        share = first + (last - first) * (fraction if sign > 0 else 1.0 - fraction)
         score = sign * float(ndtri(share))
         if not np.isfinite(score):
             score = float(np.copysign(FAR, score))
@@ -198,9 +198,9 @@ class Normal(NumberVariation):
         value = value if low is None else max(low, value)
         return with_unit(value if high is None else min(high, value), unit)
 
-    def share(self, seed: int, key: int | str, other: str | None) -> float:
+    def share(self, seed: int, key: int | str, partner: str | None) -> float:
         """As `NumberVariation.share`; never 0, which has no score."""
-        return super().share(seed, key, other) + (2.0**-54 if other is None else 0.0)
+        return super().share(seed, key, partner) + (2.0**-54 if partner is None else 0.0)
 
 
 @description
@@ -227,8 +227,8 @@ class Choice(RandomVariation):
     def number(self, seed: int, key: int | str, path: str) -> int:
         """Number of the value of a sequence."""
         bounds = np.cumsum(self.weights if self.weights is not None else np.ones(len(self.values)))
-        part = share(seed, "variation", key, path)
-        return int(np.searchsorted(bounds, part * bounds[-1], side="right"))
+        fraction = share(seed, "variation", key, path)
+        return int(np.searchsorted(bounds, fraction * bounds[-1], side="right"))
 
     def draw(self, seed: int, key: int | str, path: str) -> Plain:
         """The value of a sequence."""
@@ -253,9 +253,9 @@ class Sobol(RandomVariation):
         _check_bounds(self.low, self.high)
         return self
 
-    def at(self, part: float) -> Plain:
-        """The value at this part (0 to 1) of the way from low to high."""
-        return _between(self.low, self.high, part)
+    def at(self, fraction: float) -> Plain:
+        """The value at this fraction (0 to 1) of the way from low to high."""
+        return _between(self.low, self.high, fraction)
 
     def draw(self, seed: int, key: str, path: str, dimension: int, repeat: int) -> Plain:
         """The value of a repeat of the grid point `key`, in this dimension of the sequence."""
@@ -271,7 +271,7 @@ def _check_bounds(low: float | str, high: float | str) -> None:
         raise ValueError(f"low must be less than high: {low} to {high}")
 
 
-def _between(low: float | str, high: float | str, part: float) -> Plain:
+def _between(low: float | str, high: float | str, fraction: float) -> Plain:
     """Exactly low at 0 and high at 1."""
     (a, unit), (b, _) = number_and_unit(low), number_and_unit(high)
-    return with_unit(min(max(a * (1.0 - part) + b * part, a), b), unit)
+    return with_unit(min(max(a * (1.0 - fraction) + b * fraction, a), b), unit)

@@ -53,66 +53,66 @@ def with_settings(scene: Scene, plain: dict[str, Any], settings: Sequence[Settin
     Raises FieldError that names the setting and the field.
     """
     data: Any = {"scene": plain}
-    made = [(where(path), setting) for setting in settings for path in setting.paths]
-    for path, setting in sorted(made, key=lambda one: len(one[0])):
+    by_path = [(where(path), setting) for setting in settings for path in setting.paths]
+    for path, setting in sorted(by_path, key=lambda item: len(item[0])):
         try:
             data = put(data, path, setting.value.value)
         except LookupError as error:
-            place = setting.source[:-2] if "values" in setting.source else setting.source
-            raise FieldError((*place, "path"), f"{'.'.join(map(str, path))}: {error.args[0]}") from None
-    parts = {}
-    for name in {path[1] for path, _ in made}:
+            at = setting.source[:-2] if "values" in setting.source else setting.source
+            raise FieldError((*at, "path"), f"{'.'.join(map(str, path))}: {error.args[0]}") from None
+    changed = {}
+    for name in {path[1] for path, _ in by_path}:
         try:
-            parts[str(name)] = _PARTS[str(name)].validate_json(json.dumps(data["scene"][name]), strict=True)
+            changed[str(name)] = _PARTS[str(name)].validate_json(json.dumps(data["scene"][name]), strict=True)
         except ValidationError as error:
-            raise _explained(error, data, ("scene", name), made) from None
-    return replace(scene, **parts)
+            raise _explained(error, data, ("scene", name), by_path) from None
+    return replace(scene, **changed)
 
 
 def put(data: Any, path: Where, value: Any, depth: int = 0) -> Any:
     """`data` with the value at path[depth:] replaced. Raises LookupError where the path leads nowhere."""
     if depth == len(path):
         return value
-    part = path[depth]
+    key = path[depth]
     if isinstance(data, list):
-        if not isinstance(part, int) or part >= len(data):
-            raise LookupError(f"'{part}' is not one of the {len(data)} entries from 0")
-        return [put(v, path, value, depth + 1) if i == part else v for i, v in enumerate(data)]
+        if not isinstance(key, int) or key >= len(data):
+            raise LookupError(f"'{key}' is not one of the {len(data)} entries from 0")
+        return [put(v, path, value, depth + 1) if i == key else v for i, v in enumerate(data)]
     if data is None or isinstance(data, dict):
-        key, data = str(part), data or {}
-        if data and key not in data and not (depth == len(path) - 1 or data.get("kind")):
-            raise LookupError(_unknown(key, data))
-        return data | {key: put(data.get(key), path, value, depth + 1)}
+        name, data = str(key), data or {}
+        if data and name not in data and not (depth == len(path) - 1 or data.get("kind")):
+            raise LookupError(_unknown(name, data))
+        return data | {name: put(data.get(name), path, value, depth + 1)}
     raise LookupError(f"'{'.'.join(map(str, path[:depth]))}' has no fields")
 
 
-def _unknown(name: str, known: dict[str, Any]) -> str:
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+def _unknown(name: str, fields: dict[str, Any]) -> str:
+    close = difflib.get_close_matches(name, fields, n=1, cutoff=0.5)
     return f"'{name}' is not a field here; " + (
-        f"did you mean '{close[0]}'?" if close else f"known: {', '.join(known)}"
+        f"did you mean '{close[0]}'?" if close else f"known: {', '.join(fields)}"
     )
 
 
-def _explained(error: ValidationError, data: Any, top: Where, made: Sequence[tuple[Where, Setting]]) -> FieldError:
+def _explained(error: ValidationError, data: Any, top: Where, by_path: Sequence[tuple[Where, Setting]]) -> FieldError:
     """The first error of a validation, with the setting that is to blame: the one that sets most of its path."""
-    found_all = error.errors(include_url=False)  # a misspelt field explains a missing one
-    details = next((d for d in found_all if d["type"] == "unexpected_keyword_argument"), found_all[0])
-    path, known = list(top), data[top[0]][top[1]]
-    for n, part in enumerate(details["loc"]):
-        named = isinstance(known, dict) and part in known and known.get("kind") != part
+    errors = error.errors(include_url=False)  # a misspelt field explains a missing one
+    details = next((d for d in errors if d["type"] == "unexpected_keyword_argument"), errors[0])
+    path, node = list(top), data[top[0]][top[1]]
+    for n, key in enumerate(details["loc"]):
+        named = isinstance(node, dict) and key in node and node.get("kind") != key
         last = n == len(details["loc"]) - 1
-        if named or (isinstance(known, list) and isinstance(part, int) and part < len(known)):
-            known = known[part]
+        if named or (isinstance(node, list) and isinstance(key, int) and key < len(node)):
+            node = node[key]
         elif not (last and details["type"] in ("missing", "unexpected_keyword_argument")):
             continue
-        path.append(part)
-    found = tuple(path)
+        path.append(key)
+    field = tuple(path)
 
-    def shared(one: tuple[Where, Setting]) -> int:
-        return next((n for n, (a, b) in enumerate(zip(one[0], found, strict=False)) if a != b), len(one[0]))
+    def shared(item: tuple[Where, Setting]) -> int:
+        return next((n for n, (a, b) in enumerate(zip(item[0], field, strict=False)) if a != b), len(item[0]))
 
-    setting = max(made, key=lambda one: (shared(one) == len(one[0]), shared(one)))[1]
-    return FieldError(setting.source, f"{'.'.join(map(str, found))}: {_text(details, data, found)} ({setting.shown})")
+    setting = max(by_path, key=lambda item: (shared(item) == len(item[0]), shared(item)))[1]
+    return FieldError(setting.source, f"{'.'.join(map(str, field))}: {_text(details, data, field)} ({setting.shown})")
 
 
 def _text(details: ErrorDetails, data: Any, path: Where) -> str:
@@ -122,8 +122,8 @@ def _text(details: ErrorDetails, data: Any, path: Where) -> str:
         case "missing":
             return "is required"
         case "unexpected_keyword_argument":
-            for part in path[:-1]:
-                data = data[part]
+            for key in path[:-1]:
+                data = data[key]
             return _unknown(str(path[-1]), {name: None for name in data if name != path[-1]})
     text = details["msg"].replace("Input should be", "must be").replace("String should", "must")
     shown = Plain.of(details["input"]).shown if details["type"] != "union_tag_not_found" else "a value without kind"
@@ -132,22 +132,22 @@ def _text(details: ErrorDetails, data: Any, path: Where) -> str:
 
 def value_at(scene: Scene, path: str) -> Any:
     """What a path leads to, in SI units."""
-    found: Any = scene
-    for part in where(path)[1:]:
-        found = found[int(part)] if isinstance(found, tuple) else getattr(found, str(part))
-    return found
+    value: Any = scene
+    for key in where(path)[1:]:
+        value = value[int(key)] if isinstance(value, tuple) else getattr(value, str(key))
+    return value
 
 
 def unit_at(scene: Scene, path: str) -> Unit | None:
     """The unit of the number that a path leads to; None for one without."""
-    found: Any = scene
+    value: Any = scene
     kind: Any = Scene
-    for part in where(path)[1:]:
-        if isinstance(found, tuple):
-            kind, found = _member(kind, int(part), len(found)), found[int(part)]
+    for key in where(path)[1:]:
+        if isinstance(value, tuple):
+            kind, value = _member(kind, int(key), len(value)), value[int(key)]
         else:
-            field = type(found).__pydantic_fields__[str(part)]
-            kind, found = _with(field.annotation, field.metadata), getattr(found, str(part))
+            field = type(value).__pydantic_fields__[str(key)]
+            kind, value = _with(field.annotation, field.metadata), getattr(value, str(key))
     return _unit(kind)
 
 
@@ -172,7 +172,7 @@ def _options(kind: Any) -> list[Any]:
     if get_origin(kind) is Annotated:
         return _options(get_args(kind)[0])
     if get_origin(kind) in (Union, types.UnionType):
-        return [one for member in get_args(kind) for one in _options(member)]
+        return [option for member in get_args(kind) for option in _options(member)]
     return [kind]
 
 

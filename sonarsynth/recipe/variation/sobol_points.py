@@ -26,13 +26,13 @@ def sobol_shares(seed: int, point: str, names: list[str], first: int, repeat: in
     Kuo (2008).
     """
     block, row = divmod(repeat, BLOCK)
-    found = np.empty(len(names))
+    shares = np.empty(len(names))
     for n, name in enumerate(names):
         dimension = first + n
         points = _points(dimension // TOGETHER, block)
         shift = int(share(seed, "sobol", point, name) * (1 << BITS))
-        found[n] = (int(points[row, dimension % TOGETHER]) ^ shift) / (1 << BITS)
-    return found
+        shares[n] = (int(points[row, dimension % TOGETHER]) ^ shift) / (1 << BITS)
+    return shares
 
 
 @lru_cache(maxsize=64)

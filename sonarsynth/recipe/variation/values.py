@@ -127,7 +127,7 @@ def _paths(value: Any) -> tuple[str, ...]:
             raise ValueError(f"'{text}' is the name of a file: vary what holds it, with its kind and path")
         if text.endswith(".kind"):
             raise ValueError(f"'{text}' cannot vary by itself: vary what holds it, with its kind and all its fields")
-        if not all(re.fullmatch(r"[\w-]+", part) for part in text.split(".")):
+        if not all(re.fullmatch(r"[\w-]+", key) for key in text.split(".")):
             raise ValueError(f"'{text}' is not a path such as scene.world.targets.0.motion.heading")
     return tuple(texts)
 
@@ -147,7 +147,7 @@ Paths = Annotated[
 
 def where(path: str) -> Where:
     """A dotted path in parts."""
-    return tuple(int(part) if part.isdecimal() else part for part in path.split("."))
+    return tuple(int(key) if key.isdecimal() else key for key in path.split("."))
 
 
 def _name(value: Any) -> str:
