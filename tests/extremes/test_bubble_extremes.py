@@ -66,13 +66,6 @@ def test_less_gas_tends_to_none() -> None:
     assert far[0] > far[1] > far[2] and far[2] < 0.6 * far[1] < 0.6 * far[0]
 
 
-@pytest.mark.parametrize("radius", [1e-7, 1e-5, 1.0, 100.0])
-def test_any_size(radius: float) -> None:
-    found, tight = (bubble_collapse.collapse(Cavity(radius, 1000.0, 150e3), tolerance=e) for e in (1e-10, 1e-12))
-    assert found.minimum_radius == pytest.approx(tight.minimum_radius, rel=1e-8)
-    assert found.flag == 0
-
-
 def test_near_equilibrium_it_swings_as_minnaerts_bubble() -> None:
     """Minnaert (1933): angular frequency sqrt(3 g p/rho)/R of a small oscillation; the collapse takes half a period."""
     ambient = 101325.0

@@ -21,7 +21,6 @@ from sonarsynth import (
     eigenrays,
     eigenrays_between,
 )
-from sonarsynth.environment.casts import profile_of
 from sonarsynth.environment.sea import SoundSpeed
 
 WATER = Isovelocity(speed=1540.0)
@@ -79,37 +78,6 @@ def test_angles_of_travel_are_positive_going_down() -> None:
     assert straight_down.departure.tolist() == straight_down.arrival.tolist() == [[0.0, 0.0, -1.0]]
     level = eigenrays(WATER, 20.0, 5.0, 5.0, 10.0, vertices=0)
     assert level.launch_angle[0] == 0.0 and not np.signbit(level.launch_angle[0])
-
-
-@pytest.mark.parametrize("water", WATERS, ids=lambda w: w.kind)
-def test_a_path_is_the_same_from_both_ends(water: SoundSpeed) -> None:
-    rng = np.random.default_rng(1)
-    z1, z2, r = rng.uniform(0.0, 20.0, 40), rng.uniform(0.0, 20.0, 40), rng.uniform(1.0, 300.0, 40)
-    there, back = (eigenrays(water, 20.0, *ends, r, vertices=3) for ends in ((z1, z2), (z2, z1)))
-    assert len(there) == len(back) >= 40 * 5
-    np.testing.assert_array_equal(there.pair, back.pair)
-    np.testing.assert_allclose(there.travel_time, back.travel_time, rtol=1e-13)
-    order = np.lexsort((np.round(there.launch_angle, 9), there.pair))
-    mirrored = np.lexsort((np.round(-back.arrival_angle, 9), back.pair))
-    np.testing.assert_allclose(there.launch_angle[order], -back.arrival_angle[mirrored], atol=1e-9)
-    np.testing.assert_allclose(there.amplitude[order], back.amplitude[mirrored], rtol=1e-6)
-    for name in ("surface", "bottom", "turning", "caustics", "flag"):
-        np.testing.assert_array_equal(getattr(there, name)[order], getattr(back, name)[mirrored])
-
-
-@pytest.mark.parametrize("water", WATERS, ids=lambda w: w.kind)
-def test_snell_holds_at_both_ends_and_time_grows_with_range_like_p(water: SoundSpeed) -> None:
-    rng = np.random.default_rng(2)
-    z1, z2, r, step = rng.uniform(0.1, 19.9, 25), rng.uniform(0.1, 19.9, 25), rng.uniform(5.0, 60.0, 25), 1e-4
-    rays = eigenrays(water, 20.0, z1, z2, r, vertices=2)
-    profile = profile_of(water)
-    for angle, z in ((rays.launch_angle, z1), (rays.arrival_angle, z2)):
-        np.testing.assert_allclose(np.cos(angle) / profile.at(z[rays.pair]), rays.ray_parameter, rtol=1e-9)
-    nearer, farther = (eigenrays(water, 20.0, z1, z2, r + d, vertices=2) for d in (-step, step))
-    same = [np.array_equal(getattr(nearer, n), getattr(farther, n)) for n in ("pair", "surface", "bottom", "turning")]
-    assert all(same)
-    slope = (farther.travel_time - nearer.travel_time) / (2 * step)
-    np.testing.assert_allclose(slope, rays.ray_parameter, rtol=1e-5)
 
 
 def test_arguments_broadcast_and_pairs_number_them() -> None:

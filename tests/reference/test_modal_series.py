@@ -12,7 +12,6 @@ from sonarsynth.equations.scattering.modal_series import (
     cylinder_amplitude,
     sphere_amplitude,
     sphere_coefficients,
-    sphere_echo,
 )
 
 ANGLES = np.array([0.0, 0.5, 2.0, np.pi])
@@ -187,25 +186,6 @@ def test_a_cylinder_has_the_lobes_of_its_length_and_no_ends() -> None:
     small = cylinder_amplitude([1e-6, 2e-6, 0.0], np.pi / 2, radius=1.0, length=1.0, sound_speed=2 * np.pi)
     np.testing.assert_allclose(small[:2], -np.array([1.0, 4.0]) * 1e-12 * 0.75, rtol=1e-9)  # k^2 a^2 L (1/4 + 1/2)
     assert abs(small[2]) < 1e-100
-
-
-def test_the_echo_of_a_pulse_is_the_mirror_echo_and_the_wave_that_creeps_around() -> None:
-    """Rigid, 5 cm: half the radius at -2 a/c; another from behind at +pi a/c or later, 20 to 30 dB weaker."""
-    rate, radius, speed = 500e3, 0.05, 1500.0
-    frequency = np.fft.rfftfreq(1024, 1 / rate)
-    pulse = np.exp(-0.5 * ((frequency - 60e3) / 12e3) ** 2) * np.exp(-2j * np.pi * frequency * 1e-3)
-    echo = sphere_echo(pulse, frequency, np.array([np.pi]), radius=radius, sound_speed=speed)
-    assert echo.shape == (1, frequency.size)
-    padded = np.zeros((2, 16 * 1024), complex)
-    padded[:, : frequency.size] = pulse, echo[0]
-    envelope, back = abs(np.fft.ifft(padded)) / abs(np.fft.ifft(padded[0])).max()
-    t = np.arange(16 * 1024) / (16 * rate) - 1e-3
-    assert envelope[np.argmin(abs(t))] == pytest.approx(1.0, rel=1e-9)
-    assert t[np.argmax(back)] == pytest.approx(-2 * radius / speed, abs=0.5e-6)
-    assert back.max() == pytest.approx(radius / 2, rel=0.02)
-    late = np.where(t > 40e-6, back, 0.0)
-    assert 0.95 < t[np.argmax(late)] / (np.pi * radius / speed) < 1.25
-    assert -30 < 20 * np.log10(late.max() / back.max()) < -20
 
 
 def test_arguments_broadcast() -> None:

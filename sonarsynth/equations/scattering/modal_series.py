@@ -58,25 +58,6 @@ def sphere_amplitude(
     return np.asarray(1j * a / np.maximum(ka, TINY) * total)
 
 
-def sphere_echo(
-    spectrum: npt.ArrayLike,
-    frequency: npt.ArrayLike,
-    angle: npt.ArrayLike,
-    *,
-    radius: float,
-    sound_speed: float = 1500.0,
-    boundary: Boundary = "rigid",
-) -> Complexes:
-    """Spectrum (..., frequency) of the echo at 1 m of a wave with a spectrum (frequency,) at the middle of the sphere.
-
-    An angle (...) a row; `numpy.fft.irfft` of it is the echo, which starts as early as -2 a/c. Over the distance (m) of
-    the receiver it is the pressure there, delayed by distance/c. The rest as for `sphere_amplitude`.
-    """
-    towards = np.asarray(angle, float)[..., None]
-    echo = sphere_amplitude(frequency, towards, radius=radius, sound_speed=sound_speed, boundary=boundary)
-    return np.asarray(np.asarray(spectrum, complex) * echo)
-
-
 def sphere_coefficients(ka: npt.ArrayLike, boundary: Boundary = "rigid") -> Complexes:
     """Modal coefficients A_n (order, ...) of a sphere at products ka (...) of wavenumber and radius.
 
