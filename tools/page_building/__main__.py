@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 from tools.page_building import ROOT, generated
+from tools.page_building.pictures import DRAWN, QUICK, draw
 from tools.page_building.site import build
 
 
@@ -18,7 +19,16 @@ def main() -> int:
     parser.add_argument(
         "--check", action="store_true", help="write nothing: fail where what is generated is not of now"
     )
+    parser.add_argument(
+        "--pictures",
+        nargs="*",
+        choices=list(DRAWN),
+        metavar="NAME",
+        help=f"draw pictures again first: {', '.join(DRAWN)}; without names those that are quick: {', '.join(QUICK)}",
+    )
     options = parser.parse_args()
+    if options.pictures is not None:
+        draw(options.pictures or QUICK)
     old = [file for file, text in generated().items() if not file.is_file() or file.read_text() != text]
     for file in old:
         print(f"pages: {'run tools/pages to write' if options.check else 'wrote'} {file.relative_to(ROOT)}")

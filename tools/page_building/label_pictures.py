@@ -59,7 +59,7 @@ def frame(axes: Axes, box: np.ndarray, **style: Any) -> None:
     axes.add_patch(plt.Rectangle((left, low), right - left, high - low, fill=False, **style))
 
 
-def boxes() -> None:
+def boxes(out: Path) -> None:
     """Boxes of bodies that hide each other, of one that the view cuts, and from above."""
     figure, panels = plt.subplots(1, 3, figsize=(8.4, 2.9), dpi=80, layout="compressed")
     crowd, cut = truth("crowd", 0, BEFORE), truth("remus", 22, NARROW)
@@ -81,7 +81,7 @@ def boxes() -> None:
     )
     panels[1].set(title=f"cut off: truncation {float(cut['truth/targets'].truncation[0]):.2f}")
     above(panels[2])
-    figure.savefig(ROOT / ".github" / "label_boxes.png", metadata={"Software": None})
+    figure.savefig(out / "label_boxes.png", metadata={"Software": None})
     plt.close(figure)
 
 
@@ -103,7 +103,7 @@ def above(axes: Axes) -> None:
     axes.set(xlabel="to port, y (m)", ylabel="forward, x (m)")
 
 
-def beams() -> None:
+def beams(out: Path) -> None:
     """Target and coverage of beams on a target, and what the snap lights of it."""
     tree = truth("remus", 32)
     grid, targets = tree["truth/beams"].dataset, tree["truth/targets"].dataset
@@ -125,11 +125,11 @@ def beams() -> None:
         panel.set(title=title, xlabel="azimuth (deg)")
     left, right, low, high = targets.full_box.values[0]
     panels[0].set(xlim=(right + 0.8, left - 0.8), ylim=(low - 0.8, high + 0.8), ylabel="elevation (deg)")
-    figure.savefig(ROOT / ".github" / "label_beams.png", metadata={"Software": None})
+    figure.savefig(out / "label_beams.png", metadata={"Software": None})
     plt.close(figure)
 
 
-def labels(folder: Path) -> None:
+def labels(folder: Path, out: Path) -> None:
     """All of them."""
-    boxes()
-    beams()
+    boxes(out)
+    beams(out)

@@ -1,19 +1,15 @@
-"""Draws pictures of README and of the pages again: python tools/docs/pictures.py [NAME ...].
-
-Names: cloud, thumbnails, ghosts, images, labels, laws, accuracy, odds; left out: all of them, which takes minutes.
-"""
+"""Pictures of README and of the pages, drawn from small datasets: `tools/pages --pictures [NAME ...]`."""
 
 from __future__ import annotations
 
 import json
-import sys
 import tempfile
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from label_pictures import labels
 from matplotlib.collections import PolyCollection
 
 import sonarsynth as ss
@@ -22,6 +18,8 @@ from sonarsynth.pictures import _reference, _view
 from sonarsynth.pictures.compare import show_beside
 from sonarsynth.pictures.figures.frame_figure import FramePicture, window
 from sonarsynth.pictures.store_reading import beam_grid, opened, stored
+from tools.page_building.label_pictures import labels
+from tools.same_numbers import harbour
 
 ROOT = Path(__file__).resolve().parents[2]
 FRAMES = {
@@ -49,9 +47,10 @@ LAWS = {
 }
 
 
-def thumbnail(name: str, frame: int, sets: list[str]) -> None:
-    """The energy image of a frame, 30 dB deep, with the boxes of the targets."""
-    tree = ss.render(ss.load(ROOT / "configs" / f"{name}.yaml", sets), frame)
+def thumbnail(name: str, folder: Path, out: Path) -> None:
+    """The energy image of a frame of a shipped recipe, 30 dB deep, with the boxes of the targets."""
+    sets = list(harbour.written(folder)) if name == "harbour" else []
+    tree = ss.render(ss.load(ROOT / "configs" / f"{name}.yaml", sets), FRAMES[name])
     energy, boxes = tree["image/energy"], tree["truth/targets/image_box"].values
     decibels = 10 * np.log10(energy.values / energy.values.max())
     azimuth, elevation = energy["azimuth"].values, energy["elevation"].values
@@ -61,20 +60,17 @@ def thumbnail(name: str, frame: int, sets: list[str]) -> None:
         axes.add_patch(plt.Rectangle((left, low), right - left, high - low, fill=False, color="cyan", linewidth=0.8))
     axes.set(xlim=(azimuth[-1], azimuth[0]), ylim=(elevation[0], elevation[-1]), xticks=[], yticks=[])
     figure.subplots_adjust(0, 0, 1, 1)
-    figure.savefig(ROOT / ".github" / f"{name}.png", metadata={"Software": None})
+    figure.savefig(out / f"{name}.png", metadata={"Software": None})
     plt.close(figure)
 
 
-def thumbnails(folder: Path) -> None:
+def thumbnails(folder: Path, out: Path) -> None:
     """One of each shipped recipe."""
-    sys.path.insert(0, str(ROOT / "tools"))
-    from same_numbers import harbour
-
-    for name, frame in FRAMES.items():
-        thumbnail(name, frame, harbour.written(folder) if name == "harbour" else [])
+    for name in FRAMES:
+        thumbnail(name, folder, out)
 
 
-def ghosts(folder: Path) -> None:
+def ghosts(folder: Path, out: Path) -> None:
     """A frame with every path, as a film shows it."""
     path = folder / "ghosts.zarr"
     ss.build(ss.load(ROOT / "configs" / "thermocline.yaml"), path, frames=[GHOSTS], workers=0)
@@ -83,10 +79,10 @@ def ghosts(folder: Path) -> None:
     view = _view(tree, one, _reference([one]))
     picture = FramePicture(*beam_grid(tree), window([view]), "energy re the brightest beam (dB)")
     picture.show(view)
-    picture.figure.savefig(ROOT / ".github" / "ghosts.png", dpi=100, metadata={"Software": None})
+    picture.figure.savefig(out / "ghosts.png", dpi=100, metadata={"Software": None})
 
 
-def images(folder: Path) -> None:
+def images(folder: Path, out: Path) -> None:
     """One frame of boat.yaml by every beamformer, 35 dB deep."""
     figure, panels = plt.subplots(2, 3, figsize=(8.4, 5.6), dpi=100, sharex=True, sharey=True, layout="compressed")
     for kind, panel in zip(IMAGES, panels.flat, strict=True):
@@ -99,11 +95,11 @@ def images(folder: Path) -> None:
     figure.supxlabel("azimuth (deg), port on the left")
     figure.supylabel("elevation (deg)")
     figure.colorbar(drawn, ax=panels, label="dB re the brightest beam")
-    figure.savefig(ROOT / ".github" / "images.png", metadata={"Software": None})
+    figure.savefig(out / "images.png", metadata={"Software": None})
     plt.close(figure)
 
 
-def laws(folder: Path) -> None:
+def laws(folder: Path, out: Path) -> None:
     """The pass of remus.yaml by three laws of scattering, side by side."""
     stores = [folder / f"{name}.zarr" for name in LAWS]
     for law, path in zip(LAWS.values(), stores, strict=True):
@@ -111,16 +107,16 @@ def laws(folder: Path) -> None:
         recipe = ss.load(ROOT / "configs" / "remus.yaml", sets)
         ss.build(recipe, path, workers=0)
     (drawn,) = show_beside(stores, folder / "laws", film=False)
-    drawn.replace(ROOT / ".github" / "laws.png")
+    drawn.replace(out / "laws.png")
 
 
-def accuracy(folder: Path) -> None:
+def accuracy(folder: Path, out: Path) -> None:
     """Error against run time of tank.yaml, with the other programs that are installed."""
     measured = ss.accuracy(ss.load(ROOT / "configs" / "tank.yaml"), say=print)
-    write(measured, folder, "accuracy")[1].replace(ROOT / ".github" / "accuracy.png")
+    write(measured, folder, "accuracy")[1].replace(out / "accuracy.png")
 
 
-def cloud(folder: Path) -> None:
+def cloud(folder: Path, out: Path) -> None:
     """The points of all frames of remus.yaml, fused on the hull: from above, from the sonar's side, and from ahead."""
     path = folder / "remus.zarr"
     recipe = ss.load(ROOT / "configs" / "remus.yaml")
@@ -139,21 +135,20 @@ def cloud(folder: Path) -> None:
     axes[0].set_title(f"{len(place)} points of {tree.sizes['frame']} frames at 20 m, on the true hull", fontsize=11)
     axes[1].set_xlabel("forward (m)")
     figure.colorbar(drawn, ax=axes, label="time of the frame (s)")
-    figure.savefig(ROOT / ".github" / "cloud.png", metadata={"Software": None})
+    figure.savefig(out / "cloud.png", metadata={"Software": None})
     plt.close(figure)
 
 
-def odds(folder: Path) -> None:
+def odds(folder: Path, out: Path) -> None:
     """Shares of windows in which the target of the thesis scene is found, by `tools/bench odds`: takes minutes."""
-    sys.path.insert(0, str(ROOT / "tools"))
-    from benchmarks import odds as benchmark
+    from tools.benchmarks import odds as benchmark
 
     found = benchmark.bench(16)["rows"]
     (folder / "odds.json").write_text(json.dumps(found))
-    draw_odds(found)
+    draw_odds(found, out)
 
 
-def draw_odds(found: list[dict[str, Any]]) -> None:
+def draw_odds(found: list[dict[str, Any]], out: Path) -> None:
     """By density: for each distance and level the chorus alone, and at 10 m with reverberation and medians."""
     figure, panels = plt.subplots(1, 2, figsize=(9.0, 3.4), dpi=100, sharey=True, layout="constrained")
     alone = [row for row in found if row["case"] == "chorus"]
@@ -181,28 +176,33 @@ def draw_odds(found: list[dict[str, Any]]) -> None:
     panels[0].legend(fontsize=7, frameon=False, handlelength=3.0, ncols=3, loc="upper center")
     panels[1].legend(fontsize=7, frameon=False, ncols=2, loc="upper center")
     panels[0].set_ylabel("windows in which it is found")
-    figure.savefig(ROOT / ".github" / "odds.png", metadata={"Software": None})
+    figure.savefig(out / "odds.png", metadata={"Software": None})
     plt.close(figure)
 
 
-DRAWN = {
-    "cloud": cloud,
+QUICK: dict[str, Callable[[Path, Path], None]] = {
     "thumbnails": thumbnails,
     "ghosts": ghosts,
     "images": images,
     "labels": labels,
-    "laws": laws,
-    "accuracy": accuracy,
-    "odds": odds,
+    "cloud": cloud,
 }
+"""Two minutes of one core in all. Each takes a folder for datasets, and one for pictures."""
+DRAWN = QUICK | {"laws": laws, "accuracy": accuracy, "odds": odds}
+"""All: the last three take minutes each, and tell of times or of many windows."""
 
 
-def main() -> None:
-    """Draw what is named."""
-    for name in sys.argv[1:] or DRAWN:
+def draw(names: Iterable[str]) -> None:
+    """Draw some of them again, where README and pages have them."""
+    for name in names:
         with tempfile.TemporaryDirectory() as folder:
-            DRAWN[name](Path(folder))
+            DRAWN[name](Path(folder), ROOT / ".github")
 
 
-if __name__ == "__main__":
-    main()
+def likeness(one: Path, other: Path) -> float:
+    """Correlation of the brightness of two pictures on 32 by 24 cells: 1 for the same, near 1 where only small things
+    differ."""
+    from PIL import Image
+
+    cells = [np.asarray(Image.open(f).convert("L").resize((32, 24), Image.Resampling.BOX), float) for f in (one, other)]
+    return float(np.corrcoef(cells[0].ravel(), cells[1].ravel())[0, 1])
