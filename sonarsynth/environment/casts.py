@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
@@ -95,6 +96,9 @@ def _cast_profile(cast: Cast) -> Profile:
     """The profile of a file: read, chosen from, and said what of."""
     own_place = [None if angle is None else float(np.degrees(angle)) for angle in (cast.latitude, cast.longitude)]
     table = read_cast(Path(cast.path), cast.profile, *own_place)
+    salt = table.columns.get("salinity")
+    if cast.salinity is not None and salt is not None and not np.isfinite(salt.values).any():  # its sensor failed
+        table = replace(table, columns={name: one for name, one in table.columns.items() if name != "salinity"})
     site = _place(cast, table)
     water = {name: column.values for name, column in table.columns.items()}
     if "sound speed" in water:

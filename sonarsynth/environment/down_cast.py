@@ -58,7 +58,9 @@ def select(table: CastTable, needed: dict[str, Floats], depth: Floats) -> Select
     selection = Selection(np.arange(len(depth)))
     complete = np.all([np.isfinite(values) for values in needed.values()], axis=0)
     selection.keep(complete, "with a missing value")
-    _nonempty(table, selection)
+    empty = [name for name, values in needed.items() if not np.isfinite(values).any()]
+    hint = "; give the `salinity`" if empty == ["salinity"] else ""
+    _nonempty(table, selection, f"; '{table.columns[empty[0]].name}' has no good value{hint}" if empty else "")
     _check(table, {name: values[selection.rows] for name, values in needed.items()}, selection.rows)
     for name, values in needed.items():
         low, high, _ = PLAUSIBLE[name]
@@ -89,9 +91,9 @@ def averaged(depth: Floats, values: Floats) -> tuple[Floats, Floats]:
     return (depth, values) if len(z) == len(depth) else (z, np.bincount(back, values) / count)
 
 
-def _nonempty(table: CastTable, selection: Selection) -> None:
+def _nonempty(table: CastTable, selection: Selection, why: str = "") -> None:
     if not len(selection.rows):
-        raise CastError(f"{table.path}: no row can be used ({left_out(selection)})")
+        raise CastError(f"{table.path}: no row can be used ({left_out(selection)}){why}")
 
 
 def _check(table: CastTable, needed: dict[str, Floats], rows: Ints) -> None:

@@ -68,6 +68,7 @@ def test_the_file_decides_the_digest_and_must_be_there(tmp_path: Path) -> None:
     ("rate", "samples", "said"),
     [
         (250_000, np.zeros(9000, np.int16), "is silent"),
+        (250_000, np.full(9000, 1e200), "louder than numbers can say"),
         (250_000, np.ones(40, np.int16), "has 40 samples"),
         (96_000, np.arange(9000, dtype=np.int16), "holds nothing of the middle of the band"),
     ],

@@ -161,7 +161,14 @@ BAD = {
     "numbers only": ("1,1500\n2,1510\n", "line 1: a line of column names must come before the numbers"),
     "binary": (bytes(range(256)) * 4, "is not a text file"),
     "text": (HEAD + "1,1500,9,35\n\n2,fast,9,35\n", "line 4, column 'sound_speed': 'fast' is not a number"),
-    "nothing": ("depth,c\n,1500\n-9999,1500\n", "no row can be used (2 with a missing value)"),
+    "nothing": (
+        "depth,c\n,1500\n-9999,1500\n",
+        "no row can be used (2 with a missing value); 'depth' has no good value",
+    ),
+    "bad sensor": (
+        "depth,temperature,salinity\n1,9,-9999\n2,8,\n",
+        "no row can be used (2 with a missing value); 'salinity' has no good value; give the `salinity`",
+    ),
     "kelvin": ("depth,temperature,salinity\n1,289,35\n", "289 degC is not a temperature between -5 and 50 degC (15.85"),
     "fahrenheit": ("depth,temperature,salinity\n1,68,35\n", "-5 and 50 degC (20 degC if it is in degrees Fahrenheit)"),
     "height": (HEAD + "-1,1500,9,35\n", "line 2, column 'depth': -1 m is not a depth between 0"),
@@ -179,6 +186,18 @@ def test_a_bad_cast_is_refused_in_one_line(tmp_path, case):
         profile_of(Cast(path=str(path)))
     assert "\n" not in str(refused.value)
     assert str(path) in str(refused.value)
+
+
+def test_a_given_salinity_stands_for_that_of_a_sensor_that_failed(tmp_path):
+    """As where there was none; a column with any good value is taken at its word."""
+    rows = "\n".join(f"{z},{10 - 0.1 * z}" for z in range(1, 9))
+    none = read(tmp_path, f"depth,temperature\n{rows}\n", salinity=35.0)
+    failed = read(
+        tmp_path, f"depth,temperature,salinity\n{rows.replace(chr(10), ',-9999' + chr(10))},-9999\n", salinity=35.0
+    )
+    np.testing.assert_array_equal(failed.speed, none.speed)
+    own = read(tmp_path, f"depth,temperature,salinity\n{rows.replace(chr(10), ',30' + chr(10))},30\n", salinity=35.0)
+    assert (own.speed < none.speed - 5.0).all()
 
 
 def test_columns_that_were_asked_for_must_be_there(tmp_path):

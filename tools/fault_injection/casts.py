@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import io
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+import xarray as xr
 
 from fault_injection.fuzz import judged
 from fault_injection.recipes import (
@@ -28,7 +30,8 @@ title: files
 seed: 3
 scene:
   world:
-    environment: {{depth: 12 m, sound_speed: {speed}, noise: {{kind: flat, level: 40 dB}}}}
+    environment: {{depth: 12 m, sound_speed: {speed}, noise: {noise}}}
+    noise_sources: {ships}
     targets:
       - name: body
         shape: {{kind: sphere, radius: 0.3 m}}
@@ -47,6 +50,8 @@ USUAL = {
     "speed": "{kind: isovelocity, speed: 1540}",
     "motion": "{kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}",
     "snap": "source_level: 190 dB",
+    "noise": "{kind: flat, level: 40 dB}",
+    "ships": "[]",
 }
 ENVIRONMENT = """\
 'A shelf'
@@ -74,14 +79,47 @@ def run(count: int, seed: int, folder: Path | None = None) -> dict[str, Any]:
     return judged(bases(), mutated, count, seed, folder)
 
 
+CAST, NOISE, SNAP = (
+    "{{kind: cast, path: {}}}",
+    "{{kind: recording, path: {}}}",
+    "{{kind: recorded_snap, path: {}, fade: 0.1}}",
+)
+SOURCE = "[{{name: ship, motion: {{kind: still, position: [9, 3, -4]}}, sound: {{kind: noise_recording, path: {}}}}}]"
+
+
+def casts() -> dict[str, bytes]:
+    """A cast as each family of readers has it: names in a head, columns by place, Sea-Bird, packed, netCDF."""
+    depth = np.linspace(0.2, 24.0, 40)
+    speed, warm = 1511.9 - 0.05 * depth, 16.5 - 0.02 * depth
+    columns = "depSM: Depth [salt water, m]", "t090C: Temperature [ITS-90, deg C]", "sal00: Salinity, Practical"
+    names = "\n".join(f"# name {n} = {column}" for n, column in enumerate(columns))
+    rows = "".join(f"{z:11.3f}{t:11.4f}{35.6:11.4f}\n" for z, t in zip(depth, warm, strict=True))
+    head = f"* Sea-Bird SBE 9\n# nquan = 3\n{names}\n# bad_flag = -9.990e-29\n# file_type = ascii"
+    pairs = "".join(f"{z:.2f} {c:.2f}\n" for z, c in zip(depth, speed, strict=True))
+    asvp = f"( SoundVelocity  1.0 0 201203212242 22.5 -156.5 -1 0 0 OMS P {len(depth)} )\n{pairs}"
+    edf = f"// MK21 Export Data File\nDepth (m)  - Sound Velocity (m/s)\n// Data\n{pairs}"
+    table = xr.Dataset({"TEMP": ("N_LEVELS", warm), "PSAL": ("N_LEVELS", 35.6 + 0 * warm), "PRES": ("N_LEVELS", depth)})
+    return {
+        "cast.cnv": f"{head}\n*END*\n{rows}".encode(),
+        "cast.asvp": asvp.encode(),
+        "cast.edf": edf.encode(),
+        "cast.csv.gz": gzip.compress(cast_file(), mtime=0),
+        "cast.nc": bytes(table.to_netcdf(engine="scipy")),
+    }
+
+
 def bases() -> list[Case]:
     """A recipe with one file of each kind."""
     rows = "".join(f"{t},{10 + 0.2 * t},{0.3 * t},{5 + 0.1 * t},{80 + t}\n" for t in range(6))
     point = '<trkpt lat="{}" lon="{}"><ele>-4</ele><time>2024-05-01T10:00:0{}Z</time></trkpt>\n'
     points = "".join(point.format(1.2 + 1e-6 * t, 103.8 + 2e-6 * t, t) for t in range(6))
     found = [
-        ("cast.csv", "speed", "{{kind: cast, path: {}}}", cast_file()),
-        ("shelf.env", "speed", "{{kind: cast, path: {}}}", ENVIRONMENT.encode()),
+        ("cast.csv", "speed", CAST, cast_file()),
+        ("shelf.env", "speed", CAST, ENVIRONMENT.encode()),
+        *((name, "speed", CAST, data) for name, data in casts().items()),
+        ("sea.wav", "noise", NOISE, snap_files()["snap.wav"]),
+        ("sea.h5", "noise", NOISE, _hdf5()),
+        ("ship.wav", "ships", SOURCE, snap_files()["snap.wav"]),
         ("way.csv", "motion", "{{kind: track, path: {}}}", f"time (s),x,y,depth (m),heading\n{rows}".encode()),
         (
             "way.gpx",
@@ -89,11 +127,8 @@ def bases() -> list[Case]:
             "{{kind: track, path: {}, offset: [10, 0, 0]}}",
             f'<?xml version="1.0"?>\n<gpx><trk><trkseg>\n{points}</trkseg></trk></gpx>\n'.encode(),
         ),
-        ("snap.h5", "snap", "snap: {{kind: recorded_snap, path: {}, fade: 0.1}}", _hdf5()),
-        *(
-            (name, "snap", "snap: {{kind: recorded_snap, path: {}, fade: 0.1}}", data)
-            for name, data in snap_files().items()
-        ),
+        ("snap.h5", "snap", f"snap: {SNAP}", _hdf5()),
+        *((name, "snap", f"snap: {SNAP}", data) for name, data in snap_files().items()),
     ]
     return [
         Case(name, RECIPE.format(**USUAL | {field: text.format(name)}).encode(), {name: data})
@@ -116,7 +151,9 @@ odd_lines = lines_changed(ODD_LINES)
 def mutated(case: Case, random: np.random.Generator) -> Case:
     """The case with its file changed once to three times; now and then its recipe too, or the path to it."""
     (name,) = case.files
-    ways = [damaged] if name.endswith((".h5", ".wav")) else [numbers, numbers, odd_lines, odd_lines, damaged]
+    ways = (
+        [damaged] if name.endswith((".h5", ".wav", ".nc", ".gz")) else [numbers, numbers, odd_lines, odd_lines, damaged]
+    )
     for _ in range(pick((1, 1, 2, 3), random)):
         changed = pick(ways, random)(case.files[name], random)
         case = replace(case, files={name: changed}, done=(*case.done, "file"))

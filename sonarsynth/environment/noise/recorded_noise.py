@@ -85,7 +85,8 @@ def _spectrum_of(noise: RecordedNoise, changed: tuple[int, int]) -> tuple[Floats
     if values.size < SHORTEST:
         raise named_files.FileError(f"has {values.size} samples; the spectrum of noise needs {SHORTEST}")
     size = min(SEGMENT, values.size // FEWEST)
-    frequency, density = welch(values * noise.pascals, rate, nperseg=size)
+    with np.errstate(over="ignore", invalid="ignore"):  # judged below
+        frequency, density = welch(values * noise.pascals, rate, nperseg=size)
     if not 0.0 < float(density[1:].max()) < np.inf:
         raise named_files.FileError("is silent, or louder than numbers can say")
     return frequency, density, used
