@@ -217,9 +217,9 @@ def pressure(level_db: npt.ArrayLike) -> Floats:
     return np.asarray(REFERENCE_PRESSURE * 10.0 ** (np.asarray(level_db, float) / 20.0))
 
 
-def counted(number: int, what: str) -> str:
+def counted(number: int, noun: str) -> str:
     """A number of things: "1 frame", "2 frames"."""
-    return f"{number} {what}" + ("" if number == 1 else "s")
+    return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
 def format_bytes(count: float) -> str:

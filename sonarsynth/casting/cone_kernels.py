@@ -56,8 +56,8 @@ def _corners(facet: int, apex: Floats, frame: Floats, vertices: Floats, faces: I
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _misses_box(nodes: Floats, n: int, apex: Floats, axis: Floats, inverse: Floats, slope: float, reach: float) -> bool:
-    """Whether a cone surely passes by the box of a node: its axis does by one that is larger by what the cone is wide
-    there; inverse: of the components of the axis."""
+    """Whether a cone surely misses the box of a node: its axis misses the box enlarged by the width of the cone there.
+    inverse: of the components of the axis."""
     dx, dy, dz = nodes[n, 0] - apex[0], nodes[n, 1] - apex[1], nodes[n, 2] - apex[2]
     hx, hy, hz = nodes[n, 3], nodes[n, 4], nodes[n, 5]
     along = dx * axis[0] + dy * axis[1] + dz * axis[2]
@@ -159,8 +159,8 @@ def _closes(
     """Whether the surface that a facet on the axis belongs to closes the cone, nearer than `far`.
 
     It is followed over the edges that are in the cone. All lines of the cone must cross it from the same side, so that
-    it is folded nowhere, and none of its edges there may be an end of it. Then it has no rim within the cone, which it
-    parts in two.
+    it has no fold there, and each of its edges in the cone must join two facets. Then it has no rim within the cone,
+    and cuts it in two.
     """
     patch[0], count, done, sense = facet, 1, 0, 0.0
     while done < count:

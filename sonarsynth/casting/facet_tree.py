@@ -46,7 +46,7 @@ def _select(order: Int32s, key: Any, axis: int, low: int, high: int, middle: int
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def order_of(vertices: Floats, faces: Int32s, leaves: int) -> Int32s:
-    """The facets in order of place: halved at the middle of the longest side of what is left, leaf by leaf."""
+    """The facets, ordered by halving each range at its median along its longest side until there are `leaves`."""
     count, order, ranges = len(faces), np.arange(len(faces)).astype(np.int32), 1
     key = np.empty((count, 3), np.float32)
     for i in range(count):

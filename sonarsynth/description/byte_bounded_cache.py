@@ -21,7 +21,7 @@ LEAST: Final = 4
 
 
 def size_of(*values: object) -> int:
-    """Bytes of all arrays that results hold, each counted once; what says its `nbytes` is believed."""
+    """Bytes of all arrays that results hold, each counted once; of other objects, their `nbytes`."""
     total, counted, pending = 0, set[int](), list(values)
     alive: list[object] = []  # so that no two have the same id
     while pending:
@@ -89,7 +89,7 @@ class ByteBoundedCache:
 
 
 def byte_bounded_cache(limit: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Decorator: keep results by arguments, at most so many, bounded in bytes (`ByteBoundedCache`)."""
+    """Decorator: keep results by arguments, at most `limit`, bounded in bytes (`ByteBoundedCache`)."""
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         return ByteBoundedCache(function, limit)

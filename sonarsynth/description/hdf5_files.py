@@ -41,7 +41,7 @@ def refuse_other_files(data: bytes) -> None:
 
 
 def read_dataset(data: bytes, name: str | None, limit: int) -> tuple[np.ndarray, dict[str, float]]:
-    """The numbers of a dataset of at most so many, and its attributes that are numbers: its own before those of the
+    """The numbers of a dataset, at most `limit`, and its attributes that are numbers: its own before those of the
     groups that hold it.
 
     name: of the dataset, `/group/dataset`; left out: the only one of numbers that there is. Raises FileError, whatever

@@ -40,7 +40,7 @@ def stamp(path: Path | str) -> tuple[int, int]:
 
 
 def read(path: Path | str, limit: int) -> bytes:
-    """The bytes of a plain file of at most so many. Raises FileError."""
+    """The bytes of a plain file of at most `limit` bytes. Raises FileError."""
     with opened(path) as file:
         size = os.fstat(file.fileno()).st_size
         data = b"" if size > limit else file.read(size)

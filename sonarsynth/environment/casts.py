@@ -93,7 +93,7 @@ def _place(source: TemperatureSalinity | Cast, table: CastTable | None = None) -
 
 
 def _cast_profile(cast: Cast) -> Profile:
-    """The profile of a file: read, chosen from, and said what of."""
+    """The profile of a file: read, its rows selected, with notes of what was done."""
     own_place = [None if angle is None else float(np.degrees(angle)) for angle in (cast.latitude, cast.longitude)]
     table = read_cast(Path(cast.path), cast.profile, *own_place)
     salt = table.columns.get("salinity")

@@ -83,8 +83,7 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     that the truth has, which the check counts and warns of.
 
     Frames without a target in view, or whose echoes are inaudible, under the noise, or no louder than those of one out
-    of view, do not count. Where a chorus or anything else sounds
-    too, it may be brighter: a warning.
+    of view, do not count. A chorus, or anything else that sounds too, may be brighter: that is a warning.
     """
     name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
     azimuth, elevation = (np.deg2rad(every(tree, f"truth/beams/{axis}")) for axis in ("azimuth", "elevation"))

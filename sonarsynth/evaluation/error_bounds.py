@@ -22,7 +22,7 @@ FRAMES, FRAMES_REMOTE, ROWS = 200, 24, 20_000_000
 def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """Whether ranges of direct echoes, by their errors and by predicted ones, tell more than the beam alone does.
 
-    They do not where half of them are further off than the target is large and a beam is wide there.
+    They do not where half of them are off by more than the size of the target and the width of a beam there.
     """
     name, expected = "ranges useful", "reported"
     cloud = points(tree, frames)

@@ -133,7 +133,7 @@ def _ratio(cloud: Points) -> np.ndarray:
 
 
 def kinds(cloud: Points) -> dict[str, np.ndarray]:
-    """What points are that are not judged: each (point,) in the first that it belongs to."""
+    """Points that are not judged, by kind: masks (point,), each point in the first kind that it belongs to."""
     of = {word: cloud.origin == number for number, word in enumerate(ORIGINS)}
     rows = {
         "the snap itself": of["snap itself"],

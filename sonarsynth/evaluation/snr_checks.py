@@ -22,7 +22,7 @@ def signal_to_noise(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """Echo over the sum of the parts is the ratio; and where a target alone is much louder than all of them, the image
     has the energy of its echo, as far as parts that add or cancel may change that.
 
-    Frames of several targets, and images that are not by delay and sum, are asked for the first alone.
+    Of frames with several targets, and of images that are not by delay and sum, only the ratio is checked.
     """
     name, expected = "signal to noise", f"its parts within {ROUNDING} dB, and the images of what is loud"
     apart, compared, bad = 0.0, 0, list[int]()

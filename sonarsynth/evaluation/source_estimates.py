@@ -137,7 +137,7 @@ def _useless(tree: xr.DataTree, row: dict[str, np.ndarray]) -> bool:
 
 
 def _warning(tally: _Tally) -> str:
-    """What is honest, and of no use."""
+    """In one line, what is honest but of no use."""
     warnings = []
     if tally.unheard:
         why = ", ".join(f"{name} {count}" for name, count in tally.reasons.most_common(3))

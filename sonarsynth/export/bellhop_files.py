@@ -54,7 +54,7 @@ def write_bellhop(plan: Plan, index: int, folder: Path, name: str) -> tuple[list
     """Write an environment for each place of a snap of frame `index`: `<name>_frame<index>_snap<number>.env`.
 
     Its run is 'A': Bellhop writes delays, angles and amplitudes of the eigenrays to a `.arr`, which `sonarsynth rays
-    --compare` reads. Returns the files written, and what Bellhop has no words for, a line each. Raises FieldError for
+    --compare` reads. Returns the files written, and what Bellhop cannot express, a line each. Raises FieldError for
     a frame without a snap, OSError where a file cannot be written.
     """
     plan = plan.at(index)

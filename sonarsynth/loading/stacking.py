@@ -34,13 +34,13 @@ def stack(tree: xr.DataTree, frames: Iterable[int] | None = None) -> xr.DataArra
     """
     if "image" not in tree.children:
         raise ValueError("the store has no image")
-    some = built_frames(tree) if frames is None else np.asarray(list(frames), int)
-    energy = tree["image"].dataset["energy"].isel(frame=some)
-    there = np.isfinite(energy.values).any(axis=(1, 2))
-    if not there.any():
+    chosen = built_frames(tree) if frames is None else np.asarray(list(frames), int)
+    energy = tree["image"].dataset["energy"].isel(frame=chosen)
+    imaged = np.isfinite(energy.values).any(axis=(1, 2))
+    if not imaged.any():
         raise ValueError("none of the frames has an image")
     targets = tree["truth/targets"].dataset
-    boxes = targets["image_box"].isel(frame=some[there]).values
+    boxes = targets["image_box"].isel(frame=chosen[imaged]).values
     width = float(np.rad2deg(beam_width(tree)))
     for number, name in enumerate(targets["target"].values):
         own = boxes[:, number][np.isfinite(boxes[:, number]).all(axis=1)]
@@ -49,7 +49,7 @@ def stack(tree: xr.DataTree, frames: Iterable[int] | None = None) -> xr.DataArra
             raise ValueError(
                 f"{name} moves {moved:.1f} deg in these frames: more than half of a beam of {width:.1f} deg"
             )
-    return energy.isel(frame=there).median("frame", keep_attrs=True)
+    return energy.isel(frame=imaged).median("frame", keep_attrs=True)
 
 
 def stacked_index(ratio: float, degrees: float, windows: float) -> float:

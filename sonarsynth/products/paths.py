@@ -162,8 +162,8 @@ class Arrivals:
         """The paths that reach the centre of the array, as if all hydrophones saw what it sees."""
         if not self.occluded.shape[1]:
             return self
-        seen = self.select(self.occluded[:, 0] < 128)
-        return replace(seen, occluded=seen.occluded[:, :0])
+        unoccluded = self.select(self.occluded[:, 0] < 128)
+        return replace(unoccluded, occluded=unoccluded.occluded[:, :0])
 
     @property
     def without_reverberation(self) -> Arrivals:

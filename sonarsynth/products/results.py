@@ -109,8 +109,8 @@ class PointCloud:
         """At most so many points, those of most energy, in the order in which they are; the others are counted."""
         if len(self) <= count:
             return self
-        kept = np.sort(np.argsort(-self.energy, kind="stable")[:count])
-        return replace(self.select(kept), overflow=self.overflow + len(self) - count)
+        rows = np.sort(np.argsort(-self.energy, kind="stable")[:count])
+        return replace(self.select(rows), overflow=self.overflow + len(self) - count)
 
 
 def no_points() -> PointCloud:

@@ -23,7 +23,7 @@ class Image:
 
 
 def images(start: Floats, end: Floats, bottom_depth: float, bounces: int) -> list[Image]:
-    """All ways from depths start to depths end (pair,) by at most so many reflections; the straight one first."""
+    """All paths from depths start to depths end (pair,) with at most `bounces` reflections; the straight one first."""
     top, bottom = np.minimum(start, end), np.maximum(start, end)
     span, paths = bottom - top, []
     for n in range(bounces + 1):

@@ -17,12 +17,12 @@ RENAMED: Final[dict[Path, str]] = {
 """Old path to the new last word of it."""
 
 
-def new_path(where: Path) -> Path:
+def new_path(path: Path) -> Path:
     """A path in the words of today."""
     for old, name in RENAMED.items():
-        if where[: len(old)] == old:
-            return (*old[:-1], name, *where[len(old) :])
-    return where
+        if path[: len(old)] == old:
+            return (*old[:-1], name, *path[len(old) :])
+    return path
 
 
 def as_drawn(path: str) -> str:

@@ -149,12 +149,12 @@ def sample_geometry(
 
 
 def _even(count: int, limit: int) -> list[int]:
-    """At most so many of 0 to count - 1, evenly, both ends among them."""
+    """At most `limit` of 0 to count - 1, evenly spaced, both ends among them."""
     return [int(n) for n in np.unique(np.linspace(0, count - 1, min(count, limit)).astype(int))]
 
 
 def spread(count: int, limit: int) -> Ints:
-    """At most so many of `count` numbers: all, or one at random from each of `limit` equal parts."""
+    """At most `limit` of the numbers below `count`: all, or one at random from each of `limit` equal parts."""
     if count <= limit:
         return np.arange(count)
     width = count / limit

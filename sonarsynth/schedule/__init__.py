@@ -206,7 +206,7 @@ def _check_memory(
 
 
 def _room(plan: Plan, frames: int) -> DiskRoom:
-    """What so many frames need at most."""
+    """The room on the disk that so many frames need at most."""
     bytes_ = plan.predicted_bytes * frames / max(plan.recipe.frames, 1)
     return DiskRoom(bytes_, store.layout_of(plan).files(-(-frames // plan.shard_frames)))
 

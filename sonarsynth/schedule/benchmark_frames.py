@@ -193,9 +193,9 @@ def _mean(costs: Sequence[Stages]) -> Stages:
 
 
 def _make(plan: Plan, index: int, every: int = 1) -> _TimedFrame:
-    """One frame, with one facet of so many.
+    """One frame, with one facet in every `every`.
 
-    Where the array is cut into more than PARTS parts, it is heard as one and by so many of these.
+    Where the array is cut into more than PARTS parts, the undivided array is timed, and PARTS of the parts.
     """
     began, before = time.perf_counter(), time.thread_time()
     with stage_timer() as cpu:

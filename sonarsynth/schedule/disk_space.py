@@ -37,7 +37,7 @@ class DiskRoom(NamedTuple):
 
 
 def free_room(path: Folder) -> DiskRoom:
-    """What is free where a path is, or is to be; nobody knows of an object store, or where files are not counted."""
+    """What is free where a path is, or is to be; infinite for an object store, or where files are not counted."""
     if isinstance(path, Remote):
         return DiskRoom(math.inf, math.inf)
     existing = path

@@ -38,6 +38,6 @@ class PulseModel(Method):
         return None
 
     def fault(self, longest: float, limit: float) -> str:
-        """Why there is no such pulse, `longest` times as long and over in `limit` seconds, before it is made; empty
-        where nothing is wrong so far."""
+        """Why there is no such pulse, told before it is computed; empty where nothing is wrong so far. The pulse may be
+        `longest` times as long, and must be over in `limit` seconds."""
         return ""

@@ -158,10 +158,10 @@ def meeting_times(tracks: Sequence[Track], snaps: tuple[Emission, ...], travel_t
     start = np.array([snap.position for snap in snaps]).reshape(-1, 1, 3) + np.zeros((len(tracks), 3))
     met, arrives = emitted, np.ones(emitted.shape, bool)
     for _ in range(MEETINGS if emitted.size else 0):
-        found = emitted + travel_time(start.reshape(-1, 3), positions(tracks, met).reshape(-1, 3)).reshape(met.shape)
-        arrives = np.isfinite(found)
-        late = np.abs(found - met)[arrives].max(initial=0.0)
-        met = np.where(arrives, found, met)
+        arrival = emitted + travel_time(start.reshape(-1, 3), positions(tracks, met).reshape(-1, 3)).reshape(met.shape)
+        arrives = np.isfinite(arrival)
+        late = np.abs(arrival - met)[arrives].max(initial=0.0)
+        met = np.where(arrives, arrival, met)
         if late <= MET or all(track.still for track in tracks):
             break
     return np.where(arrives, met, np.nan)

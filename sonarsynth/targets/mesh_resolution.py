@@ -174,7 +174,7 @@ def _refinable(shape: Shape) -> bool:
 
 
 def _limits(mesh: Mesh, shape: Shape, edge: float, sagitta: float, max_facets: int) -> tuple[float, float]:
-    """Longest edge and mean sagitta (m) for the mesh of a shape, so long that about so many facets serve.
+    """Longest edge and mean sagitta (m) for the mesh of a shape, so that about `max_facets` facets suffice.
 
     Facets of the coarse mesh are cut in as many as their area asks, and as the distance of their plane from the curve
     asks, which falls with the square of the edge.

@@ -21,7 +21,7 @@ MOST: Final = 4096
 
 
 def overlap(a: PlacedTarget, b: PlacedTarget) -> str | None:
-    """How two closed bodies overlap, as a verb with its object left out, or None: they are apart, or only touch.
+    """How two closed bodies overlap, as a verb, or None where they are apart or only touch.
 
     "coincide", "overlap", or "overlap (the second is inside the first)" and the like. Facets are taken a little under
     the surface: bodies overlap where one such is inside the other body, or where one crosses its surface.

@@ -33,9 +33,9 @@ def kept_aperture_terms(position: Floats, aperture: float, terms: int) -> Floats
 
 @lru_cache(maxsize=256)
 def _kept_terms(position: bytes, aperture: float, terms: int) -> Floats:
-    found = aperture_terms(np.frombuffer(position).reshape(-1, 3), aperture, terms)
-    found.setflags(write=False)
-    return found
+    polynomials = aperture_terms(np.frombuffer(position).reshape(-1, 3), aperture, terms)
+    polynomials.setflags(write=False)
+    return polynomials
 
 
 def element_directivity(frequency: npt.ArrayLike, direction: npt.ArrayLike, face: float, sound_speed: float) -> Floats:

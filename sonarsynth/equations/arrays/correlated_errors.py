@@ -14,8 +14,8 @@ def correlated_error_factor(error: Floats, sensor: Ints, neighbour: Ints) -> flo
     """Factor on the variance of a fit, at least 1, where the errors (sensor,) of neighbouring sensors are correlated.
 
     sensor (live,): which sensors; neighbour (live, near): those next to each. Another wave in the window shifts the
-    lags in waves across the array: neighbours err alike, and the fit takes more of it for direction and curvature than
-    of independent errors. Errors that correlate by r between neighbours on a lattice, and by r^n between the n-th along
+    lags in ripples across the array: neighbours err alike, and direction and curvature err more than by independent
+    errors. Errors that correlate by r between neighbours on a lattice, and by r^n between the n-th along
     a row or a column, give means ((1 + r)/(1 - r))^2 times the variance of independent ones.
     Source: Bartlett (1946), J. R. Stat. Soc. Suppl. 8, 27, in both directions.
     """

@@ -8,10 +8,10 @@ from sonarsynth.conventions import Floats
 
 
 def grating_lobes(direction: Floats, frequency: Floats, pitch: float, sound_speed: float) -> Floats:
-    """Directions (lobe, frequency, xyz) of beams that hear a plane wave from `direction` (xyz) as loud as its own does.
+    """Directions (lobe, frequency, xyz) of beams that hear a plane wave from `direction` (xyz) as loud as a beam there.
 
     Of a square lattice in the plane x = 0, ahead of it (x > 0): frequency (Hz), pitch (m), sound speed (m/s). NaN at
-    frequencies that have not this lobe; lobes of no frequency are left out. Components along the lattice differ by
+    frequencies without this lobe; lobes of no frequency are left out. Components along the lattice differ by
     whole multiples of c/(f pitch) (Van Trees 2002, Optimum Array Processing, section 2.5).
     """
     step = sound_speed / (np.asarray(frequency, float) * pitch)

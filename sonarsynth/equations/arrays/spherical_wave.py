@@ -61,7 +61,7 @@ def plane_wave(
 ) -> tuple[Floats, float]:
     """Direction (xyz) and time (s) of the plane wave that fits delays (sensor,) best: the thesis's eq. 6, corrected.
 
-    The sum of SQUARES of tau_i - t0 + u.q_i/c is least, with the intercept t0 among the unknowns; closed form, no
+    Minimises the sum of SQUARES of tau_i - t0 + u.q_i/c, with the intercept t0 among the unknowns; closed form, no
     search. (As printed, without the square, the sum does not depend on the angles for a symmetric array.) A planar
     array gives the two components in its plane; the third follows from |u| = 1 with the sign that faces +x, since
     such an array cannot tell front from back. NaN where the sensors (those of positive weight) lie on one line or in

@@ -111,11 +111,11 @@ def pulse(collapse: Collapse, highest: float, fade: float = 0.5) -> Pulse:
 
 @lru_cache(maxsize=256)
 def peak_below(collapse: Collapse, frequency: float, fade: float = 0.5) -> float:
-    """Largest pressure (Pa) at 1 m of the first collapse below a frequency (Hz): behind a low pass that is at half
-    there, to 1e-4.
+    """Largest pressure (Pa) at 1 m of the first collapse below a frequency (Hz): after a low-pass filter whose
+    gain is a half there; good to 1e-4.
 
-    It hardly depends on the gas, and is finite for a bubble that becomes a point: what an instrument hears of a peak
-    that lasts nanoseconds. Raises ValueError for a bubble that settles.
+    This is what an instrument hears of a peak that lasts nanoseconds. It hardly depends on the gas, and is finite for
+    a bubble that becomes a point. Raises ValueError for a bubble that settles.
     """
     low_pass = Fir(0.0, frequency, TRANSITION * frequency, ATTENUATION)
     emitted = pulse(collapse, reach(low_pass), fade)

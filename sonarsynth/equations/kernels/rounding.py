@@ -19,21 +19,21 @@ def multiples(values: npt.NDArray[Any], step: float) -> npt.NDArray[np.int16]:
 @njit(cache=True, error_model="numpy", nogil=True)
 def _multiples(values: npt.NDArray[Any], step: Any, out: npt.NDArray[np.int16]) -> None:
     for i in range(values.shape[0]):
-        row, whole = values[i], out[i]
+        row, counts = values[i], out[i]
         for j in range(len(row)):
-            whole[j] = np.int16(np.rint(row[j] / step))
+            counts[j] = np.int16(np.rint(row[j] / step))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def round_off(values: npt.NDArray[Any], step: Any, most: Any, out: npt.NDArray[Any]) -> tuple[int, int]:
-    """Write values (row, column) rounded to whole steps, of `most` steps at most either way, into out; returns how many
-    were more, and how many are no number."""
+def round_off(values: npt.NDArray[Any], step: Any, limit: Any, out: npt.NDArray[Any]) -> tuple[int, int]:
+    """Write values (row, column) rounded to whole steps, at most `limit` steps either way, into out. Returns how
+    many were beyond that, and how many are not a number."""
     clipped = unknown = 0
     for i in range(values.shape[0]):
         row, rounded = values[i], out[i]
         for j in range(len(row)):
             count = np.rint(row[j] / step)
-            clipped += 1 if abs(count) > most else 0
+            clipped += 1 if abs(count) > limit else 0
             unknown += 1 if np.isnan(count) else 0
-            rounded[j] = min(max(count, -most), most) * step
+            rounded[j] = min(max(count, -limit), limit) * step
     return clipped, unknown

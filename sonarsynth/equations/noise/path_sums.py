@@ -83,7 +83,7 @@ def _turn(x: Floats, y: Floats, phase: float, delay: float, omega: Floats, room:
 def _fade(
     x: Floats, y: Floats, amplitude: float, decay: float, half: float, relative: Floats, square: Floats, largest: float
 ) -> None:
-    """Multiplies x + iy (bin,) by amplitude exp(-decay relative - half square); most: of |relative|."""
+    """Multiplies x + iy (bin,) by amplitude exp(-decay relative - half square); largest: of |relative|."""
     if abs(decay) * largest + half * square[-1] < SMALL:
         for k in range(x.size):
             exponent = -decay * relative[k] - half * square[k]

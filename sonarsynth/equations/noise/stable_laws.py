@@ -109,7 +109,7 @@ def _quantiles() -> tuple[Floats, Floats, Floats]:
 def fit_quantiles(values: Floats) -> StableFit:
     """From the 5, 25, 75 and 95 % quantiles of samples (sample,). Raises ValueError where no law fits.
 
-    Source: McCulloch (1986), Comm. Statist. Simul. Comp. 15, 1109, with quantiles worked out here for his table.
+    Source: McCulloch (1986), Comm. Statist. Simul. Comp. 15, 1109, with quantiles computed here in place of his table.
     """
     low, lower, upper, high = np.quantile(values, [0.05, 0.25, 0.75, 0.95])
     if not upper > lower:
@@ -126,7 +126,7 @@ def fit_characteristic_function(values: Floats) -> StableFit:
     """From log(-log |phi(t)|^2) = log(2 c^alpha) + alpha log t, phi the characteristic function of samples (sample,).
 
     Raises ValueError where no law fits. Source: Koutrouvelis (1980), J. Am. Stat. Assoc. 75, 918, by ordinary least
-    squares from the fit by quantiles on.
+    squares, from the fit by quantiles as first guess.
     """
     alpha, scale = fit_quantiles(values)
     alphas, points = np.transpose(CHARACTERISTIC_POINTS)

@@ -73,7 +73,7 @@ def water(depth: Floats, speed: Floats, bottom_depth: float) -> Water:
 
 @lru_cache(maxsize=64)
 def _water(depth: bytes, speed: bytes, bottom_depth: float) -> Water:
-    """The same, kept: it is asked for with every batch of rays."""
+    """The same, cached: every batch of rays asks for it."""
     z, c = np.frombuffer(depth), np.frombuffer(speed)
     if z.shape != c.shape or len(z) == 0:
         raise ValueError("a profile needs as many speeds as depths, and one at least")

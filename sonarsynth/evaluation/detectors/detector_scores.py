@@ -123,7 +123,7 @@ class DetectorReport:
         }
 
     def conditions(self) -> Iterator[tuple[str, list[tuple[str, np.ndarray]]]]:
-        """Objects (row,) by category, range, aspect, snr and visibility, without those that hold none."""
+        """Masks (row,) of objects by category, range, aspect, snr and visibility; empty ones are left out."""
         of = self.objects
         yield "category", _held((name, of.category == n) for n, name in enumerate(self.categories))
         for name, (unit, edges) in EDGES.items():

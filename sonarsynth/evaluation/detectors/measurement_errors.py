@@ -47,7 +47,7 @@ def _figures(error: Floats, unit: str) -> dict[str, Any]:
 
 
 def _calibration(error: Floats, predicted: Floats) -> dict[str, Any]:
-    """Errors over those predicted; nothing where none are."""
+    """How errors compare with predicted ones; empty where none are predicted."""
     has_both = np.isfinite(error) & (predicted > 0.0)
     if not has_both.any():
         return {}

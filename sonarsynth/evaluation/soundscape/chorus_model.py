@@ -66,7 +66,7 @@ class ChorusModel:
         return tuple(np.concatenate([-above[::-1], above]).tolist())
 
     def intensity(self, sine: Floats, absorption: float) -> Floats:
-        """Energy per unit of sine (node,), over that of a snap at 1 m and times the snaps a m2: sum of 2 pi V^2
+        """Energy per unit of sine (node,), relative to that of a snap at 1 m times the snaps a m2: sum of 2 pi V^2
         exp(-a r)/|sine| over the images whose rays come from there; absorption: dB/m."""
         flat, away = np.asarray(sine, float).ravel(), np.maximum(np.abs(np.asarray(sine, float)).ravel(), 1e-12)
         length = self.climb[:, None] / away

@@ -176,7 +176,7 @@ class _Sea:
         return cls(scene, times, others)
 
     def tried(self, population: Population, slot: int, draws: Floats) -> Target | None:
-        """The body that draws make, and it is in the water from now on; None where it does not fit."""
+        """The body that draws make, which stays in the water for those after it; None where it does not fit."""
         position = population.region.place(draws[:3], self.view)
         if position is None:
             return None

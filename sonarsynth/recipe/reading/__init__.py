@@ -146,50 +146,50 @@ def dump(recipe: Recipe) -> str:
     return text.getvalue()
 
 
-def _resolved(source: Source, data: Any, where: Where, check: bool) -> Any:
+def _resolved(source: Source, data: Any, keys: Where, check: bool) -> Any:
     """The data with the paths of files absolute; raises RecipeError where a file is not there."""
     if isinstance(data, list):
-        return [_resolved(source, value, (*where, i), check) for i, value in enumerate(data)]
+        return [_resolved(source, value, (*keys, i), check) for i, value in enumerate(data)]
     if not isinstance(data, dict):
         return data
     path = data.get("path")
     if isinstance(path, str) and any(data.get("kind") == kind for kind in FILE_KINDS):
-        field = (*where, "path")
+        field = (*keys, "path")
         folder = Path.cwd() if source.place(field) == SET else source.folder
         file = Path(path) if Path(path).is_absolute() else folder / path
         if check:
             _check_place(source, field, path)
             _check_file(source, field, path, folder)
         return data | {"path": path if Path(path).is_absolute() else str(file)}
-    return {key: _resolved(source, value, (*where, key), check) for key, value in data.items()}
+    return {key: _resolved(source, value, (*keys, key), check) for key, value in data.items()}
 
 
-def _check_file(source: Source, where: Where, path: str, folder: Path) -> None:
+def _check_file(source: Source, keys: Where, path: str, folder: Path) -> None:
     file = folder / path
     try:
         exists, is_file = file.exists(), file.is_file()
     except (OSError, ValueError):  # too long, or a NUL byte
-        raise source.error(where, "is not the path of a file") from None
+        raise source.error(keys, "is not the path of a file") from None
     if not exists:
-        raise source.error(where, f"no such file: {path}" + ("" if Path(path).is_absolute() else f", in {folder}"))
+        raise source.error(keys, f"no such file: {path}" + ("" if Path(path).is_absolute() else f", in {folder}"))
     if not is_file:
-        raise source.error(where, f"is not a file: {path or file}")
+        raise source.error(keys, f"is not a file: {path or file}")
 
 
-def _check_place(source: Source, where: Where, path: str) -> None:
+def _check_place(source: Source, keys: Where, path: str) -> None:
     """What a recipe names lies in its folder: what comes from elsewhere with a recipe opens no other file of ours."""
-    if source.place(where) == SET:
+    if source.place(keys) == SET:
         return
     if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://|file:", path):
-        raise source.error(where, "is a URL: a recipe names files in its own folder")
+        raise source.error(keys, "is a URL: a recipe names files in its own folder")
     elsewhere = "a recipe names files in its own folder; `--set` may name any"
     if Path(path).is_absolute():
-        raise source.error(where, f"is an absolute path: {elsewhere}")
+        raise source.error(keys, f"is an absolute path: {elsewhere}")
     if ".." in Path(path).parts:
-        raise source.error(where, f"leaves the folder of the recipe: {elsewhere}")
+        raise source.error(keys, f"leaves the folder of the recipe: {elsewhere}")
     try:
         inside = (source.folder / path).resolve().is_relative_to(source.folder.resolve())
     except (OSError, ValueError, RuntimeError):  # too long, a NUL byte, links in a circle
-        raise source.error(where, "is not the path of a file") from None
+        raise source.error(keys, "is not the path of a file") from None
     if not inside:
-        raise source.error(where, f"is a link out of the folder of the recipe: {elsewhere}")
+        raise source.error(keys, f"is a link out of the folder of the recipe: {elsewhere}")

@@ -18,59 +18,59 @@ def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
     """The first error of a validation, with its place in the file, and how many more there are."""
     texts: dict[Where, str] = {}
     for details in error.errors(include_url=False):
-        where = _where(details, source.data)
-        where, message = _message(details, where, root, source.data)
-        if details["type"] == "dataclass_type" and (texts.get(where) or "").startswith("must be '"):
-            texts[where] = texts[where].replace("' or '", "', '").replace(", not ", " or a mapping, not ", 1)
-        texts.setdefault(where, message)
-    words = {where for where, text in texts.items() if text.startswith("must be '") and text.endswith("not a mapping")}
-    for where in words:  # of a word or a mapping, it is the mapping that was meant
-        if any(len(longer) > len(where) and longer[: len(where)] == where for longer in texts):
-            del texts[where]
+        keys = _where(details, source.data)
+        keys, message = _message(details, keys, root, source.data)
+        if details["type"] == "dataclass_type" and (texts.get(keys) or "").startswith("must be '"):
+            texts[keys] = texts[keys].replace("' or '", "', '").replace(", not ", " or a mapping, not ", 1)
+        texts.setdefault(keys, message)
+    words = {keys for keys, text in texts.items() if text.startswith("must be '") and text.endswith("not a mapping")}
+    for keys in words:  # of a word or a mapping, it is the mapping that was meant
+        if any(len(longer) > len(keys) and longer[: len(keys)] == keys for longer in texts):
+            del texts[keys]
     guessed = [item for item in texts.items() if "did you mean" in item[1]]  # a misspelt field explains a missing one
-    where, message = next(iter(texts.items()))
+    keys, message = next(iter(texts.items()))
     if guessed and message == "is required":
-        where, message = guessed[0]
+        keys, message = guessed[0]
     more = f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
-    return source.error(where, message + _of_another_kind(where, source) + more)
+    return source.error(keys, message + _of_another_kind(keys, source) + more)
 
 
-def _of_another_kind(where: Where, source: Source) -> str:
+def _of_another_kind(keys: Where, source: Source) -> str:
     """What to do about a field of the kind that `--set` has replaced; "" where it has not."""
-    kind = (*where[:-1], "kind")
-    if not where or where[-1] == "kind" or source.places.get(kind) != SET or source.places.get(where, SET) == SET:
+    kind = (*keys[:-1], "kind")
+    if not keys or keys[-1] == "kind" or source.places.get(kind) != SET or source.places.get(keys, SET) == SET:
         return ""
     holder = source.data
-    for key in where[:-1]:
+    for key in keys[:-1]:
         holder = holder[key]
-    return f"; to replace all fields: --set {dotted(where[:-1])}='{{kind: {holder['kind']}}}'"
+    return f"; to replace all fields: --set {dotted(keys[:-1])}='{{kind: {holder['kind']}}}'"
 
 
 def _where(details: ErrorDetails, data: Any) -> Where:
     """The path of an error in the file: pydantic's, without the parts that name members of unions."""
     path: list[str | int] = []
-    keys = details["loc"]
-    for n, key in enumerate(keys):
+    loc = details["loc"]
+    for n, key in enumerate(loc):
         named = isinstance(data, dict) and key in data and data.get("kind") != key
         if named or (isinstance(data, list) and isinstance(key, int) and key < len(data)):
             data = data[key]
-        elif not (details["type"] == "missing" and n == len(keys) - 1):
+        elif not (details["type"] == "missing" and n == len(loc) - 1):
             continue
         path.append(key)
     return tuple(path)
 
 
-def _message(details: ErrorDetails, where: Where, root: type, data: Any) -> tuple[Where, str]:
+def _message(details: ErrorDetails, keys: Where, root: type, data: Any) -> tuple[Where, str]:
     """Path and text of an error."""
     context = details.get("ctx", {})
     if details["type"] == "union_tag_invalid":
-        kinds = _kinds(_type_at(root, where, data))
-        return (*where, "kind"), _unknown(str(context["tag"]), kinds, "kind")
+        kinds = _kinds(_type_at(root, keys, data))
+        return (*keys, "kind"), _unknown(str(context["tag"]), kinds, "kind")
     if details["type"] == "union_tag_not_found":
-        return where, f"needs a kind: one of {', '.join(_kinds(_type_at(root, where, data)))}"
+        return keys, f"needs a kind: one of {', '.join(_kinds(_type_at(root, keys, data)))}"
     if details["type"] == "unexpected_keyword_argument":
-        return where, _unknown(str(where[-1]), _fields(_class_at(root, where[:-1], data)))
-    return where, _text(details)
+        return keys, _unknown(str(keys[-1]), _fields(_class_at(root, keys[:-1], data)))
+    return keys, _text(details)
 
 
 def _text(details: ErrorDetails) -> str:
@@ -95,9 +95,9 @@ def _text(details: ErrorDetails) -> str:
     return f"{text[0].lower()}{text[1:]}, not {value}"
 
 
-def _unknown(name: str, known: list[str], noun: str = "field") -> str:
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(known)}"
+def _unknown(name: str, names: list[str], noun: str = "field") -> str:
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(names)}"
     return f"'{name}' is not a {noun} here; {hint}"
 
 
@@ -119,18 +119,18 @@ def _fields(cls: type | None) -> list[str]:
     return [] if cls is None else list(getattr(cls, "__pydantic_fields__", {}))
 
 
-def _class_at(root: Any, where: Where, data: Any) -> type | None:
+def _class_at(root: Any, keys: Where, data: Any) -> type | None:
     """The description that a path leads to; None where it leads elsewhere."""
-    kind = _type_at(root, where, data)
-    for key in where:
+    kind = _type_at(root, keys, data)
+    for key in keys:
         data = data[key]
     chosen = _chosen(kind, data)
     return chosen if isinstance(chosen, type) and is_dataclass(chosen) else None
 
 
-def _type_at(kind: Any, where: Where, data: Any) -> Any:
+def _type_at(kind: Any, keys: Where, data: Any) -> Any:
     """The annotation of what a path leads to, choosing members of unions by the `kind` in the data."""
-    for key in where:
+    for key in keys:
         kind, data = _chosen(kind, data), data[key]
         if get_origin(kind) is tuple:
             members = get_args(kind)

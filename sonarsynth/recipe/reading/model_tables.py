@@ -20,28 +20,28 @@ COLUMNS: Final = ("file", *OF_MODEL, "scale_low", "scale_high", *OF_SHAPE)
 
 def with_models(source: Source) -> Source:
     """The source with the models that its tables list in place of the tables. Raises RecipeError."""
-    where: Where = ("scene", "world", "populations")
+    keys: Where = ("scene", "world", "populations")
     populations = source.data
-    for key in where:
+    for key in keys:
         populations = populations.get(key) if isinstance(populations, dict) else None
     if not isinstance(populations, list):
         return source
-    with_tables_read, scene = [], source.data["scene"]
+    expanded, scene = [], source.data["scene"]
     for number, population in enumerate(populations):
         models = population.get("models") if isinstance(population, dict) else None
         if isinstance(models, dict) and isinstance(models.get("table"), str):
-            with_tables_read.append(population | {"models": _listed(source, (*where, number, "models"), models)})
+            expanded.append(population | {"models": _listed(source, (*keys, number, "models"), models)})
         else:
-            with_tables_read.append(population)
-    world = scene["world"] | {"populations": with_tables_read}
+            expanded.append(population)
+    world = scene["world"] | {"populations": expanded}
     return replace(source, data=source.data | {"scene": scene | {"world": world}})
 
 
-def _listed(source: Source, where: Where, models: dict[str, Any]) -> list[dict[str, Any]]:
+def _listed(source: Source, keys: Where, models: dict[str, Any]) -> list[dict[str, Any]]:
     """The models of a table."""
-    name, at = models["table"], (*where, "table")
+    name, at = models["table"], (*keys, "table")
     if len(models) > 1:
-        raise source.error(where, f"a table has no field beside it: {', '.join(k for k in models if k != 'table')}")
+        raise source.error(keys, f"a table has no field beside it: {', '.join(k for k in models if k != 'table')}")
     if source.place(at) == SET:
         raise source.error(at, "a table is named in the recipe itself: paths in it are relative to that")
     rows = csv.DictReader(io.StringIO(_text(source, at, name)), skipinitialspace=True)

@@ -48,7 +48,7 @@ def with_new_keys(source: Source) -> Source:
         data = _changed(data, (block,), partial(_new_paths, notes))
     if data is source.data:
         return source
-    places = {new_path(where): line for where, line in source.places.items()}
+    places = {new_path(keys): line for keys, line in source.places.items()}
     return replace(source, data=data, places=places, notes=tuple(dict.fromkeys(notes)))
 
 
@@ -106,18 +106,18 @@ def _new_paths(notes: list[str], node: Any) -> Any:
     return changed
 
 
-def _at(data: Any, where: Where) -> Any:
-    for key in where:
+def _at(data: Any, keys: Where) -> Any:
+    for key in keys:
         data = data.get(key) if isinstance(data, dict) else None
     return data
 
 
-def _changed(data: Any, where: Where, change: Callable[[Any], Any]) -> Any:
+def _changed(data: Any, keys: Where, change: Callable[[Any], Any]) -> Any:
     """`data` with the value at a path changed; the same object where nothing is, or where there is no such path."""
-    if not where:
+    if not keys:
         new = change(data)
         return data if new == data else new
-    if not isinstance(data, dict) or where[0] not in data:
+    if not isinstance(data, dict) or keys[0] not in data:
         return data
-    inner = _changed(data[where[0]], where[1:], change)
-    return data if inner is data[where[0]] else data | {where[0]: inner}
+    inner = _changed(data[keys[0]], keys[1:], change)
+    return data if inner is data[keys[0]] else data | {keys[0]: inner}

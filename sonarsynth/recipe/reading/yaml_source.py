@@ -61,22 +61,22 @@ class Source:
     notes: tuple[str, ...] = ()
     """What is to be said of it: keys that are called otherwise now."""
 
-    def place(self, where: Where) -> str:
+    def place(self, keys: Where) -> str:
         """Line of a value, or of the nearest one that holds it; `--set` where that set a part of the value."""
-        if any(place == SET and at[: len(where)] == where for at, place in self.places.items()):
+        if any(place == SET and at[: len(keys)] == keys for at, place in self.places.items()):
             return SET
-        while where and where not in self.places:
-            where = where[:-1]
-        return self.places.get(where, "1")
+        while keys and keys not in self.places:
+            keys = keys[:-1]
+        return self.places.get(keys, "1")
 
-    def error(self, where: Where, message: str) -> RecipeError:
+    def error(self, keys: Where, message: str) -> RecipeError:
         """The error of the value at a path."""
-        return RecipeError(self.name, self.place(where), dotted(where), message)
+        return RecipeError(self.name, self.place(keys), dotted(keys), message)
 
 
-def dotted(where: Where) -> str:
+def dotted(keys: Where) -> str:
     """A path as people write it: scene.world.targets.0.name."""
-    return ".".join(map(str, where))
+    return ".".join(map(str, keys))
 
 
 def read_file(path: Path | str) -> Source:
@@ -116,36 +116,36 @@ def override(source: Source, setting: str) -> Source:
     path, equals, text = setting.partition("=")
     if not equals or not path.strip():
         raise RecipeError(source.name, SET, "", f"'{setting}' is not path=value")
-    where: Where = tuple(int(p) if p.isdecimal() else p for p in path.strip().split("."))
+    keys: Where = tuple(int(p) if p.isdecimal() else p for p in path.strip().split("."))
     reader = _Reader(source.name, {}, SET)
     node = _compose(text, source.name, SET, path.strip())
-    value = None if node is None else reader.value(node, where)
-    places = {w: p for w, p in source.places.items() if w[: len(where)] != where}
+    value = None if node is None else reader.value(node, keys)
+    places = {w: p for w, p in source.places.items() if w[: len(keys)] != keys}
     return Source(
         source.name,
         source.folder,
-        _replaced(source, source.data, where, 0, value),
-        places | reader.places | {where: SET},
+        _replaced(source, source.data, keys, 0, value),
+        places | reader.places | {keys: SET},
         source.text,
         (*source.settings, setting),
         source.notes,
     )
 
 
-def _replaced(source: Source, data: Any, where: Where, depth: int, value: Any) -> Any:
-    """`data` with the value at where[depth:] replaced; mappings on the way are made where there are none."""
-    if depth == len(where):
+def _replaced(source: Source, data: Any, keys: Where, depth: int, value: Any) -> Any:
+    """`data` with the value at keys[depth:] replaced; missing mappings on the way are added."""
+    if depth == len(keys):
         return value
-    key = where[depth]
+    key = keys[depth]
     if isinstance(data, list):
         if not isinstance(key, int) or key >= len(data):
-            raise RecipeError(source.name, SET, dotted(where), f"'{key}' is not one of the {len(data)} entries from 0")
-        return [_replaced(source, v, where, depth + 1, value) if i == key else v for i, v in enumerate(data)]
+            raise RecipeError(source.name, SET, dotted(keys), f"'{key}' is not one of the {len(data)} entries from 0")
+        return [_replaced(source, v, keys, depth + 1, value) if i == key else v for i, v in enumerate(data)]
     if data is None or isinstance(data, dict):
         data = data or {}
         text = str(key)
-        return data | {text: _replaced(source, data.get(text), where, depth + 1, value)}
-    raise RecipeError(source.name, SET, dotted(where), f"'{dotted(where[:depth])}' has no fields")
+        return data | {text: _replaced(source, data.get(text), keys, depth + 1, value)}
+    raise RecipeError(source.name, SET, dotted(keys), f"'{dotted(keys[:depth])}' has no fields")
 
 
 @lru_cache(maxsize=16)
@@ -211,57 +211,57 @@ class _Reader:
     places: dict[Where, str]
     place: str = ""
 
-    def error(self, node: Node, where: Where, message: str) -> RecipeError:
-        return RecipeError(self.name, self.place or str(node.start_mark.line + 1), dotted(where), message)
+    def error(self, node: Node, keys: Where, message: str) -> RecipeError:
+        return RecipeError(self.name, self.place or str(node.start_mark.line + 1), dotted(keys), message)
 
-    def value(self, node: Node, where: Where, at: Node | None = None) -> Any:
-        self.places.setdefault(where, self.place or str((at or node).start_mark.line + 1))
+    def value(self, node: Node, keys: Where, at: Node | None = None) -> Any:
+        self.places.setdefault(keys, self.place or str((at or node).start_mark.line + 1))
         if len(self.places) > MAX_VALUES:
             raise self.error(node, (), f"holds more than {MAX_VALUES} values (aliases are counted)")
-        if len(where) > MAX_DEPTH:
+        if len(keys) > MAX_DEPTH:
             raise self.error(node, (), f"is nested deeper than {MAX_DEPTH} levels")
         if isinstance(node, ScalarNode):
-            return self._scalar(node, where)
+            return self._scalar(node, keys)
         if isinstance(node, SequenceNode) and str(node.tag) == f"{_TAG}seq":
-            return [self.value(item, (*where, i)) for i, item in enumerate(node.value)]
+            return [self.value(item, (*keys, i)) for i, item in enumerate(node.value)]
         if isinstance(node, MappingNode) and str(node.tag) == f"{_TAG}map":
-            return {key: self.value(v, (*where, key), k) for key, k, v in self._items(node, where)}
-        raise self.error(node, where, f"has the tag {node.tag}; tags are not used in recipes")
+            return {key: self.value(v, (*keys, key), k) for key, k, v in self._items(node, keys)}
+        raise self.error(node, keys, f"has the tag {node.tag}; tags are not used in recipes")
 
-    def _items(self, node: MappingNode, where: Where) -> Iterator[tuple[str, Node, Node]]:
-        keys: set[str] = set()
+    def _items(self, node: MappingNode, keys: Where) -> Iterator[tuple[str, Node, Node]]:
+        taken: set[str] = set()
         for key, value in node.value:
             if not isinstance(key, ScalarNode):
-                raise self.error(key, where, "a key must be a text")
+                raise self.error(key, keys, "a key must be a text")
             if not _is_text(key.value):
-                raise self.error(key, where, "a key holds half a character (a surrogate)")
-            if key.value in keys:
-                raise self.error(key, (*where, key.value), "is given twice")
-            keys.add(key.value)
+                raise self.error(key, keys, "a key holds half a character (a surrogate)")
+            if key.value in taken:
+                raise self.error(key, (*keys, key.value), "is given twice")
+            taken.add(key.value)
             yield str(key.value), key, value
 
-    def _scalar(self, node: ScalarNode, where: Where) -> Any:
+    def _scalar(self, node: ScalarNode, keys: Where) -> Any:
         text, tag = str(node.value), str(node.tag)
         if not tag.startswith(_TAG):
-            raise self.error(node, where, f"has the tag {tag}; tags are not used in recipes")
+            raise self.error(node, keys, f"has the tag {tag}; tags are not used in recipes")
         match tag.removeprefix(_TAG):
             case "str" | "timestamp" | "merge" | "value":
                 if not _is_text(text):
-                    raise self.error(node, where, "holds half a character (a surrogate)")
+                    raise self.error(node, keys, "holds half a character (a surrogate)")
                 return text
             case "null":
                 return None
             case "bool" if text.lower() in ("true", "false"):
                 return text.lower() == "true"
             case "bool":
-                raise self.error(node, where, f"must be true or false, not {text[:40]}")
+                raise self.error(node, keys, f"must be true or false, not {text[:40]}")
             case "int":
-                return self._integer(node, where, text)
+                return self._integer(node, keys, text)
             case "float":
-                return self._float(node, where, text)
-        raise self.error(node, where, f"has the tag {tag}; tags are not used in recipes")
+                return self._float(node, keys, text)
+        raise self.error(node, keys, f"has the tag {tag}; tags are not used in recipes")
 
-    def _integer(self, node: Node, where: Where, text: str) -> int:
+    def _integer(self, node: Node, keys: Where, text: str) -> int:
         digits = text.lower().lstrip("+-")
         base = {"0x": 16, "0o": 8, "0b": 2}.get(digits[:2], 10)
         try:
@@ -270,15 +270,15 @@ class _Reader:
                 return number
             raise ValueError
         except ValueError:
-            raise self.error(node, where, "is not a whole number that can be used") from None
+            raise self.error(node, keys, "is not a whole number that can be used") from None
 
-    def _float(self, node: Node, where: Where, text: str) -> float:
+    def _float(self, node: Node, keys: Where, text: str) -> float:
         try:
             number = float(text.replace("_", ""))
         except ValueError:  # .inf and .nan, as YAML writes them
             number = math.nan
         if not math.isfinite(number):
-            raise self.error(node, where, f"must be a finite number, not {text[:40]}")
+            raise self.error(node, keys, f"must be a finite number, not {text[:40]}")
         return number
 
 

@@ -31,17 +31,17 @@ def numbered_variations(world: World, variations: tuple[Variation, ...]) -> tupl
     return tuple(_numbered(world, variation, ("variations", i)) for i, variation in enumerate(variations))
 
 
-def _numbered(world: World, entry: Entry, where: Where) -> Entry:
-    paths = tuple(_by_number(world, path, (*where, "path")) for path in entry.path)
+def _numbered(world: World, entry: Entry, at: Where) -> Entry:
+    paths = tuple(_by_number(world, path, (*at, "path")) for path in entry.path)
     return entry if paths == entry.path else replace(entry, path=paths)
 
 
-def _by_number(world: World, path: str, where: Where) -> str:
+def _by_number(world: World, path: str, at: Where) -> str:
     keys = path.split(".")
     if len(keys) < 4 or keys[1] != "world" or keys[2] not in LISTS or keys[3].isdecimal():
         return path
     names = [item.name for item in getattr(world, keys[2])]
     if keys[3] not in names:
         listed = ", ".join(names) or "there are none"
-        raise FieldError(where, f"'{path}': none of scene.world.{keys[2]} is called '{keys[3]}'; known: {listed}")
+        raise FieldError(at, f"'{path}': none of scene.world.{keys[2]} is called '{keys[3]}'; known: {listed}")
     return ".".join([*keys[:3], str(names.index(keys[3])), *keys[4:]])

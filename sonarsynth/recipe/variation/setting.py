@@ -48,7 +48,7 @@ def plain_scene(scene: Scene) -> dict[str, Any]:
 
 
 def with_settings(scene: Scene, plain: dict[str, Any], settings: Sequence[Setting]) -> Scene:
-    """The scene (`plain` is the same in JSON) with settings made, wider ones first.
+    """The scene (`plain` is the same in JSON) with settings applied, those of shorter paths first.
 
     Raises FieldError that names the setting and the field.
     """

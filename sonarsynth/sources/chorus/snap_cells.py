@@ -144,7 +144,7 @@ def _numbered(rows: Ints, count: Ints) -> Ints:
 
 
 def poisson(uniform: Floats, mean: float) -> Ints:
-    """Numbers (...) of the law of Poisson, from numbers evenly in 0 to 1, by inverting its distribution."""
+    """Poisson numbers (...), from numbers uniform in 0 to 1, by inverting the distribution."""
     count = np.zeros(uniform.shape, np.int64)
     more = np.flatnonzero(uniform >= np.exp(-mean))
     term = total = float(np.exp(-mean))

@@ -172,7 +172,7 @@ def _middles(full: int, n: int, phase: int) -> Ints:
 
 
 def _nearest(full: int, n: int, phase: int, m: int, phase_m: int) -> Ints:
-    """The vertex of the other ring nearest to the middle of each edge."""
+    """The vertex of the other ring (m vertices) nearest to the middle of each edge of a ring of n."""
     if m == 1:
         return np.zeros(n, int)
     step = 2 * (full // m)

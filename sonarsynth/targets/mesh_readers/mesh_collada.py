@@ -71,7 +71,7 @@ def _read(text: bytes) -> tuple[list[Surface], float, str]:
 
 
 def _check_placements(root: Element) -> None:
-    """Refuses a scene that places nodes in themselves, or more often than any scene does (each may place two more)."""
+    """Refuses a scene whose nodes contain themselves, or are placed too often (each may place two more)."""
     nodes = {element.get("id"): element for element in root.iter() if element.tag.endswith("}node")}
     sizes: dict[Element, int] = {}
     for start in nodes.values():
