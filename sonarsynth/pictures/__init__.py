@@ -135,7 +135,7 @@ def _view(tree: xr.DataTree, frame: StoredFrame, reference: float) -> View:
     title = tree.attrs.get("title") or "untitled"
     clock = f"   t = {frame.time:.2f} s" if np.isfinite(frame.time) else ""
     count = tree["truth"].sizes["frame"]
-    of = f", frames 0 to {count - 1}" if count > 1 else ""
+    of = f", {count} frames" if count > 1 else ""
     return View(
         title=f"{title}{of}",
         moment=f"frame {frame.index}{clock}{_snr(tree, frame)}",
@@ -155,7 +155,7 @@ def _snr(tree: xr.DataTree, frame: StoredFrame) -> str:
         return ""
     snr, names = found[frame.index], needed(tree, "truth/targets/target")
     loud = [n for n in np.argsort(-np.nan_to_num(snr, nan=-np.inf))[:3] if np.isfinite(snr[n])]
-    return "   snr " + ", ".join(f"{names[n]} {snr[n]:.0f} dB" for n in loud) if loud else ""
+    return "   snr " + ", ".join(f"{names[n]} {round(float(snr[n]))} dB" for n in loud) if loud else ""
 
 
 def _write_sheet(

@@ -107,7 +107,7 @@ def test_the_cloud_from_above_has_port_on_the_left_and_counts_what_it_does_not_s
     plan = next(axes for axes in picture.figure.axes if "above" in axes.get_title(loc="left"))
     assert plan.xaxis_inverted()
     assert not plan.yaxis_inverted()
-    assert "3 points, 1 of them outside" in [text.get_text() for text in plan.texts]
+    assert "3 points (1 outside)" in [text.get_text() for text in plan.texts]
 
 
 def test_the_filter_is_drawn_with_half_its_response_at_the_cutoff() -> None:

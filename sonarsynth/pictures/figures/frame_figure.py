@@ -189,8 +189,9 @@ class CloudPanel:
         self._points.set_array(clipped(view.point_level))
         outside = int((np.abs(at) > [reach, reach / 1.6]).any(axis=1).sum())
         before = f", grey: {len(view.earlier)} of earlier frames" if len(view.earlier) else ""
-        hidden = f", {outside} of them outside" if outside else ""
-        self._note.set_text(counted(len(at), "point") + hidden + before if hidden or self.plane == PLAN else "")
+        hidden = f"{outside} outside" if outside else ""
+        every = counted(len(at), "point") + (f" ({hidden})" if hidden else "") + before
+        self._note.set_text(every if self.plane == PLAN else hidden)
 
 
 def clipped(level: Floats) -> Floats:

@@ -106,8 +106,8 @@ class GhostMarks:
         return ring, text
 
 
-def legend(axes: Axes) -> None:
-    """What outline, rings and lines mean, over the axes of an image."""
+def legend(axes: Axes, ghosts: bool = True, lobes: bool = True) -> None:
+    """What outline, rings (of ghosts) and lines (of lobes) mean, over the axes of an image."""
     from matplotlib.lines import Line2D
 
     ring: dict[str, Any] = {
@@ -117,11 +117,9 @@ def legend(axes: Axes) -> None:
         "markerfacecolor": "none",
         "color": OUTLINES[0],
     }
-    handles = [
-        Line2D([], [], color=OUTLINES[0], label="true outline"),
-        Line2D([], [], label="ghost by surface or bottom", **ring),
-        Line2D([], [], label="grating lobe", **LOBE),
-    ]
+    handles = [Line2D([], [], color=OUTLINES[0], label="true outline")]
+    handles += [Line2D([], [], label="ghost by surface or bottom", **ring)] if ghosts else []
+    handles += [Line2D([], [], label="grating lobe", **LOBE)] if lobes else []
     where: dict[str, Any] = {
         "loc": "lower left",
         "bbox_to_anchor": (0.0, 1.0),

@@ -84,7 +84,7 @@ def draw_image(axes: Axes, azimuth: Floats, elevation: Floats, view: View, unit:
     if view.level is not None:
         image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
     outlines = set_outlines(outline_artist(axes), view.hulls)
-    legend(axes)
+    legend(axes, bool(view.ghosts), bool(view.lobes))
     colour_bar(axes, image, unit)
     return outlines
 
@@ -97,8 +97,8 @@ def mark_beams(axes: Axes, beams: list[Beam], outlines: list[Floats]) -> None:
     taken += [box_of(to_pixels([(beam.azimuth, beam.elevation)]), 5.0 * point) for beam in beams]
     for beam, number, colour in zip(beams, "123", MARKS, strict=False):
         at = (beam.azimuth, beam.elevation)
-        axes.plot(*at, "o", ms=8, mfc="none", mec="white", mew=2.4)
-        axes.plot(*at, "o", ms=8, mfc="none", mec=colour, mew=1.2)
+        axes.plot(*at, "o", ms=8, mfc="none", mec="white", mew=2.4, clip_on=False)
+        axes.plot(*at, "o", ms=8, mfc="none", mec=colour, mew=1.2, clip_on=False)
         size, pixel = np.full(2, BADGE * point), to_pixels(at)
         middle = place(pixel, size, 6.0 * point, np.asarray(axes.get_window_extent().extents), taken)
         taken.append(box_of(middle[None], 0.5 * BADGE * point))

@@ -162,6 +162,9 @@ def space_figure(title: str, rays: Sequence[Floats], looks: Sequence[Look], geom
         over = place if name != "array" else np.append(place[:2], geometry.sensors[:, 2].max())
         beside = {"ha": "center", "va": "bottom"} if name == "array" else {}
         axes.text(*over, name if beside else f"  {name}", fontsize=9, color=INK, **beside)
+    for hull in geometry.hulls:
+        top = hull.vertices[np.argmax(hull.vertices[:, 2])]
+        axes.text(*top, f"{hull.name}\n", fontsize=9, color=INK, ha="center", va="bottom", linespacing=0.5)
     every = [*rays, *(hull.vertices for hull in geometry.hulls), *geometry.tracks.values(), geometry.view["across"]]
     one_scale(axes, np.concatenate([*every, *(p[None] for p in geometry.places.values())]), geometry.bearing)
     _face(made.add_subplot(parts[0, 1]), geometry)
