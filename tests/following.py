@@ -1,7 +1,7 @@
 """Rays followed leg by leg through layered water by Snell's law: launch, refract, turn, reflect, and note every visit.
 
-Nothing is shared with the search for eigenrays: no sums with multiplicities, no bounds, no chains. Works on one ray of
-mpmath numbers (50 digits) or on many rays of NumPy's long doubles that see the same layers.
+Nothing is shared with the search for eigenrays: no sums with multiplicities, no bounds, no chains. Works on one ray or
+on many that see the same layers, in NumPy's long doubles.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-import mpmath as mp
 import numpy as np
 
 from sonarsynth.conventions import Floats
@@ -23,19 +22,18 @@ Family = tuple[int, int, int, int, int]
 
 @dataclass(frozen=True)
 class Visit:
-    """A ray where it passes the depth of the receiver: counts so far, sense of travel (1 up), sums, vertices so far."""
+    """A ray where it passes the depth of the receiver: counts so far, sense of travel (1 up), range so far."""
 
     surface: int
     bottom: int
     turning: int
     up: int
-    sums: Any  # what `layer` gives, added up: (range, ...) of one ray, or of many
-    upper: Any  # m: least and largest depth of a vertex, None without one
-    lower: Any
+    range: Any  # m, of one ray or of many
 
 
-def nodes(water: ray_solutions.Water, ends: tuple[float, float], number: Any) -> tuple[list[Any], list[Any]]:
-    """Depths and speeds of the profile in a type of number, with nodes at the two ends."""
+def nodes(water: ray_solutions.Water, ends: tuple[float, float]) -> tuple[list[Any], list[Any]]:
+    """Depths and speeds of the profile as long doubles, with nodes at the two ends."""
+    number = np.longdouble
     z, c = [number(float(v)) for v in water.depth], [number(float(v)) for v in water.speed]
     for end in map(number, ends):
         if end not in z:
@@ -56,84 +54,42 @@ def sides(z: list[Any], start: Any, end: Any) -> tuple[int, int]:
 
 
 def follow(
-    z: list[Any], c: list[Any], ends: tuple[Any, Any], p: Any, up: int, vertices: int, reflections: int, layer: Any
+    z: list[Any], c: list[Any], ends: tuple[Any, Any], p: Any, up: int, vertices: int, reflections: int
 ) -> Iterator[Visit]:
     """Visits of a ray of slowness p to the second depth, up to a number of vertices; it leaves the first up or down.
 
     An end on a jump is on the side that faces the other end, on the lower side where both are there.
-    layer(p, thickness, c1, c2) gives the sums through a layer, c2 = None where the ray becomes level.
     """
     last, typical = len(z) - 1, middle(p)
     i, receiver = sides(z, *ends)
     surface = bottom = turning = 0
-    sums, met = 0, []
+    total = 0
     while True:
         j = i - up  # the next node
         if 0 <= j <= last and typical * c[j] < 1:
-            sums = sums + layer(p, abs(z[j] - z[i]), c[i], c[j])
+            total = total + through(p, abs(z[j] - z[i]), c[i], c[j])
             i = j
         else:
             if j < 0 or j > last:
                 surface, bottom = surface + (up > 0), bottom + (up < 0)
-                met.append(z[i])
             else:
                 part = (1 / p - c[i]) / (c[j] - c[i])
                 if z[j] != z[i]:
-                    sums = sums + 2 * layer(p, abs(z[j] - z[i]) * part, c[i], None)
+                    total = total + 2 * through(p, abs(z[j] - z[i]) * part, c[i], None)
                 turning += 1
-                met.append(z[i] + (z[j] - z[i]) * middle(part))
             up = -up
             if surface + bottom + turning > vertices or surface + bottom > reflections:
                 return
         if i == receiver:
-            upper, lower = (min(met), max(met)) if len(met) > 1 else (None, None)
-            if len(met) == 1:
-                upper, lower = (met[0], None) if up < 0 else (None, met[0])
-            yield Visit(surface, bottom, turning, up, sums, upper, lower)
+            yield Visit(surface, bottom, turning, up, total)
 
 
-def textbook(p: mp.mpf, dz: mp.mpf, c1: mp.mpf, c2: mp.mpf | None) -> Any:
-    """Range (m), time (s), length (m) and dX/dp through a layer by the forms of the textbooks, which cancel."""
-    if dz == 0:
-        return np.array([mp.mpf(0)] * 4)
-    s1 = mp.sqrt(1 - (p * c1) ** 2)
-    if c1 == c2:
-        return np.array([dz * p * c1 / s1, dz / (c1 * s1), dz / s1, dz * c1 / s1**3])
-    if c2 is None:
-        g = (1 / p - c1) / dz
-        return np.array(
-            [s1 / (p * g), mp.log((1 + s1) / (p * c1)) / g, mp.acos(p * c1) / (p * g), -1 / (s1 * p * p * g)]
-        )
-    g, s2 = (c2 - c1) / dz, mp.sqrt(1 - (p * c2) ** 2)
-    time = mp.log(c2 / c1 * (1 + s1) / (1 + s2)) / g
-    length = (mp.acos(p * c1) - mp.acos(p * c2)) / (p * g)
-    return np.array([(s1 - s2) / (p * g), time, length, (1 / s2 - 1 / s1) / (p * p * g)])
-
-
-def range_only(p: Any, dz: Any, c1: Any, c2: Any) -> Any:
-    """Range through a layer for many rays."""
+def through(p: Any, dz: Any, c1: Any, c2: Any) -> Any:
+    """Range (m) through a layer of thickness dz; c2 None where the ray becomes level."""
     s1 = np.sqrt((1 - p * c1) * (1 + p * c1))
     if c2 is None:
         return (p * c1 + 1) * dz / s1
     return p * (c1 + c2) * dz / (s1 + np.sqrt((1 - p * c2) * (1 + p * c2)))
-
-
-def solve_again(
-    water: ray_solutions.Water, start: float, end: float, r: mp.mpf, found: ray_solutions.Eigenrays, i: int
-) -> tuple[mp.mpf, Visit]:
-    """Slowness and visit of found ray i, solved again for the distance r in many digits along its own path."""
-    z, c = nodes(water, (start, end), mp.mpf)
-    counts = int(found.surface[i]), int(found.bottom[i]), int(found.turning[i])
-    up = 1 if found.start_sine[i] > 0 else -1
-    p = mp.mpf(float(found.slowness[i]))
-    for _ in range(9):
-        visits = follow(z, c, (mp.mpf(start), mp.mpf(end)), p, up, sum(counts), sum(counts), textbook)
-        visit = next(v for v in visits if (v.surface, v.bottom, v.turning) == counts)
-        miss = visit.sums[0] - r
-        if abs(miss) < mp.mpf("1e-40") * r:
-            return p, visit
-        p -= miss / visit.sums[3]
-    raise AssertionError((miss, counts))
 
 
 def fan(critical: list[Any], count: int = 600) -> Iterator[Floats]:
@@ -153,7 +109,7 @@ def families(
     fan is refined.
     """
     number = np.longdouble
-    z, c = nodes(water, (start, end), number)
+    z, c = nodes(water, (start, end))
     a, b = number(start), number(end)
     found: list[list[tuple[Family, float, float]]] = [[] for _ in distances]
     for up in (1, -1):
@@ -161,8 +117,8 @@ def families(
         for p in fan(critical):
 
             def ranges(q: Any, up: int = up) -> list[tuple[Family, Any]]:
-                visits = follow(z, c, (a, b), q, up, vertices, reflections, range_only)
-                return [((up, v.surface, v.bottom, v.turning, v.up), v.sums) for v in visits]
+                visits = follow(z, c, (a, b), q, up, vertices, reflections)
+                return [((up, v.surface, v.bottom, v.turning, v.up), v.range) for v in visits]
 
             for which, (family, x) in enumerate(ranges(p)):
                 if np.ndim(x) == 0:

@@ -25,18 +25,6 @@ POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(np.pi / 2))
 WATER = Profile(np.array([0.0]), np.array([C]))
 
 
-@pytest.mark.parametrize(("off", "slope"), [(1.0, 50.0), (0.1, 5e3), (0.01, 5e5)])
-def test_target_near_the_baseline(off, slope):
-    """Between array and source: dr/dL grows without bound, and says so."""
-    target = np.array([10.0, off, 0.0])
-    beam = target / np.linalg.norm(target)
-    source = np.array([20.0, 0.0, 0.0])
-    found = bistatic_range(excess_path(beam, np.linalg.norm(target), source), beam, source)
-    assert found.by_path == pytest.approx(slope, rel=0.02)
-    assert found.ill_conditioned
-    assert found.range == pytest.approx(np.linalg.norm(target), rel=1e-9)
-
-
 def test_on_the_baseline_every_range_fits_and_none_is_given():
     found = bistatic_range(0.0, AHEAD, 20.0 * AHEAD)
     assert np.isnan(found.range)
@@ -60,13 +48,6 @@ def test_target_behind_the_source():
 def test_source_behind_the_array():
     """psi = pi: r = x/2, whatever the baseline."""
     assert bistatic_range(6.0, AHEAD, -20.0 * AHEAD).range == pytest.approx(3.0, rel=1e-15)
-
-
-@pytest.mark.parametrize("size", [1e-9, 1e-3, 1e6, 1e12])
-def test_any_size_of_scene(size):
-    beam, source = direction(0.3, 0.1), size * np.array([9.0, -5.0, -6.0])
-    found = bistatic_range(excess_path(beam, 20.0 * size, source), beam, source)
-    assert found.range == pytest.approx(20.0 * size, rel=1e-12)
 
 
 def test_target_at_the_array_and_at_the_source():

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.water.seawater import ainslie_mccolm
-from sonarsynth.products import Arrivals, Kind
-from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
+from sonarsynth.products import Arrivals
+from sonarsynth.receiver import Elements, PositionTable, Romanis, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
-from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Emission
+from tests.laws.test_synthesis import SNAPS, SONAR, C, arrivals
 
-C = 1540.0
-SONAR = Sonar()
-SNAPS = (Emission(np.zeros(3), 0.0, LogarithmicBubble(), None),)
 ROMANIS = elements(Romanis())
 FAR = np.argsort(np.linalg.norm(ROMANIS.position, axis=1))[[-1, -2, -200]]
 
@@ -29,47 +27,8 @@ def from_points(points: Floats, place: Floats, loss: float) -> Arrivals:
     """Spherical waves from points (point, xyz) that reach `place` (xyz), through water that absorbs `loss` (dB/m)."""
     away = points - place
     distance = np.linalg.norm(away, axis=1)
-    n, zero, one = len(points), np.zeros(len(points)), np.ones(len(points))
-    none, whole = np.zeros((n, 0)), np.zeros(n, np.int64)
-    return Arrivals(
-        delay=distance / C,
-        direction=away / distance[:, None],
-        radius=distance,
-        delay_terms=none,
-        amplitude_terms=none,
-        phase_terms=none,
-        delay_variance_terms=none,
-        amplitude=10.0 ** (-loss * distance / 20.0) / distance,
-        spreading_out=1.0 / distance,
-        spreading_in=one,
-        scattering=one,
-        boundary=one,
-        absorption=loss * distance,
-        length=distance,
-        snap=whole,
-        kind=np.full(n, Kind.ECHO, np.int8),
-        target=whole,
-        facet=whole,
-        point=points,
-        surface=whole,
-        bottom=whole,
-        turning=whole,
-        caustics=whole,
-        lit_by=whole,
-        arrives_by=whole,
-        phase=zero,
-        delay_std=zero,
-        echo_delay_std=zero,
-        doppler=zero,
-        coherent=np.zeros(n, bool),
-        corner_delays=np.zeros((n, 3)),
-        coherent_fraction=zero,
-        height_delay_std=zero,
-        occluded=np.zeros((n, 0), np.uint8),
-        centre=SONAR.band.centre,
-        sound_speed=C,
-        wavefront_error=0.0,
-    )
+    sent = 10.0 ** (-loss * distance / 20.0) / distance
+    return replace(arrivals(distance / C, away, distance, sent, loss=loss * distance), centre=SONAR.band.centre)
 
 
 def points_at(distance: float, count: int, spread: float) -> Floats:

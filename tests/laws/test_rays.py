@@ -104,3 +104,31 @@ def test_mean_slowness_is_the_integral_of_the_slowness(layers) -> None:
         i == j, 1 / np.interp(z1, water.depth, water.speed), (total[j] - total[i]) / np.where(i == j, 1, z2 - z1)
     )
     np.testing.assert_allclose(mean, expected, rtol=1e-11)
+
+
+@pytest.mark.parametrize("gradient", [0.016, 1.0, -0.05])
+def test_hops_along_a_boundary_have_the_closed_form(gradient: float) -> None:
+    """Both ends on the surface (or the bottom) of water that bends rays back to it: n equal arcs."""
+    c, bottom_depth, r = 1500.0, 1000.0, 800.0
+    speeds = np.array([c, c + gradient * bottom_depth]) if gradient > 0 else np.array([c - gradient * bottom_depth, c])
+    water, end = (
+        ray_solutions.water(np.array([0.0, bottom_depth]), speeds, bottom_depth),
+        0.0 if gradient > 0 else bottom_depth,
+    )
+    found = ray_solutions.eigenrays(water, np.array([end]), np.array([end]), np.array([r]), 11, 11)
+    g = abs(gradient)
+    for hops in range(1, 6):
+        hits = found.surface if gradient > 0 else found.bottom
+        mine = (found.turning == hops) & (found.surface + found.bottom == hits)
+        assert sorted(hits[mine]) == [hops - 1, hops, hops, hops + 1]  # reflected or not at either end
+        tangent = g * r / (2 * hops * c)
+        np.testing.assert_allclose(found.travel_time[mine], 2 * hops / g * np.arcsinh(tangent), rtol=2e-15)
+        np.testing.assert_allclose(
+            found.length[mine], 2 * hops * c / g * np.arctan(tangent) * np.hypot(1, tangent), rtol=1e-12
+        )
+        np.testing.assert_allclose(np.abs(found.start_sine[mine]), tangent / np.hypot(1, tangent), rtol=1e-12)
+        deepest = c * (np.hypot(1, tangent) - 1) / g
+        vertex = found.lower[mine] if gradient > 0 else bottom_depth - found.upper[mine]
+        np.testing.assert_allclose(vertex, deepest, rtol=1e-9)
+        assert set(found.caustics[mine]) == {hops - 1}
+        assert sorted(np.sign(found.start_sine[mine])) == [-1, -1, 1, 1]

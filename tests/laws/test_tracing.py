@@ -156,17 +156,6 @@ def compose(outer: Pose, inner: Pose) -> Floats:
     return quaternion_product(outer.orientation, inner.orientation)
 
 
-def test_halving_every_range_raises_an_echo_by_twelve_decibels() -> None:
-    speck = Mesh(HULL.vertices * 0.01, HULL.faces)
-    law = Isotropic(strength=1e-3)
-    far = run((body((20.0, 1.0, -11.0), mesh=speck),), (snap((4.0, 8.0, -30.0)),), law=law, absorption=0.0)
-    near = run((body((10.0, 0.5, -10.5), mesh=speck),), (snap((2.0, 4.0, -20.0)),), law=law, absorption=0.0)
-    shared = np.intersect1d(far.facet[1:], near.facet[1:])
-    assert len(shared) > 100
-    ratio = near.amplitude[1:][np.isin(near.facet[1:], shared)] / far.amplitude[1:][np.isin(far.facet[1:], shared)]
-    np.testing.assert_allclose(20 * np.log10(ratio), 20 * np.log10(4), atol=0.02)
-
-
 @pytest.mark.parametrize("profile", [UNIFORM, LAYERED])
 def test_source_and_array_may_change_places(profile: Profile) -> None:
     point = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))

@@ -98,21 +98,6 @@ def test_halving_every_range_raises_an_echo_by_12_db() -> None:
     assert near - far == pytest.approx(12.041, abs=0.002)
 
 
-def test_moving_everything_together_changes_nothing() -> None:
-    def moved(v: tuple[float, float, float]) -> tuple[float, float, float]:
-        return (v[1] + 70.0, -v[0] - 30.0, v[2] - 10.0)  # turned clockwise by a quarter and shifted
-
-    here = point_scene(TARGET, SNAP)
-    there = point_scene(moved(TARGET), moved(SNAP), moved((0.0, 0.0, -50.0)), heading=np.pi)
-    one, other = (trace_frame(_planned(r), 0) for r in (here, there))
-    for name in ("delay", "amplitude", "radius"):
-        a, b = getattr(one.arrivals, name)[:1], getattr(other.arrivals, name)[:1]  # the direct path
-        assert b == pytest.approx(a, rel=1e-12)
-    assert other.arrivals.direction[0] == pytest.approx(one.arrivals.direction[0], abs=1e-12)
-    echo = [np.sort(t.arrivals.delay[1:]).mean() for t in (one, other)]
-    assert echo[1] == pytest.approx(echo[0], abs=1e-9)
-
-
 def test_render_is_pure_and_labelled() -> None:
     recipe = remus()
     first, second = render(recipe, 1), render(recipe, 1)

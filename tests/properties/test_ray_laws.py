@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.rays import ray_solutions
-from tests.following import families, family, follow, images, nodes, range_only
+from tests.following import families, family, follow, images, nodes
 
 BOTTOM_DEPTH = 100.0
 nodes_of_water = st.lists(
@@ -205,14 +205,14 @@ def test_slopes_of_the_travel_time_are_the_slownesses_of_the_ray(
 def test_amplitudes_are_those_of_a_ray_tube(water: ray_solutions.Water, start: float, end: float, power: float) -> None:
     """Range of two neighbouring rays, followed in long doubles."""
     found = trace(water, [(start, end, 10.0**power)])
-    z, c = nodes(water, (start, end), np.longdouble)
+    z, c = nodes(water, (start, end))
     for i in np.flatnonzero((found.start_sine != 0) & (found.flag != ray_solutions.CAUSTIC)):
         up, surface, bottom, turning, _ = family(found, i)
         p = np.longdouble(found.slowness[i])
         x = []
         for q in (p * (1 - np.longdouble(1e-11)), p * (1 + np.longdouble(1e-11))):
-            visits = follow(z, c, (np.longdouble(start), np.longdouble(end)), q, up, 4, 3, range_only)
-            x += [v.sums for v in visits if (v.surface, v.bottom, v.turning) == (surface, bottom, turning)]
+            visits = follow(z, c, (np.longdouble(start), np.longdouble(end)), q, up, 4, 3)
+            x += [v.range for v in visits if (v.surface, v.bottom, v.turning) == (surface, bottom, turning)]
         sines = abs(found.start_sine[i] * found.end_sine[i])
         if len(x) < 2 or sines < 1e-4:
             continue  # one of the two turns elsewhere

@@ -44,11 +44,6 @@ def test_normal_incidence_is_the_contrast_of_impedances():
     assert rayleigh(np.pi / 2, m, ratio) == pytest.approx((m * ratio - 1) / (m * ratio + 1), rel=1e-14)
 
 
-def test_a_lossless_bed_reflects_everything_below_the_critical_angle():
-    q = np.linspace(0, critical_grazing(1.2), 500)
-    np.testing.assert_allclose(np.abs(rayleigh(q, 1.8, 1.2)), 1.0, rtol=0, atol=1e-14)
-
-
 def test_energy_is_conserved_above_the_critical_angle():
     q = np.linspace(critical_grazing(1.2) + 1e-3, np.pi / 2, 300)
     m, n = 1.8, 1 / 1.2
@@ -56,22 +51,6 @@ def test_energy_is_conserved_above_the_critical_angle():
     sine_below = np.sqrt(1 - (np.cos(q) / n) ** 2)
     transmitted = (1 + v) ** 2 * n * sine_below / (m * np.sin(q))
     np.testing.assert_allclose(v**2 + transmitted, 1.0, rtol=0, atol=1e-12)
-
-
-def test_a_lossy_bed_never_gives_energy():
-    q = np.linspace(0, np.pi / 2, 91)[:, None, None, None]
-    density, speed, loss = (
-        np.array([0.5, 1.0, 3.0])[:, None, None],
-        np.array([0.6, 1.0, 2.5])[:, None],
-        [0.0, 0.02, 1.0],
-    )
-    assert np.abs(rayleigh(q, density, speed, loss)).max() <= 1 + 1e-14
-
-
-def test_the_reflection_at_grazing_is_that_of_a_soft_surface():
-    sediments = np.array([[1.845, 1.1782, 0.01624], [1.149, 0.9885, 0.00676], [1.845, 1.1782, 0.0]]).T
-    np.testing.assert_allclose(rayleigh(0.0, *sediments), -1.0)
-    np.testing.assert_allclose(rayleigh(1e-9, *sediments), -1.0, atol=1e-7)
 
 
 def test_a_boundary_of_density_alone_reflects_the_same_at_every_angle():
