@@ -4,69 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
-from sonarsynth import Cast, Catenary, Environment, Linear, Munk, Tabulated, Thermocline, eigenrays
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth import Cast, Catenary, Environment, Linear, Munk, Thermocline, eigenrays
+from sonarsynth.conventions import Floats
 from sonarsynth.environment.casts import profile_of, smoothed
 from sonarsynth.environment.profiles import munk, munk_nodes, nearest
-from sonarsynth.environment.sea import Profile, SoundSpeed
+from sonarsynth.environment.sea import Profile
 
 MUNK = munk(1300.0, 1300.0, 0.00737, 1500.0)
-
-
-def munk_speed(z: float) -> tuple[float, float]:
-    """Speed and gradient of the canonical profile, written out on their own."""
-    eta = (z - 1300.0) / 650.0
-    return 1500.0 * (1 + 0.00737 * (eta - 1 + np.exp(-eta))), 1500.0 * 0.00737 / 650.0 * (1 - np.exp(-eta))
-
-
-def shot(angle: float, start: float, distance: float, bottom_depth: float) -> tuple[Floats, int, int]:
-    """(depth, angle, time) at a distance of the ray launched at an angle (down positive), and its reflections."""
-
-    def slopes(x: float, state: Floats) -> list[float]:
-        c, gradient = munk_speed(state[0])
-        return [np.tan(state[1]), -gradient / c, 1.0 / (c * np.cos(state[1]))]
-
-    def at_surface(x: float, state: Floats) -> float:
-        return float(state[0])
-
-    def at_bottom(x: float, state: Floats) -> float:
-        return float(bottom_depth - state[0])
-
-    for event in (at_surface, at_bottom):
-        event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
-    x, state, hits = 0.0, np.array([start, angle, 0.0]), [0, 0]
-    while x < distance:
-        leg = solve_ivp(
-            slopes,
-            (x, distance),
-            state,
-            "DOP853",
-            events=(at_surface, at_bottom),
-            rtol=1e-11,
-            atol=[1e-7, 1e-12, 1e-12],
-        )
-        x, state = leg.t[-1], leg.y[:, -1].copy()
-        if leg.status == 1:
-            hits[int(len(leg.t_events[1]) > 0)] += 1
-            state[1] = -state[1]
-    return state, *hits
-
-
-def time_through_formula(
-    angle: float, start: float, end: float, distance: float, bottom_depth: float
-) -> tuple[float, int, int]:
-    """Travel time of the ray through the formula near a launch angle, by the secant method; Fermat for what is left."""
-    before, step = shot(angle, start, distance, bottom_depth)[0][0], 1e-6
-    for _ in range(8):
-        angle += step
-        (z, arrival, time), surface, bottom = shot(angle, start, distance, bottom_depth)
-        if abs(z - end) < 1e-2:
-            break
-        before, step = z, step * (end - z) / (z - before)
-    assert abs(z - end) < 0.1
-    return time + (end - z) * np.sin(arrival) / munk_speed(z)[0], surface, bottom
 
 
 def test_munk_has_the_published_values() -> None:
@@ -83,48 +28,6 @@ def test_the_slopes_of_munk_are_those_of_its_speed() -> None:
     bend = (MUNK.speed(z + step) - 2 * MUNK.speed(z) + MUNK.speed(z - step)) / step**2
     np.testing.assert_allclose(MUNK.gradient(z), rise, rtol=1e-4, atol=1e-8)
     np.testing.assert_allclose(MUNK.curvature(z), bend, rtol=1e-3, atol=1e-8)
-
-
-def errors(sound_speed: SoundSpeed, every: int) -> tuple[Floats, Ints, set[tuple[int, ...]]]:
-    """Errors (s) of travel times in Munk's profile over 10 to 100 km, turning points, and which kinds of ray were seen.
-
-    Rays that reach surface or bottom at less than 1 degree are left out: the formula may turn them just before it.
-    """
-    rng = np.random.default_rng(5)
-    start, end = rng.uniform(100.0, 4500.0, (2, 6))
-    distance = np.array([10e3, 20e3, 50e3, 50e3, 80e3, 100e3])
-    found = eigenrays(sound_speed, 5000.0, start, end, distance, vertices=4)
-    fastest = np.where(found.bottom > 0, munk_speed(5000.0)[0], np.where(found.surface > 0, munk_speed(0.0)[0], 0.0))
-    clear = np.flatnonzero(found.ray_parameter * fastest < np.cos(np.deg2rad(1.0)))
-    assert len(clear) > 0.9 * len(found)
-    found = found.select(clear[::every])
-    left = np.empty(len(found))
-    for i, pair in enumerate(found.pair):
-        time, surface, bottom = time_through_formula(
-            found.launch_angle[i], start[pair], end[pair], distance[pair], 5000.0
-        )
-        assert (surface, bottom) == (found.surface[i], found.bottom[i])
-        left[i] = found.travel_time[i] - time
-    kinds = np.stack([found.surface, found.bottom, found.turning], axis=1)
-    return left, found.turning, set(map(tuple, kinds.tolist()))
-
-
-@pytest.mark.parametrize(("tolerance", "nodes"), [(1e-6, 140), (1e-7, 350)])
-def test_travel_times_in_munk_meet_their_tolerance(tolerance: float, nodes: int) -> None:
-    """A turning point may add the tolerance; rays are integrated through the formula, layers play no part in it."""
-    described = Munk(tolerance=tolerance)
-    assert len(profile_of(described).depth) < nodes
-    left, turning, kinds = errors(described, 2)
-    assert (np.abs(left) < tolerance * (1 + turning)).all()
-    assert len(kinds) > 5
-
-
-def test_nodes_on_the_formula_are_much_worse_than_nodes_nearest_to_it() -> None:
-    depth, speed = munk_nodes(1300.0, 1300.0, 0.00737, 1500.0, 1e-6)
-    near, on = (
-        errors(Tabulated(depth=tuple(depth), speed=tuple(values)), 3)[0] for values in (speed, MUNK.speed(depth))
-    )
-    assert np.sqrt(np.mean(on**2)) > 20 * np.sqrt(np.mean(near**2))
 
 
 def great_circle(g: float, c: float, axis: float, start: Floats, end: Floats, distance: Floats) -> Floats:
