@@ -66,7 +66,8 @@ _HOMES = {
     "sources.shrimp": "LogarithmicBubble SnappingShrimp",
     "sources.snap_models": "Gabor KellerMiksis RecordedSnap Ricker SnapVariation",
     "store": "verify",
-    "targets.shapes": "Box Cylinder LShape MeshFile Myring Remus100 Sphere",
+    "targets.relief": "Relief",
+    "targets.shapes": "Box Cylinder Knots LShape MeshFile Myring Remus100 School Sphere",
     "targets.target": "Target",
     "targets.target_strength": "target_strength",
 }

@@ -166,13 +166,16 @@ from sonarsynth.sources.snap_models import (
 )
 from sonarsynth.store import verify as verify
 from sonarsynth.store.cards import write as card
+from sonarsynth.targets.relief import Relief as Relief
 from sonarsynth.targets.shapes import (
     Box as Box,
     Cylinder as Cylinder,
+    Knots as Knots,
     LShape as LShape,
     MeshFile as MeshFile,
     Myring as Myring,
     Remus100 as Remus100,
+    School as School,
     Sphere as Sphere,
 )
 from sonarsynth.targets.target import Target as Target

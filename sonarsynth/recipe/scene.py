@@ -31,6 +31,7 @@ from sonarsynth.sources import Source
 from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.noise_source import NoiseSource
 from sonarsynth.state import Emission, WorldState
+from sonarsynth.targets.relief import Relief
 from sonarsynth.targets.target import Target
 
 MOST = 500
@@ -51,6 +52,8 @@ class World:
     """What scatters sound and belongs to no target: pieces of the bottom, stones."""
     noise_sources: tuple[NoiseSource, ...] = ()
     """What sounds all the time from one place, and lights nothing: ships, animals."""
+    relief: Relief | None = None
+    """What of the bottom rises over its mean plane; left out: it is flat."""
     populations: Annotated[tuple[Population, ...], MaxLen(100)] = ()
     """Targets that are drawn anew for each sequence."""
     chorus: Chorus | None = None

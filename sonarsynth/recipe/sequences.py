@@ -23,6 +23,7 @@ from sonarsynth.products import SPLITS
 from sonarsynth.randomness import number
 from sonarsynth.recipe.populations.drawn_bodies import DrawnBodies, draw
 from sonarsynth.recipe.renamed_keys import as_drawn
+from sonarsynth.recipe.rising_bottom import with_relief
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import Splits, assign
 from sonarsynth.recipe.variation.grid import Axis, Zip, axes
@@ -147,11 +148,10 @@ class Sequences:
             if isinstance(variation, Choice):
                 continue
             for fraction in (0.0, 1.0):
-                changed = list(settings)
-                old = settings[before + i]
+                changed, old = list(settings), settings[before + i]
                 changed[before + i] = Setting(old.source, old.name, old.paths, variation.at(fraction))
                 try:
-                    scene = with_settings(self.base, self._plain, changed)
+                    scene = with_relief(with_settings(self.base, self._plain, changed))
                     yield self._drawn_in(scene, sequence).put_in(scene)
                 except FieldError:
                     continue
@@ -177,7 +177,7 @@ class Sequences:
 
     def scene(self, sequence: int) -> Scene:
         """Scene of a sequence. Raises FieldError that names the entry and its value where there is none."""
-        return _scene(self, sequence) if self.varied or self.base.world.populations else self.base
+        return _scene(self, sequence) if self.base.world.populations else self.described(sequence)
 
     def repeat(self, sequence: int) -> tuple[str, int]:
         """The grid point of a sequence, as written, and which repeat of that it is."""
@@ -193,7 +193,7 @@ class Sequences:
 
     def described(self, sequence: int) -> Scene:
         """The same before its populations are drawn."""
-        return _described(self, sequence) if self.varied else self.base
+        return _described(self, sequence) if self.varied else with_relief(self.base)
 
     @cached_property
     def split(self) -> Ints:
@@ -279,7 +279,7 @@ def _scene(sequences: Sequences, sequence: int) -> Scene:
 
 @lru_cache(maxsize=4)
 def _described(sequences: Sequences, sequence: int) -> Scene:
-    scene = with_settings(sequences.base, sequences._plain, sequences.settings(sequence))
+    scene = with_relief(with_settings(sequences.base, sequences._plain, sequences.settings(sequence)))
     speed = sequences._mesh_speed
     return scene if speed is None else replace(scene, sonar=replace(scene.sonar, mesh_sound_speed=speed))
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Annotated, ClassVar, Final, Literal, Self
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
@@ -60,6 +62,10 @@ SnapModel = Annotated[LogarithmicBubble | KellerMiksis | RecordedSnap | Ricker |
 """The models of a snap, by `kind`."""
 
 
+ABOVE_RELIEF: Final = 1e-3
+"""m between a shrimp and the facet that it sits on."""
+
+
 @description
 class SnappingShrimp(SoundSource):
     """A shrimp on the bottom that snaps at given times."""
@@ -88,6 +94,12 @@ class SnappingShrimp(SoundSource):
         """As `SoundSource.place`."""
         x, y, *z = self.position
         return np.array([x, y, z[0] if z else self.height - bottom])
+
+    def on_relief(self, bottom: float, ground: Callable[[Floats], float]) -> Self:
+        """As `SoundSource.on_relief`."""
+        x, y, *z = self.position
+        rise = 0.0 if z else ground(np.array([x, y]))
+        return self if rise == 0.0 else replace(self, position=(x, y, self.height + rise + ABOVE_RELIEF - bottom))
 
     @property
     def times(self) -> tuple[float, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -55,6 +55,11 @@ class SoundSource(Method):
     def place(self, bottom: float, time: float = 0.0) -> Floats:
         """Where it is (xyz) in m, over a bottom at this depth (m), at a time (s) since the start of the motions."""
         raise NotImplementedError(f"{type(self).__name__} is nowhere")
+
+    def on_relief(self, bottom: float, ground: Callable[[Floats], float]) -> Self:
+        """The same where the bottom rises over its mean depth (m): by a height (m) at each place (xy). What gives its
+        own z stays there."""
+        return self
 
     def velocity(self, time: float) -> Floats:
         """How it moves (xyz) in m/s then: pulses are shorter ahead of it (Doppler)."""

@@ -15,7 +15,7 @@ from sonarsynth.geometry.curvature import bend
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.surfaces import longest_edge, volume
 from sonarsynth.targets.meshes import file_stamp, mesh_of, refined_mesh
-from sonarsynth.targets.shapes import Box, Cylinder, LShape, MeshFile, Remus100, Shape, Sphere
+from sonarsynth.targets.shapes import Box, Cylinder, Knots, LShape, MeshFile, Remus100, School, Shape, Sphere
 
 ROWS: Final = 0.55
 """Longest edge over the wavelength on a curved surface. Rows of facets half a wavelength apart or more are a grating:
@@ -170,7 +170,7 @@ def _refinable(shape: Shape) -> bool:
     """Whether a finer mesh of it is nearer to the body that it stands for."""
     if isinstance(shape, MeshFile):
         return shape.smooth
-    return not (isinstance(shape, (Box, LShape)) or (isinstance(shape, Remus100) and shape.coarse))
+    return not (isinstance(shape, (Box, Knots, LShape, School)) or (isinstance(shape, Remus100) and shape.coarse))
 
 
 def _limits(mesh: Mesh, shape: Shape, edge: float, sagitta: float, max_facets: int) -> tuple[float, float]:

@@ -15,7 +15,8 @@ from sonarsynth.geometry.mesh import Mesh, read_only
 from sonarsynth.geometry.surfaces import MeshError, Surface, halve_longest_edges, split_long_edges
 from sonarsynth.targets.generated.generation import generate
 from sonarsynth.targets.generated.smoothing import curved
-from sonarsynth.targets.mesh_readers.mesh_files import IN_METRES, read_surface
+from sonarsynth.targets.mesh_readers.elevation_grid import over_floor
+from sonarsynth.targets.mesh_readers.mesh_files import GRIDS, IN_METRES, read_surface
 from sonarsynth.targets.mesh_readers.mesh_repair import check, repair, with_backs
 from sonarsynth.targets.shapes import Cylinder, MeshFile, Myring, Remus100, Shape
 
@@ -92,7 +93,7 @@ def refined_mesh(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) ->
 def _read(shape: MeshFile, edge: float, sagitta: float) -> tuple[Surface, tuple[str, ...]]:
     surface, notes = _repaired(replace(shape, edge=None, smooth=False, crease=SHARP, sides="front"), file_stamp(shape))
     longest = min(edge, np.inf if shape.edge is None else shape.edge)
-    if np.isinf(longest) and not (shape.smooth and np.isfinite(sagitta)):
+    if not len(surface[1]) or (np.isinf(longest) and not (shape.smooth and np.isfinite(sagitta))):
         return surface, notes
     try:
         if shape.smooth:
@@ -114,7 +115,14 @@ def _repaired(shape: MeshFile, stamp: tuple[int, int] | None) -> tuple[Surface, 
     with np.errstate(invalid="ignore", over="ignore"):
         placed = (vertices * UNITS["m"][unit]) @ turn.T + np.array(shape.offset)
     check((placed, faces), shape.path)
-    (vertices, faces), notes = repair((placed, faces), shape.path, shares_vertices=path.suffix.lower() != ".stl")
+    notes: tuple[str, ...] = ()
+    if path.suffix.lower().removeprefix(".") in GRIDS:  # its facets look up, whatever they seem to enclose
+        vertices = placed
+    else:
+        (vertices, faces), notes = repair((placed, faces), shape.path, shares_vertices=path.suffix.lower() != ".stl")
+    if shape.floor is not None:
+        (vertices, faces), area, deepest = over_floor((vertices, faces), shape.floor, shape.least)
+        notes = (*notes, f"{area:.3g} m2 are under the floor, up to {deepest:.3g} m: taken as flat") if area else notes
     vertices.flags.writeable = faces.flags.writeable = False
     return (vertices, faces), (*guessed, *notes)
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import ValidationInfo, field_validator
 
-from sonarsynth.conventions import NonNegativeMetres, Number, Position, PositiveMetres, Radians
+from sonarsynth.conventions import Metres, NonNegativeMetres, Number, Position, PositiveMetres, Radians
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.description.method import Method
 
@@ -33,7 +33,8 @@ class BodyShape(Method):
 
 @description
 class MeshFile(BodyShape):
-    """A mesh in a file: STL, OBJ, PLY, OFF, glTF, COLLADA, 3MF, or a text of three lines a facet."""
+    """A mesh in a file: STL, OBJ, PLY, OFF, glTF, COLLADA, 3MF, or a text of three lines a facet; or a grid of heights
+    (CSV, npz, netCDF): x, y and z (or depth) in metres, whose front is above."""
 
     kind: Literal["mesh_file"] = "mesh_file"
     path: str
@@ -59,6 +60,11 @@ class MeshFile(BodyShape):
     smooth normals. For Kirchhoff scattering, too long is what the wavelength says."""
     crease: Annotated[Radians, Gt(0), Lt(np.pi)] = np.deg2rad(40.0)
     """Edges that turn by more stay sharp. Nothing where not smooth."""
+    floor: Metres | None = None
+    """Height (z in the body frame) of a level ground: what is lower is raised to it, and nothing is left that lies in
+    it. Left out: there is none."""
+    least: NonNegativeMetres = 0.0
+    """What rises less over the floor is taken as the floor."""
 
     @property
     def plain(self) -> MeshFile:
@@ -190,4 +196,39 @@ class Myring(BodyShape):
         return offset
 
 
-Shape = Annotated[MeshFile | Sphere | Cylinder | Box | LShape | Remus100 | Myring, BY_KIND]
+@description
+class Knots(BodyShape):
+    """Knots of a net in the plane x = 0, in rows and columns centred on the origin; with one column, links of a chain.
+    Each is an octahedron: lit and seen from one side it shows four facets."""
+
+    kind: Literal["knots"] = "knots"
+    columns: Annotated[int, Ge(1), Le(1000)] = 1
+    """Knots of a row, along y."""
+    rows: Annotated[int, Ge(1), Le(1000)] = 20
+    """Rows, along z."""
+    spacing: Size = 0.1
+    """From one to the next."""
+    radius: Size = 0.02
+    """From the middle of a knot to its corners."""
+    edge: ClassVar[None] = None
+
+
+@description
+class School(BodyShape):
+    """Fish, or bubbles: alike octahedra spread evenly in an ellipsoid about the origin. Each shows four facets where it
+    is lit and seen from one side, so that by the law `isotropic` it has a target strength of 20 log10 of four times
+    the law's strength: a fish of 20 cm has about -40 dB at its side (Love 1977, J. Acoust. Soc. Am. 62, 1397)."""
+
+    kind: Literal["school"] = "school"
+    axes: tuple[Size, Size, Size] = (1.0, 1.0, 0.5)
+    """Half its length along x, y and z."""
+    members: Annotated[int, Ge(1), Le(20_000)] = 200
+    """How many there are."""
+    radius: Size = 0.05
+    """From the middle of one to its corners."""
+    arrangement: Annotated[int, Ge(0)] = 0
+    """Another number is another arrangement of its members."""
+    edge: ClassVar[None] = None
+
+
+Shape = Annotated[MeshFile | Sphere | Cylinder | Box | LShape | Remus100 | Myring | Knots | School, BY_KIND]

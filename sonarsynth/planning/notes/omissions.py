@@ -14,6 +14,7 @@ from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.reverberation_rows import reverberation_left_out
 from sonarsynth.propagation.bounces import MOST_BOUNCES
 from sonarsynth.receiver import stop_frequency
+from sonarsynth.recipe.rising_bottom import relief_of
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.scattering import MirrorLobe
 from sonarsynth.signals.chorus.chorus_arrivals import FAINT
@@ -53,7 +54,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
         rows.append(
             Omission("depth dependence of the absorption spectrum", "one absorption spectrum for all paths", bound)
         )
-    rows += _facets_leave_out(plan)
+    rows += _facets_leave_out(plan) + _relief_left_out(plan)
     moved = [
         frame.sonar_velocity,
         *(b.velocity for b in frame.moment.bodies),
@@ -69,6 +70,23 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     if not environment.noises:
         rows.append(Omission("ambient noise", "none in the recipe", "signals are free of noise"))
     return tuple(rows + _thinned(plan) + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))
+
+
+def _relief_left_out(plan: Plan) -> list[Omission]:
+    """What mirror reflections do not have of the relief of the bottom."""
+    relief, slowest = relief_of(plan.scene), float(plan.profile.speed.min())
+    if relief is None:
+        return []
+    highest, up = float(relief.box[1, 2]), relief.normal[:, 2] > 0.0
+    area = float((relief.area * relief.normal[:, 2])[up].sum())
+    late = f"up to {2e3 * highest / slowest:.2g} ms ({highest:.3g} m of height) late over its {area:.3g} m2"
+    rows = [
+        Omission("relief in mirror reflections", "they are at the mean plane", f"those under it are hidden, not {late}")
+    ]
+    if plan.scene.world.reverberation is not None or plan.scene.world.chorus is not None:
+        why = "their places are on the mean plane, and nothing hides them"
+        rows.append(Omission("relief in reverberation and chorus", why, f"{area:.3g} m2 are heard through it"))
+    return rows
 
 
 def _chorus_left_out(plan: Plan) -> list[Omission]:

@@ -18,7 +18,9 @@ from sonarsynth.receiver import elements
 from sonarsynth.recipe.populations.drawn_tracks import DRAWS, SequenceTimes
 from sonarsynth.recipe.populations.population import Population
 from sonarsynth.recipe.populations.regions import SonarView
+from sonarsynth.recipe.rising_bottom import relief_of
 from sonarsynth.recipe.variation.sobol_points import OF_VARIATIONS, sobol_shares
+from sonarsynth.targets.relief import highest_within
 from sonarsynth.targets.target import Target
 
 if TYPE_CHECKING:
@@ -172,6 +174,8 @@ class _Sea:
             for same_source in zip(*snaps, strict=False):
                 others.append(_Ball(np.array([snap.position for snap in same_source]), 0.0))
         for target, mesh in zip(scene.world.targets, scene.meshes, strict=True):
+            if mesh is relief_of(scene):
+                continue  # bodies may be over it: `_ground`
             others.append(_MovingBox(tuple(pose(target.motion, t) for t in times), mesh.box))
         return cls(scene, times, others)
 
@@ -199,8 +203,9 @@ class _Sea:
         mesh = target.base_mesh(law, self.scene.sonar.shortest_wavelength)
         hull = target.scale * hull_of(mesh)
         if population.on_bottom:
-            lowest = float(pose(motion, self.span.middle).to_world(hull)[:, 2].min())
-            position = position - [0.0, 0.0, lowest + self.scene.world.environment.depth - ABOVE_BOTTOM]
+            places = pose(motion, self.span.middle).to_world(hull)
+            lowest, ground = float(places[:, 2].min()), self._ground(places)
+            position = position + [0.0, 0.0, ground + ABOVE_BOTTOM - lowest]
             motion = population.track.motion(position, attitude, self.span, draws[6 : 6 + DRAWS])
             target = replace(target, motion=motion)
         poses = [pose(motion, t) for t in self.times.tolist()]
@@ -212,9 +217,16 @@ class _Sea:
         return target
 
     def _in_water(self, hull: Floats, poses: list[Pose]) -> bool:
-        bottom = -self.scene.world.environment.depth
-        heights = [at_time.to_world(hull)[:, 2] for at_time in poses]
-        return all(float(z.min()) > bottom and float(z.max()) < 0.0 for z in heights)
+        at_times = [at_time.to_world(hull) for at_time in poses]
+        return all(float(p[:, 2].min()) > self._ground(p) and float(p[:, 2].max()) < 0.0 for p in at_times)
+
+    def _ground(self, places: Floats) -> float:
+        """z (m) of the highest ground in the circle round places (place, xyz)."""
+        bottom, relief = -self.scene.world.environment.depth, relief_of(self.scene)
+        if relief is None:
+            return bottom
+        centre = 0.5 * (places[:, :2].min(axis=0) + places[:, :2].max(axis=0))
+        return bottom + highest_within(relief, centre, float(np.hypot(*(places[:, :2] - centre).T).max()))
 
 
 def _round(mesh: Mesh, scale: float, poses: list[Pose]) -> _Ball:

@@ -18,9 +18,10 @@ from sonarsynth.geometry.surfaces import (
 )
 from sonarsynth.targets.generated.blocks import blocks
 from sonarsynth.targets.generated.myring import hull_meridian
+from sonarsynth.targets.generated.octahedra import knots, members, octahedra
 from sonarsynth.targets.generated.remus import HULL, remus100
 from sonarsynth.targets.generated.revolution import Arc, enclosed_volume, line, revolve
-from sonarsynth.targets.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Shape, Sphere
+from sonarsynth.targets.shapes import Box, Cylinder, Knots, LShape, MeshFile, Myring, Remus100, School, Shape, Sphere
 
 DEFAULT = 8.0
 """Edges of curved shapes, where left out: the radius over this."""
@@ -52,6 +53,10 @@ def generate(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) -> tup
             return (_refined(box(shape), shape.edge) if _finer(shape.edge, edge) else _box(shape, edge)), ()
         case LShape():
             return (_refined(l_shape(shape), shape.edge) if _finer(shape.edge, edge) else _l_shape(shape, edge)), ()
+        case Knots():
+            return octahedra(knots(shape), shape.radius), ()
+        case School():
+            return octahedra(members(shape), shape.radius), ()
         case MeshFile():
             raise TypeError("a mesh file is read, not generated")
 

@@ -1,5 +1,5 @@
 """Reading mesh files: OBJ, OFF, PLY and text STL by our own readers, binary STL and glTF through trimesh,
-COLLADA through pycollada, 3MF and plain corners by our own.
+COLLADA through pycollada, 3MF, plain corners and elevation grids by our own.
 
 trimesh misreads legal files of the former without an error (`mesh_text`, `mesh_ply`), and gives an empty mesh for a
 damaged STL; of a GLB it leaves out what it does not know. What a file promises is checked here first.
@@ -15,6 +15,7 @@ from typing import Final
 from sonarsynth.description import named_files
 from sonarsynth.description.memory import max_facets
 from sonarsynth.geometry.surfaces import MeshError, Surface
+from sonarsynth.targets.mesh_readers.elevation_grid import read_grid_text, read_netcdf_grid, read_npz
 from sonarsynth.targets.mesh_readers.mesh_3mf import read_3mf
 from sonarsynth.targets.mesh_readers.mesh_collada import read_collada
 from sonarsynth.targets.mesh_readers.mesh_gltf import read_glb, read_gltf
@@ -22,6 +23,8 @@ from sonarsynth.targets.mesh_readers.mesh_ply import read_ply
 from sonarsynth.targets.mesh_readers.mesh_text import read_corners, read_obj, read_off, read_text_stl
 from sonarsynth.targets.mesh_readers.mesh_trimesh import by_trimesh
 
+GRIDS: Final = ("csv", "npz", "nc")
+"""Elevation grids, in metres."""
 MAX_BYTES = {
     "stl": 4 << 30,
     "glb": 1 << 30,
@@ -29,7 +32,7 @@ MAX_BYTES = {
     "obj": 1 << 29,
     "off": 1 << 29,
     "gltf": 1 << 29,
-} | dict.fromkeys(("dae", "zae", "3mf", "txt"), 1 << 28)
+} | dict.fromkeys(("dae", "zae", "3mf", "txt", *GRIDS), 1 << 28)
 """Text takes several times its size in memory to read."""
 
 
@@ -94,8 +97,11 @@ READERS: dict[str, Callable[[bytes, Path], Surface]] = {
     "zae": lambda data, folder: read_collada(data),
     "3mf": lambda data, folder: read_3mf(data),
     "txt": lambda data, folder: read_corners(data),
+    "csv": lambda data, folder: read_grid_text(data),
+    "npz": lambda data, folder: read_npz(data),
+    "nc": lambda data, folder: read_netcdf_grid(data),
 }
 """Per format: vertices and triangles of a file's bytes (and its folder), or MeshError with the reason."""
 
-IN_METRES: Final = ("glb", "gltf", "dae", "zae", "3mf")
-"""Formats that say their unit: what is read is in metres."""
+IN_METRES: Final = ("glb", "gltf", "dae", "zae", "3mf", *GRIDS)
+"""Formats that say their unit, or have it by convention: what is read is in metres."""

@@ -1,0 +1,189 @@
+"""Elevation grids as surfaces: heights over a grid of x (east) and y (north), in text, NumPy's npz or netCDF.
+
+Two triangles a cell. The grid may be uneven; a name `depth`, or `positive: down`, says that heights count downwards.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+import zipfile
+from typing import Any, Final
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats
+from sonarsynth.description import hdf5_files
+from sonarsynth.description.memory import max_facets
+from sonarsynth.geometry.surfaces import MeshError, Surface, weld
+from sonarsynth.targets.mesh_readers.mesh_repair import without_area
+from sonarsynth.targets.mesh_readers.mesh_text import lines_of
+
+NAMES: Final = {
+    "x": ("x", "east", "easting"),
+    "y": ("y", "north", "northing"),
+    "z": ("z", "height", "elevation", "depth"),
+}
+"""What columns, arrays and variables are called, in small letters; what follows, a unit in brackets, is not read."""
+
+
+LEVEL: Final = 1e-6
+"""m: what is no farther from a floor lies in it."""
+
+
+def grid_surface(x: Floats, y: Floats, z: Floats) -> Surface:
+    """The surface, seen from above, of heights z (y, x) at x (x,) and y (y,), each in ascending or descending order.
+
+    Raises MeshError where they make no grid.
+    """
+    if x.ndim != 1 or y.ndim != 1 or z.shape != (len(y), len(x)):
+        raise MeshError(f"has heights of shape {z.shape} for {y.shape} numbers y and {x.shape} x: they must be (y, x)")
+    if min(z.shape) < 2:
+        raise MeshError(f"has a grid of {z.shape[1]} by {z.shape[0]}: it takes two by two at least")
+    if 2 * z.size > max_facets():
+        raise MeshError(f"has a grid of {z.shape[1]} by {z.shape[0]}, more than {max_facets()} facets")
+    for name, some in (("x", x), ("y", y)):
+        if not (np.isfinite(some).all() and ((np.diff(some) > 0).all() or (np.diff(some) < 0).all())):
+            raise MeshError(f"has numbers {name} that neither only rise nor only fall")
+    if not np.isfinite(z).all():
+        row, column = np.argwhere(~np.isfinite(z))[0]
+        missing = np.count_nonzero(~np.isfinite(z))
+        raise MeshError(f"has no height at {missing} of {z.size} points, the first at x {x[column]:g}, y {y[row]:g}")
+    x, z = (x, z) if x[0] < x[-1] else (x[::-1], z[:, ::-1])
+    y, z = (y, z) if y[0] < y[-1] else (y[::-1], z[::-1])
+    east, north = np.meshgrid(x, y)
+    number = np.arange(z.size).reshape(z.shape)
+    a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
+    faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], axis=2)
+    return np.stack([east, north, z], axis=-1).reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def read_grid_text(data: bytes) -> Surface:
+    """Rows of x, y and z, in any order, that fill a grid; a line of names may come first. Raises MeshError."""
+    rows = [
+        (number, [word for word in re.split(rb"[,;\s]+", line.strip()) if word])
+        for number, line in enumerate(lines_of(data), 1)
+        if line.strip() and not line.lstrip().startswith(b"#")
+    ]
+    order, sign = [0, 1, 2], 1.0
+    if rows and not _number(rows[0][1][0]):
+        line = re.sub(rb"[\[(][^\])]*[\])]", b"", lines_of(data)[rows[0][0] - 1])
+        found = [word for word in re.split(r"[,;\s]+", line.decode("utf-8", "replace").strip().lower()) if word]
+        places = {axis: [n for n, word in enumerate(found) if word in names] for axis, names in NAMES.items()}
+        if any(len(some) != 1 for some in places.values()):
+            raise MeshError(f"line {rows[0][0]}: names {', '.join(found[:8])} are not x, y and z (or depth)")
+        order = [places[axis][0] for axis in "xyz"]
+        sign, rows = -1.0 if found[order[2]] == "depth" else 1.0, rows[1:]
+    table = np.empty((len(rows), 3))
+    for at, (number, words) in enumerate(rows):
+        try:
+            table[at] = [float(words[n]) for n in order]
+        except (ValueError, IndexError):
+            raise MeshError(f"line {number}: is not a row of numbers x, y and z") from None
+    x, column = np.unique(table[:, 0], return_inverse=True)
+    y, row = np.unique(table[:, 1], return_inverse=True)
+    if len(x) * len(y) != len(table) or len(np.unique(row * len(x) + column)) != len(table):
+        raise MeshError(f"has {len(table)} rows that do not fill a grid: {len(x)} different x, {len(y)} different y")
+    z = np.empty((len(y), len(x)))
+    z[row, column] = sign * table[:, 2]
+    return grid_surface(x, y, z)
+
+
+def read_npz(data: bytes) -> Surface:
+    """Arrays x (x,), y (y,) and z, or depth, (y, x). Raises MeshError."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            unpacked = sum(member.file_size for member in archive.infolist())
+        if unpacked > 64 * max_facets():
+            raise MeshError(f"would unpack to {unpacked} bytes")
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            held = {name: np.asarray(archive[name], float) for name in archive.files}
+    except MeshError:
+        raise
+    except Exception as error:  # whatever a damaged file may bring
+        raise MeshError(f"cannot be read as npz ({type(error).__name__})") from None
+    return grid_surface(*_picked(held))
+
+
+def read_netcdf_grid(data: bytes) -> Surface:
+    """A variable of two dimensions with a coordinate in metres each. Raises MeshError."""
+    import xarray as xr
+
+    engine = "scipy" if data[:3] == b"CDF" else "h5netcdf"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if engine == "h5netcdf":
+                hdf5_files.refuse_other_files(data)
+            grid = xr.open_dataset(io.BytesIO(data), engine=engine, decode_times=False).load()
+    except ImportError:
+        raise MeshError("is netCDF 4, which needs h5netcdf: pip install 'sonarsynth[netcdf]'") from None
+    except Exception as error:  # whatever a damaged file may bring
+        raise MeshError(f"cannot be read as netCDF ({type(error).__name__})") from None
+    flat: dict[str, Floats] = {}
+    for name, variable in grid.variables.items():
+        unit = str(variable.attrs.get("units", "m")).lower()
+        known = str(name).lower() in sum(NAMES.values(), ())
+        if "degree" in unit and str(name).lower() in ("lat", "lon", "latitude", "longitude", *NAMES["x"], *NAMES["y"]):
+            raise MeshError(f"has '{name}' in degrees: a grid in metres, east and north, is needed")
+        if known and unit not in ("m", "metre", "metres", "meter", "meters", "1", ""):
+            raise MeshError(f"has '{name}' in {unit[:20]}: it must be in m")
+        if known:
+            down = str(variable.attrs.get("positive", "")).lower() == "down" and str(name).lower() != "depth"
+            order = [str(d) for d in variable.dims]
+            values = np.asarray(variable.values, float)
+            transposed = len(order) == 2 and order[0].lower() in NAMES["x"]
+            flat[str(name)] = (-1.0 if down else 1.0) * (values.T if transposed else values)
+    return grid_surface(*_picked(flat))
+
+
+def _picked(held: dict[str, Any]) -> tuple[Floats, Floats, Floats]:
+    """x, y and z by their names; heights that are depths with their sign turned."""
+    found = []
+    for axis, names in NAMES.items():
+        some = [name for name in held if name.lower() in names]
+        if len(some) != 1:
+            known = ", ".join(list(held)[:8]) or "nothing"
+            raise MeshError(f"must hold {' or '.join(names)} once, for {axis}; it holds {known}")
+        found.append(held[some[0]] * (-1.0 if some[0].lower() == "depth" else 1.0))
+    return found[0], found[1], found[2]
+
+
+def _number(word: bytes) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def over_floor(surface: Surface, floor: float, least: float) -> tuple[Surface, float, float]:
+    """What of a surface rises over a floor (z, m) by more than `least` (m): other vertices are brought to the floor,
+    facets in it are dropped, and where the rest has a border over it a wall goes down. Also the area (m2) and the
+    greatest depth (m) of what was under the floor.
+    """
+    vertices, faces = surface
+    under = faces[(vertices[:, 2] < floor - LEVEL)[faces].any(axis=1)]
+    area = 0.5 * float(np.abs(_plan_area(vertices[under])).sum())
+    deepest = float(floor - vertices[under, 2].min(initial=floor))
+    vertices = vertices.copy()
+    on_floor: Bools = vertices[:, 2] <= floor + max(least, LEVEL)
+    vertices[on_floor, 2] = floor
+    faces = faces[~on_floor[faces].all(axis=1)]
+    sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    code = np.sort(sides, axis=1)
+    _, first, count = np.unique(code, axis=0, return_index=True, return_counts=True)
+    border = sides[first[count == 1]]
+    border = border[~on_floor[border].all(axis=1)]
+    below = np.arange(len(border) * 2).reshape(-1, 2) + len(vertices)
+    feet = vertices[border.ravel()] * [1.0, 1.0, 0.0] + [0.0, 0.0, floor]
+    wall = [np.stack([border[:, 1], border[:, 0], below[:, 0]], 1), np.stack([border[:, 1], *below.T], 1)]
+    vertices, faces = np.concatenate([vertices, feet]), np.concatenate([faces, *wall])
+    return weld((vertices, faces[~without_area(vertices[faces])])), area, deepest
+
+
+def _plan_area(corners: Floats) -> Floats:
+    """Twice the signed area (facet,) of facets (facet, 3, xyz) seen from above."""
+    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T[:2], (corners[:, 2] - corners[:, 0]).T[:2]
+    return np.asarray(ax * by - ay * bx)
