@@ -4,27 +4,35 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache, partial
+from typing import Final
 
 from sonarsynth.description import FieldError
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.recipe.scene import Scene
+from sonarsynth.targets.meshes import file_stamp
 from sonarsynth.targets.relief import BOTTOM, highest_within
+
+WHERE: Final = ("scene", "world", "relief", "shape")
+
+
+def with_relief(scene: Scene) -> Scene:
+    """A scene with what rises of its bottom last among its targets, and its shrimp on it. Raises FieldError."""
+    if scene.world.relief is None:
+        return scene
+    if BOTTOM in scene.world.target_names:
+        raise FieldError(WHERE, f"is a body that is called '{BOTTOM}': no target and no population can be")
+    try:
+        return _with_relief(scene, file_stamp(scene.world.relief.shape))
+    except (ValueError, OSError) as error:
+        raise FieldError(WHERE, str(error)) from None
 
 
 @lru_cache(maxsize=16)
-def with_relief(scene: Scene) -> Scene:
-    """A scene with what rises of its bottom last among its targets, and its shrimp on it. Raises FieldError."""
-    world, where = scene.world, ("scene", "world", "relief", "shape")
-    if world.relief is None:
-        return scene
-    if BOTTOM in world.target_names:
-        raise FieldError(where, f"is a body that is called '{BOTTOM}': no target and no population can be")
-    depth = world.environment.depth
-    try:
-        rise = world.relief.target(depth)
-    except (ValueError, OSError) as error:
-        raise FieldError(where, str(error)) from None
-    if rise is None:
+def _with_relief(scene: Scene, stamp: tuple[int, int] | None) -> Scene:
+    """The same, kept until the file changes."""
+    world, depth = scene.world, scene.world.environment.depth
+    assert world.relief is not None
+    if (rise := world.relief.target(depth)) is None:
         return scene
     made = replace(scene, world=replace(world, targets=(*world.targets, rise)))
     ground = partial(highest_within, made.mesh_of(len(world.targets)), radius=0.0)

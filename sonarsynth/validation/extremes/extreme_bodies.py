@@ -1,8 +1,12 @@
-"""Spheres of a millimetre to 10 m by every law, against the exact series; bodies at every bearing."""
+"""Spheres of a millimetre to 10 m by every law, against the exact series; bodies at every bearing; a relief of the
+bottom up to the surface, and needles."""
 
 from __future__ import annotations
 
 import re
+import tempfile
+from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -11,16 +15,21 @@ from sonarsynth.conventions import Floats, direction
 from sonarsynth.equations.scattering.modal_series import sphere_amplitude
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.labels import label
-from sonarsynth.products import View
+from sonarsynth.pipeline import trace_frame
+from sonarsynth.planning import plan
+from sonarsynth.products import Arrivals, View
 from sonarsynth.propagation import Straight
 from sonarsynth.receiver import BeamGrid, PositionTable, Romanis, Sonar, elements
+from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import FacetLaw, Isotropic, Kirchhoff, MirrorLobe, Scatterer
 from sonarsynth.scattering.law_validity import OFF
 from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
-from sonarsynth.targets.shapes import Box, Sphere
+from sonarsynth.targets.relief import Relief
+from sonarsynth.targets.shapes import Box, MeshFile, Sphere
 from sonarsynth.targets.target import base_mesh
-from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, together
+from sonarsynth.validation.extremes.extreme_chains import recipe
+from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, refused, together
 from sonarsynth.validation.extremes.plain_scenes import POSE, PROFILE, WATER, C, body, snap, traced, transfer
 
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
@@ -106,6 +115,37 @@ def _bearings() -> CaseResult:
     return together(parts, holds(flags == expected, f"flags {sorted(flags)}"))
 
 
+def _relief() -> CaseResult:
+    """A wall before the snap, of nearly the depth and of all of it; one too low to be any; a needle beside the way."""
+    base, parts = recipe(((Sphere(radius=0.5, edge=0.3), (20.0, 0.0, 0.0)),)), []
+
+    def over(height: float, x: Floats, y: Floats) -> Recipe:
+        z = np.zeros((3, 4))
+        z[:, 1:3] = height
+        np.savez(path, x=x, y=y, z=z)
+        relief = Relief(shape=MeshFile(path=str(path), edge=1e3))
+        return replace(base, scene=replace(base.scene, world=replace(base.scene.world, relief=relief)))
+
+    def heard(sea: Recipe) -> Arrivals:
+        return trace_frame(plan(sea, ("signals",)), 0).arrivals
+
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "relief.npz"
+        wall, needle = np.array([7.0, 7.1, 7.2, 7.3]), np.array([9.0, 9.001, 9.002, 9.003])
+        wide, thin = np.array([-500.0, 0.0, 500.0]), np.array([9.0, 9.001, 9.002])
+        plain = heard(base)
+        parts += [refused(lambda: heard(over(40.0, wall, wide)), "rises 40 m over a bottom that is 40 m deep")]
+        hidden = heard(over(39.999, wall, wide))
+        parts += [holds(not hidden.direct.any(), "no snap behind a wall up to a millimetre under the surface")]
+        for words, other in (
+            ("nothing of a rise of 9 cm", heard(over(0.09, wall, wide))),
+            ("all of the snap beside a needle of 30 m", heard(over(30.0, needle, thin))),
+        ):
+            same = bool(np.array_equal(other.delay[other.direct], plain.delay[plain.direct]))
+            parts += [holds(same and bool(np.isfinite(other.amplitude).all()), words)]
+    return together(parts)
+
+
 CASES = (
     *(
         Case(
@@ -119,4 +159,5 @@ CASES = (
     Case(
         "a body at every bearing", "its box within the view, mirrored with it, or a flag that says why not", _bearings
     ),
+    Case("a relief up to the surface, of no height, of a millimetre's width", "hides all, nothing, nothing", _relief),
 )
