@@ -13,7 +13,9 @@ from sonarsynth.equations.bubble.bubble_collapse import Method
 from sonarsynth.sources.snap_models import KellerMiksis
 from sonarsynth.validation.bubbles import bubble_checks, bubbles_conserved, bubbles_extreme, bubbles_solvers
 from sonarsynth.validation.bubbles.all_bubbles import bubble_accuracy
-from sonarsynth.validation.bubbles.bubble_checks import described, exact
+from sonarsynth.validation.bubbles.bubble_checks import described, exact, frozen_rows, level_rows
+from sonarsynth.validation.bubbles.bubbles_conserved import conserved_rows, rayleigh_rows
+from sonarsynth.validation.bubbles.bubbles_logarithmic import logarithmic_rows
 from sonarsynth.validation.references.bubble_forms import acceleration, solve
 
 
@@ -76,6 +78,12 @@ def test_the_last_of_an_empty_cavity_is_rayleighs() -> None:
         integral = quad(lambda u: np.sqrt(1.5 * u**3 / (1.0 - u**3)), 0.0, x)[0]
         assert integral == pytest.approx(time, rel=1e-6)
     assert bubbles_conserved.left(np.array(1e-8)) == pytest.approx(bubbles_conserved.LAW * 1e-8**0.4, rel=1e-6)
+
+
+def test_bubbles_have_the_numbers_of_tables_series_and_closed_forms() -> None:
+    """Collapse, rebound, levels, energy, and the formula of the logarithmic bubble."""
+    solved = [*frozen_rows(True), *level_rows(False), *rayleigh_rows(), *conserved_rows(True)]
+    assert [row for row in (*solved, *logarithmic_rows(True)) if not row.ok] == []
 
 
 @pytest.mark.long

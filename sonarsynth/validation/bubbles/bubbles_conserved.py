@@ -64,10 +64,10 @@ def smallest(cavity: Cavity) -> float:
     """Smallest R/R0 of a cavity without friction and tension, of energy alone: the work of the drive is in the gas."""
     drive, g = cavity.ambient_pressure - cavity.vapour_pressure, cavity.exponent - 1.0
 
-    def left_over(x: float) -> float:
-        return drive * (1.0 - x**3) - cavity.gas_pressure * float(boxcox(x**-3.0, g))
+    def left_over(q: float) -> float:
+        return float(drive * (1.0 - np.exp(3.0 * q)) - cavity.gas_pressure * boxcox(np.exp(-3.0 * q), g))
 
-    return float(brentq(left_over, 1e-6, 0.99, xtol=1e-17))
+    return float(np.exp(brentq(left_over, -25.0, -1e-3, xtol=1e-15, rtol=1e-15)))
 
 
 def drift(found: Collapse) -> float:

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from math import gamma
-
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import betaincinv, boxcox
 
 from sonarsynth.equations.bubble import bubble_collapse
-from sonarsynth.equations.bubble.bubble_collapse import Cavity
 from sonarsynth.sources.snap_models import KellerMiksis
+from sonarsynth.validation.bubbles.bubbles_conserved import COLLAPSE, EMPTY, RADIUS, UNIT, drift, left, smallest
 from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, refused, together
-
-RADIUS = 3.5e-3
-EMPTY = Cavity(RADIUS, 0.0, 1e5, 0.0, 0.0, 0.0, 1000.0, compressible=False)
-UNIT = RADIUS * np.sqrt(EMPTY.density / EMPTY.ambient_pressure)  # s
-WHOLE = float(np.sqrt(np.pi / 6.0) * gamma(5.0 / 6.0) / gamma(4.0 / 3.0))
 
 
 def _rayleigh() -> CaseResult:
     """To the last billionth of the time: the radius over R0 is that of the incomplete beta function."""
     found = bubble_collapse.collapse(EMPTY, 0, 1e-13)
     before = np.geomspace(1e-9, 0.9, 30)
-    exact = np.cbrt(betaincinv(5.0 / 6.0, 0.5, before / WHOLE))
+    exact = left(before)
     got = bubble_collapse.wall(-before * UNIT, found).radius / RADIUS
     return together(
-        off(found.collapse_time / UNIT / WHOLE - 1.0, 1e-12, what="time of collapse"),
+        off(found.collapse_time / UNIT / COLLAPSE - 1.0, 1e-12, what="time of collapse"),
         off((got / exact - 1.0)[before > 1e-5], 1e-7, what="radius"),
         off((got / exact - 1.0), 1e-4, what="radius to 1e-9 before"),
         holds(found.flag == bubble_collapse.SINGULAR and found.mach == np.inf, found.reason),
@@ -38,18 +29,10 @@ def _energy() -> CaseResult:
     parts = []
     for gas in (1e-3, 1.0, 1e3, 1e4, 5e4):
         cavity = EMPTY._replace(gas_pressure=gas, exponent=1.4)
-
-        def left_over(q: float, gas: float = gas) -> float:
-            return float(1e5 * (1.0 - np.exp(3.0 * q)) - gas * boxcox(np.exp(-3.0 * q), 0.4))
-
-        least = np.exp(brentq(left_over, -25.0, -1e-3, xtol=1e-15, rtol=1e-15))
         found = bubble_collapse.collapse(cavity, 1, 1e-11)
-        first, last = found.clock[[0, -1]]
-        near = np.geomspace(1e-14, 1e-6, 40)
-        time = np.concatenate([np.linspace(first, last, 500), -near, [0.0], near])
-        drift = bubble_collapse.energy(time, found) / bubble_collapse.energy(first, found) - 1.0
+        least = smallest(cavity)
         parts.append(off(found.minimum_radius / RADIUS / least - 1.0, 1e-8, what=f"{gas:g} Pa: smallest radius"))
-        parts.append(off(drift, 1e-7, what="energy"))
+        parts.append(off(drift(found), 1e-7, what="energy"))
     return together(*parts)
 
 
