@@ -6,7 +6,8 @@ import numpy as np
 
 from sonarsynth.equations.bubble import bubble_collapse
 from sonarsynth.sources.snap_models import KellerMiksis
-from sonarsynth.validation.bubbles.bubbles_conserved import COLLAPSE, EMPTY, RADIUS, UNIT, drift, left, smallest
+from sonarsynth.validation.bubbles.bubble_checks import RADIUS
+from sonarsynth.validation.bubbles.bubbles_conserved import COLLAPSE, EMPTY, UNIT, drift, left, smallest
 from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, refused, together
 
 
