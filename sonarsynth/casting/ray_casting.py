@@ -119,18 +119,19 @@ class CastingMesh:
         from sonarsynth.casting import intersections
 
         facet, distance = np.full(len(start), NO_TARGET), np.full(len(start), np.nan)
-        rays, passed = np.arange(len(start)), np.zeros(len(start))
+        rays, passed, ahead = np.arange(len(start)), np.zeros(len(start)), start
         for _ in range(ROUNDS):
-            proposed, at = self.caster.nearest(start + passed[:, None] * heading, heading, limit - passed)
-            proposed = np.where((proposed >= 0) & (proposed < len(self.faces)), proposed, -1)
-            hit, along = np.empty(len(start), np.int64), np.empty(len(start))
-            from_start, as_proposed = np.zeros(len(start)), np.fmin(limit, passed + at + SLACK)
+            proposed, at = self.caster.nearest(ahead, heading, limit - passed)
+            some = np.flatnonzero((proposed >= 0) & (proposed < len(self.faces)))  # of most rays, nothing
+            rays, start, heading, limit = rays[some], start[some], heading[some], limit[some]
+            beyond = passed[some] + at[some]
+            hit, along = np.empty(len(some), np.int64), np.empty(len(some))
             intersections.confirm(
                 start,
                 heading,
-                from_start,
-                as_proposed,
-                proposed,
+                np.zeros(len(some)),
+                np.fmin(limit, beyond + SLACK),
+                proposed[some],
                 self.vertices,
                 self.faces,
                 *self.around,
@@ -139,11 +140,12 @@ class CastingMesh:
                 along,
             )
             facet[rays], distance[rays] = hit, along
-            again = (hit < 0) & (proposed >= 0)
-            if not again.any():
+            again = np.flatnonzero(hit < 0)
+            if not len(again):
                 return facet, distance
-            passed = (passed + at + 2 * OFFSET)[again]
             rays, start, heading, limit = rays[again], start[again], heading[again], limit[again]
+            passed = beyond[again] + 2 * OFFSET
+            ahead = start + passed[:, None] * heading
         hit, along = np.empty(len(start), np.int64), np.empty(len(start))
         intersections.search(start, heading, np.zeros(len(start)), limit, self.vertices, self.faces, 1.0, hit, along)
         facet[rays], distance[rays] = hit, along

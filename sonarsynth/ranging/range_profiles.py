@@ -135,7 +135,7 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
         face = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], f[0], spacing, len(f))
         face /= np.sqrt(face**2 @ share)[:, None]
         echo = ifft(received.beams.spectra(u[here]) * (face * matched).astype(np.complex64), length, axis=1)
-        power[here] = echo.real[:, : power.shape[1]] ** 2 + echo.imag[:, : power.shape[1]] ** 2
+        ranging_kernels.powers(echo, power[here])
     spread = np.sum(taper**2)
     centre = f @ taper**2 / spread
     beta = np.sqrt(max((f - centre) ** 2 @ taper**2 / spread, spacing**2))

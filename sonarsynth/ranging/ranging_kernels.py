@@ -27,6 +27,14 @@ def power_and_peak(pressure: Any, live: Any) -> Any:
 
 
 @nb.njit(cache=True, nogil=True)
+def powers(waves: Any, power: Any) -> None:
+    """Write |.|^2 of the first samples of complex waves (beam, sample) into power (beam, sample), as many as it has."""
+    for b in range(power.shape[0]):
+        for t in range(power.shape[1]):
+            power[b, t] = waves[b, t].real * waves[b, t].real + waves[b, t].imag * waves[b, t].imag
+
+
+@nb.njit(cache=True, nogil=True)
 def cut_out(pressure: Any, place: Any, half: int, gain: Any) -> Any:
     """Samples (sensor, 2 half) about `place` (sensor,), counted in samples, times gain and a flat top.
 

@@ -100,11 +100,10 @@ def _supports(
 
     def each(turned: Bools, rough: Bools) -> Floats:
         out, kinds = np.empty((2, front.count)), front.coherent + 2 * turned + 4 * rough
-        for kind in range(8):
+        for kind in np.unique(kinds).tolist():
             rows = kinds == kind
-            if rows.any():
-                shape = PulseChanges(turned=kind & 2 > 0, sloped=kind % 2 == 1, rough=roughest * (kind >= 4))
-                out[:, rows] = np.array([support_of(w, chosen, shape) for w in longest])[arrivals.snap[rows]].T
+            shape = PulseChanges(turned=kind & 2 > 0, sloped=kind % 2 == 1, rough=roughest * (kind >= 4))
+            out[:, rows] = np.array([support_of(w, chosen, shape) for w in longest])[arrivals.snap[rows]].T
         return out
 
     none, silent = np.zeros(front.count, bool), np.zeros(front.count, bool)

@@ -25,7 +25,9 @@ def at(x: float, xs: Floats, ys: Floats) -> float:
         return float(ys[0])
     if x >= xs[n - 1]:
         return float(ys[n - 1])
-    i = np.searchsorted(xs, x)
+    i = min(1 + int((x - xs[0]) / (xs[n - 1] - xs[0]) * (n - 1)), n - 1)
+    if not xs[i - 1] < x <= xs[i]:  # the places are not even
+        i = int(np.searchsorted(xs, x))
     return float(ys[i - 1] + (ys[i] - ys[i - 1]) * (x - xs[i - 1]) / (xs[i] - xs[i - 1]))
 
 
