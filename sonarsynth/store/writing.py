@@ -6,7 +6,8 @@ import errno
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -71,7 +72,7 @@ def _write(store: Opened, plan: Plan, shard: int, frames: Mapping[int, Values], 
     content = ContentDigest()
     files: dict[str, FileRecord] = {}
     under_way: deque[tuple[str, Future[FileRecord]]] = deque()
-    with ThreadPoolExecutor(AT_ONCE) as writers:
+    try:
         for array in sorted((a for a in layout.arrays if not a.empty), key=lambda a: a.path):
             if len(under_way) == AT_ONCE:
                 name, first = under_way.popleft()
@@ -79,8 +80,10 @@ def _write(store: Opened, plan: Plan, shard: int, frames: Mapping[int, Values], 
             block = layout.block(array, shard, checked)
             content.add(array.path, block)
             packed = _content(layout, array, region.start, block)  # here: threads keep the memory that they allocate
-            under_way.append((array.file(shard), writers.submit(_put, store, array.file(shard), packed)))
-        files |= {name: rest.result() for name, rest in under_way}
+            under_way.append((array.file(shard), _writers().submit(_put, store, array.file(shard), packed)))
+    finally:
+        wait([rest for _, rest in under_way])  # the folder is let go of then
+    files |= {name: rest.result() for name, rest in under_way}
     if isinstance(store, OpenedFolder) and not store.in_its_place():
         raise Damage(f"{store}: {GONE}")
     still()
@@ -114,6 +117,15 @@ def _content(layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) 
     """What the file of a shard is to hold."""
     layout.check_region(start, start + len(block))
     return encoded(array, block)
+
+
+@lru_cache(maxsize=1)
+def _writers() -> ThreadPoolExecutor:
+    """Threads of this process that write: to start them anew takes longer than to write a small shard."""
+    return ThreadPoolExecutor(AT_ONCE, "write")
+
+
+os.register_at_fork(after_in_child=_writers.cache_clear)  # a fork has none of the threads
 
 
 def _put(store: Opened, name: str, content: bytes | None) -> FileRecord:
