@@ -22,12 +22,12 @@ def chosen_frames(frames: str | None, sequences: str | None, first: Sequence[int
     Raises BadOption.
     """
     numbers = frame_numbers(frames, first[-1])
-    of = _numbers("--sequences", "sequence", sequences, len(first) - 1)
-    if of is None:
+    chosen = _numbers("--sequences", "sequence", sequences, len(first) - 1)
+    if chosen is None:
         return numbers
     if numbers is None:
-        return tuple(frame for n in of for frame in range(first[n], first[n + 1]))
-    wanted = {frame for n in of for frame in range(first[n], first[n + 1])}
+        return tuple(frame for n in chosen for frame in range(first[n], first[n + 1]))
+    wanted = {frame for n in chosen for frame in range(first[n], first[n + 1])}
     both = tuple(frame for frame in numbers if frame in wanted)
     if not both:
         raise BadOption("--frames and --sequences have no frame in common")

@@ -52,10 +52,10 @@ def on_ghost(block: SmallVariables, frame: int, azimuth: float, elevation: float
     """
     if not block.has("truth/targets/echo_azimuth"):
         return False
-    at = (np.deg2rad(block.of(f"truth/targets/echo_{axis}", frame)[:, 1:]) for axis in ("azimuth", "elevation"))
+    ghost = (np.deg2rad(block.of(f"truth/targets/echo_{axis}", frame)[:, 1:]) for axis in ("azimuth", "elevation"))
     box = np.deg2rad(block.of("truth/targets/image_box", frame))[:, None]
     reach = np.nan_to_num(np.stack([box[..., 1] - box[..., 0], box[..., 3] - box[..., 2]])) + beam_width(block.tree)
-    off = np.abs(np.stack([middle - angle for middle, angle in zip(at, (azimuth, elevation), strict=True)]))
+    off = np.abs(np.stack([middle - angle for middle, angle in zip(ghost, (azimuth, elevation), strict=True)]))
     level = block.of("truth/targets/echo_level", frame)
     loud = level[:, 1:] >= np.nan_to_num(level[:, :1], nan=-np.inf) - GLINT
     return bool(((off <= reach).all(axis=0) & loud).any())  # NaN where no echo comes that way
@@ -74,8 +74,8 @@ def in_box(block: SmallVariables, frame: int, azimuth: float, elevation: float) 
     """Whether a direction (rad) is in the image box of a target, or within a beam width of it: no beam may point at
     what little of a target is in view."""
     box = np.deg2rad(block.of("truth/targets/image_box", frame))
-    width, at = beam_width(block.tree), np.array([azimuth, azimuth, elevation, elevation])
-    return bool(((at[[0, 2]] >= box[:, [0, 2]] - width) & (at[[1, 3]] <= box[:, [1, 3]] + width)).all(axis=1).any())
+    width, beam = beam_width(block.tree), np.array([azimuth, azimuth, elevation, elevation])
+    return bool(((beam[[0, 2]] >= box[:, [0, 2]] - width) & (beam[[1, 3]] <= box[:, [1, 3]] + width)).all(axis=1).any())
 
 
 def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:

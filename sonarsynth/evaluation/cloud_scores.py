@@ -27,18 +27,18 @@ def figures_of(to_surface: Floats, to_point: Floats) -> dict[str, Any]:
     figures: dict[str, Any] = {"points": len(to_surface), "samples": len(to_point)}
     if not len(to_surface) or not len(to_point):
         return figures | {"chamfer": float("nan"), "by_tolerance": {}}
-    by: dict[str, dict[str, float]] = {}
+    by_tolerance: dict[str, dict[str, float]] = {}
     for limit in TOLERANCES:
         precision, recall = (float(np.mean(values <= limit)) for values in (to_surface, to_point))
         both = precision + recall
-        by[f"{limit:g} m"] = {
+        by_tolerance[f"{limit:g} m"] = {
             "precision": precision,
             "recall": recall,
             "f_score": 2.0 * precision * recall / both if both else 0.0,
         }
     forth, back = (values[np.isfinite(values)] for values in (to_surface, to_point))  # a frame may lack one of both
     chamfer = float(np.mean(forth) + np.mean(back)) if len(forth) and len(back) else float("nan")
-    return figures | {"chamfer": chamfer, "by_tolerance": by}
+    return figures | {"chamfer": chamfer, "by_tolerance": by_tolerance}
 
 
 def cloud_scores(tree: xr.DataTree, frames: np.ndarray) -> dict[str, Any]:

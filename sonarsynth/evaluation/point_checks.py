@@ -62,12 +62,12 @@ def has_labels(tree: xr.DataTree) -> bool:
 
 def points(tree: xr.DataTree, frames: Sequence[int] | np.ndarray) -> Points:
     """The points of some frames of a store whose points have labels."""
-    cloud, at = tree["cloud"].dataset, np.asarray(frames)
+    cloud, numbers = tree["cloud"].dataset, np.asarray(frames)
     names = ("range", "range_error", "true_range", "target", "emission", "family", "lit_by", "origin")
     count = max(MOST_ROWS // max(cloud.sizes["point"], 1), 1)
     chunks: dict[str, list[np.ndarray]] = {name: [] for name in ("frame", "row", *names)}
-    for start in range(0, len(at), count):
-        block = at[start : start + count]
+    for start in range(0, len(numbers), count):
+        block = numbers[start : start + count]
         lists = {name: np.asarray(cloud[name].isel(frame=block).values) for name in names}
         frame, row = np.nonzero(np.isfinite(lists["range"]))
         chunks["frame"].append(block[frame])
@@ -134,16 +134,16 @@ def _ratio(cloud: Points) -> np.ndarray:
 
 def kinds(cloud: Points) -> dict[str, np.ndarray]:
     """Points that are not judged, by kind: masks (point,), each point in the first kind that it belongs to."""
-    of = {word: cloud.origin == number for number, word in enumerate(ORIGINS)}
+    by_origin = {word: cloud.origin == number for number, word in enumerate(ORIGINS)}
     rows = {
-        "the snap itself": of["snap itself"],
-        "unexplained": of["unexplained"],
+        "the snap itself": by_origin["snap itself"],
+        "unexplained": by_origin["unexplained"],
         "lit by another snap": cloud.strange,
     }
-    rows |= {"mirror images": of["mirror image"]}
+    rows |= {"mirror images": by_origin["mirror image"]}
     rows |= {f"ghosts by {word}": cloud.family == n for n, word in enumerate(FAMILIES) if n}
     rows |= {f"lit by way of {word}": cloud.lit_by == n for n, word in enumerate(FAMILIES) if n}
-    rows |= {"in side lobes": of["side lobe"], "in grating lobes": of["grating lobe"]}
+    rows |= {"in side lobes": by_origin["side lobe"], "in grating lobes": by_origin["grating lobe"]}
     uncounted = ~cloud.judged
     for word, mask in rows.items():
         rows[word] = mask & uncounted

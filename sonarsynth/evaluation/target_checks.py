@@ -24,11 +24,11 @@ def labels_of_targets(tree: xr.DataTree, frames: np.ndarray) -> Check:
     azimuth, elevation = (np.asarray(tree[f"truth/beams/{axis}"].values) for axis in ("azimuth", "elevation"))
     for block in blocks(tree, frames):
         for i in block.frames:
-            of = {str(v): block.of(f"truth/targets/{v}", i) for v in _READ}
-            present = of["view"] >= 0
-            if not _boxes_agree({v: values[present] for v, values in of.items()}):
+            labels = {str(v): block.of(f"truth/targets/{v}", i) for v in _READ}
+            present = labels["view"] >= 0
+            if not _boxes_agree({v: values[present] for v, values in labels.items()}):
                 wrong["oriented boxes"].append(i)
-            if not _views_agree({v: values[present] for v, values in of.items()}, azimuth, elevation):
+            if not _views_agree({v: values[present] for v, values in labels.items()}, azimuth, elevation):
                 wrong["boxes in view"].append(i)
             if counted:
                 points, whose = block.of("truth/targets/points", i), block.of("cloud/target", i)
@@ -47,27 +47,27 @@ _READ = (
 )  # fmt: skip
 
 
-def _boxes_agree(of: dict[str, np.ndarray]) -> bool:
-    for box, centre, size, turned in zip(*(of[v] for v in _READ[:4]), strict=True):
+def _boxes_agree(labels: dict[str, np.ndarray]) -> bool:
+    for box, centre, size, turned in zip(*(labels[v] for v in _READ[:4]), strict=True):
         rebuilt = Pose(centre, turned).to_world(_SIDES * size)
         if not (np.abs(rebuilt - box) <= ROUNDING * (1.0 + np.abs(box))).all():
             return False
     return True
 
 
-def _views_agree(of: dict[str, np.ndarray], azimuth: np.ndarray, elevation: np.ndarray) -> bool:
-    box, pixels, view, cut = of["image_box"], of["pixel_box"], of["view"], of["truncation"]
+def _views_agree(labels: dict[str, np.ndarray], azimuth: np.ndarray, elevation: np.ndarray) -> bool:
+    box, pixels, view, cut = labels["image_box"], labels["pixel_box"], labels["view"], labels["truncation"]
     in_view = view <= 1  # in view, or partly
-    if not ((np.isnan(box).any(axis=1) == ~in_view).all() and (of["in_view"][in_view] == 1).all()):
+    if not ((np.isnan(box).any(axis=1) == ~in_view).all() and (labels["in_view"][in_view] == 1).all()):
         return False
     if not ((cut[view == 0] == 0.0).all() and (cut[(view == 2) | (view == 3)] == 1.0).all()):
         return False
-    full_box, outward = of["full_box"][in_view], np.array([-1.0, 1.0, -1.0, 1.0])
+    full_box, outward = labels["full_box"][in_view], np.array([-1.0, 1.0, -1.0, 1.0])
     if not (outward * (full_box - box[in_view]) >= -ROUNDING).all():
         return False
     for angles, columns, sides in ((azimuth, [0, 1], [0, 2]), (elevation, [2, 3], [1, 3])):
         if len(angles) > 1:
-            at = np.interp(box[in_view][:, columns], angles, np.arange(len(angles)) + 0.5)
-            if not (np.abs(at - pixels[in_view][:, sides]) <= 1e-6).all():
+            in_beams = np.interp(box[in_view][:, columns], angles, np.arange(len(angles)) + 0.5)
+            if not (np.abs(in_beams - pixels[in_view][:, sides]) <= 1e-6).all():
                 return False
     return True

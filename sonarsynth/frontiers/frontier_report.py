@@ -48,8 +48,8 @@ def _panel(stage: str, points: Sequence[Point]) -> Panel | None:
     for role in ("point", "peer"):
         of_role = [p for p in of_stage if p.role == role]
         for knob in dict.fromkeys(p.knob for p in of_role if p.knob != "chosen"):
-            of = [p for p in of_role if p.knob == knob]
-            if role == "point" and not any(p.chosen for p in of) and len(of) > 1 and stage != "synthesis":
-                of = [*of, chosen]
-            lines.append(Line(knob, tuple(1e3 * p.seconds for p in of), tuple(p.error for p in of), role == "peer"))
+            line = [p for p in of_role if p.knob == knob]
+            if role == "point" and not any(p.chosen for p in line) and len(line) > 1 and stage != "synthesis":
+                line = [*line, chosen]
+            lines.append(Line(knob, tuple(1e3 * p.seconds for p in line), tuple(p.error for p in line), role == "peer"))
     return Panel(TITLES[stage], chosen.unit, chosen.allowed, tuple(lines), (1e3 * chosen.seconds, chosen.error))

@@ -110,8 +110,8 @@ def trace_points(exact: ExactFrame, traced: TracedBySensor) -> Iterator[Point]:
     usual = replace(best, choices=replace(best.choices, subarrays=plan.choices.subarrays))
     if plan.choices.subarrays < plan.elements.count:
         view = replace(usual, choices=replace(usual.choices, occlusion="centre"))
-        of = TracedBySensor.of(view, exact.frame, exact.sensor)
-        yield _point(exact, of, "occlusion", f"from the centre, {_cut(plan)}")
+        from_centre = TracedBySensor.of(view, exact.frame, exact.sensor)
+        yield _point(exact, from_centre, "occlusion", f"from the centre, {_cut(plan)}")
     for level in DYNAMIC_RANGES:
         share = 10.0 ** (-level / 10.0)
         varied = replace(best, choices=replace(best.choices, negligible=share))

@@ -175,8 +175,8 @@ def eigenrays_between(
             raise ValueError(f"{name} must be positions (..., xyz), but its shape is {position.shape}")
         wrong = ~np.isfinite(position).all(axis=-1)
         if wrong.any():
-            at = f" {int(np.argmax(wrong))}" if wrong.size > 1 else ""
-            raise ValueError(f"{name}{at} must be finite, but is {position.reshape(-1, 3)[int(np.argmax(wrong))]}")
+            which = f" {int(np.argmax(wrong))}" if wrong.size > 1 else ""
+            raise ValueError(f"{name}{which} must be finite, but is {position.reshape(-1, 3)[int(np.argmax(wrong))]}")
     names = ("bottom_depth", "source", "receiver")
     bottom_depth = _numbers("bottom_depth", bottom_depth)
     bottom_depths, from_row, to_row = _together(names, [bottom_depth, _rows(start), _rows(end)])

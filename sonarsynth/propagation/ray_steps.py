@@ -128,12 +128,12 @@ def meet(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats) -> tuple[
     span = end - start
     nearest = np.linalg.norm(span, axis=1)
     for index, body in enumerate(bodies):
-        going = np.flatnonzero(nearest > 0)
-        o, d = body.pose.to_body(start[going]), body.pose.turn_to_body(span[going])
-        hit, at = first_hit(body.mesh, o, d)
-        closer = (hit >= 0) & (at <= nearest[going])
-        rows = going[closer]
-        target[rows], facet[rows], nearest[rows] = index, hit[closer], at[closer]
+        moving = np.flatnonzero(nearest > 0)
+        o, d = body.pose.to_body(start[moving]), body.pose.turn_to_body(span[moving])
+        hit, distance = first_hit(body.mesh, o, d)
+        closer = (hit >= 0) & (distance <= nearest[moving])
+        rows = moving[closer]
+        target[rows], facet[rows], nearest[rows] = index, hit[closer], distance[closer]
     return target, facet, nearest
 
 

@@ -62,14 +62,14 @@ class Refracted(PathModel):
 
         layers = water(profile.depth, profile.speed, environment_depth)
         count, ends = len(rays.start), len(end)
-        z, at = (np.clip(depth(point), 0.0, environment_depth) for point in (rays.start, end))
+        z, z_end = (np.clip(depth(point), 0.0, environment_depth) for point in (rays.start, end))
         c_start = np.interp(z, layers.depth, layers.speed)
         level = end[None, :, :2] - rays.start[:, None, :2]
         distance = np.hypot(level[..., 0], level[..., 1])
         time, sine, spreading = (np.empty((count, ends)) for _ in range(3))
         ray_continuation.rays_nearby(
             layers.depth, layers.speed, z, np.hypot(rays.departure[:, 0], rays.departure[:, 1]) / c_start,
-            (rays.departure[:, 2] > 0).astype(np.int64), rays.vertices, np.arange(ends), at, distance,
+            (rays.departure[:, 2] > 0).astype(np.int64), rays.vertices, np.arange(ends), z_end, distance,
             time, sine, spreading,
         )  # fmt: skip
         ahead = np.divide(level, distance[..., None], out=np.zeros_like(level), where=distance[..., None] > 0)

@@ -74,8 +74,8 @@ class SampledGeometry:
         """What was looked at, in a sentence."""
         recipe, sequences = self.recipe, len(np.unique(self.sequence))
         longest, steps = np.bincount(self.sequence).max(), int(recipe.spanned.steps.max())
-        of = [(sequences, recipe.sequences, "sequence"), (int(longest), steps, "step")]
-        texts = [f"{n} of {counted(every, noun)}" if n < every else counted(n, noun) for n, every, noun in of]
+        counts = [(sequences, recipe.sequences, "sequence"), (int(longest), steps, "step")]
+        texts = [f"{n} of {counted(every, noun)}" if n < every else counted(n, noun) for n, every, noun in counts]
         spread = ", evenly sampled" if len(self.sequence) < recipe.frames else ""
         return f"{' x '.join(texts)}{spread}"
 

@@ -146,8 +146,8 @@ class DiffuseKirchhoff:
 
     def _powers(self, incident: Floats, scattered: Floats, patch: FacetGeometry) -> tuple[Floats, Floats]:
         """Cross-sections per area (...) (1/sr) of the lobe, where heights are large, and of the floor."""
-        on = lit_and_seen(incident, scattered, patch.normal, self.beyond)
-        returned = np.where(on, np.abs(reflection(self.law, incident, scattered)) ** 2, 0.0)
+        lit = lit_and_seen(incident, scattered, patch.normal, self.beyond)
+        returned = np.where(lit, np.abs(reflection(self.law, incident, scattered)) ** 2, 0.0)
         lobe = slope_lobe(incident, scattered, patch.normal, self.law.slope) if self.law.roughness > 0 else 0.0
         floor = lambert(incident, scattered, patch.normal, self.law.diffuse)
         return np.asarray(returned * (1.0 - self.law.diffuse) * lobe), np.asarray(returned * floor)

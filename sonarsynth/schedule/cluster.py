@@ -174,8 +174,8 @@ class _Builder:
         self.submitted += 1
         token, blocks = f"{self.token}.{self.submitted}", []
         results: Any
-        for at in range(0, len(flight.frames), self.job.block):
-            results = flight.frames[at : at + self.job.block]
+        for begin in range(0, len(flight.frames), self.job.block):
+            results = flight.frames[begin : begin + self.job.block]
             self.frames += len(results)
             first, number = -len(tasks.STAGES) * self.frames, results[0]
             for n, stage in enumerate(tasks.tasks_of(self.job.products)):

@@ -117,15 +117,15 @@ def cut_mesh(shape: Shape, longest: float) -> Mesh:
 @byte_bounded_cache(16)
 def _cut(shape: Shape, stamp: tuple[int, int] | None, longest: float) -> Mesh:
     plain = mesh_of(shape)
-    was = longest_edge((plain.vertices, plain.faces))
-    if shape.edge is not None or was <= longest:
+    old = longest_edge((plain.vertices, plain.faces))
+    if shape.edge is not None or old <= longest:
         return plain
     edge, _ = _limits(plain, shape, longest, np.inf, MOST_CUT)
-    if was <= edge:
+    if old <= edge:
         return plain
     mesh = refined_mesh(shape, edge)
     note = (
-        f"{len(plain.faces)} facets up to {_said(was, 2)} long are cut into {len(mesh.faces)} up to {_said(edge, 2)}, "
+        f"{len(plain.faces)} facets up to {_said(old, 2)} long are cut into {len(mesh.faces)} up to {_said(edge, 2)}, "
         "for each echoes from its middle: `shape.edge` says how far"
     )
     return replace(mesh, notes=(*mesh.notes, note))
@@ -147,8 +147,8 @@ def _fine(
     while ratio > 1.1 and len(mesh.faces) * ratio < MOST_FACETS and np.isfinite(sagitta):
         sagitta /= ratio
         finer = refined_mesh(shape, edge, sagitta)
-        was, ratio = ratio, expected_error(finer, wavelength) / error
-        if ratio > 0.9 * was:  # what is left are edges that are neither creases nor rounded
+        last_ratio, ratio = ratio, expected_error(finer, wavelength) / error
+        if ratio > 0.9 * last_ratio:  # what is left are edges that are neither creases nor rounded
             break
         mesh = finer
     longest = longest_edge((mesh.vertices, mesh.faces))

@@ -119,11 +119,11 @@ class _Body:
         if isinstance(self.law, Kirchhoff) and self.shape is not None:
             facets = mesh.corners, mesh.normal, mesh.area, self.curved
             return self.law.cross_section(*facets, incident, scattered, wavenumber, self.shape)
-        on = np.flatnonzero(self.seen_from(-incident) & self.seen_from(scattered))
+        lit = np.flatnonzero(self.seen_from(-incident) & self.seen_from(scattered))
         if isinstance(self.law, Kirchhoff):
-            facets = mesh.corners_of(on), mesh.normal[on], mesh.area[on], self.curved[on]
+            facets = (mesh.corners_of(lit), mesh.normal[lit], mesh.area[lit], self.curved[lit])
             return self.law.cross_section(*facets, incident, scattered, wavenumber)
-        amplitude = self.law.amplitude(incident, scattered, mesh.normal[on], mesh.area[on])
+        amplitude = self.law.amplitude(incident, scattered, mesh.normal[lit], mesh.area[lit])
         return np.full(wavenumber.shape, np.sum(amplitude**2))
 
     def seen_from(self, towards: Floats) -> Bools:
@@ -134,10 +134,10 @@ class _Body:
             mesh = self.mesh
             out = mesh.normal @ towards > 0.0
             if not self.convex:
-                on = np.flatnonzero(out)
+                lit = np.flatnonzero(out)
                 size = 0.5 * float(np.linalg.norm(mesh.box[1] - mesh.box[0]))
-                start = mesh.centroid[on] + OFFSET * size * mesh.normal[on]
-                out[on] = first_hit(mesh, start, np.broadcast_to(towards, start.shape))[0] < 0
+                start = mesh.centroid[lit] + OFFSET * size * mesh.normal[lit]
+                out[lit] = first_hit(mesh, start, np.broadcast_to(towards, start.shape))[0] < 0
             if len(self.unhidden) >= 64:
                 self.unhidden.pop(next(iter(self.unhidden)))
             self.unhidden[key] = out

@@ -31,5 +31,5 @@ def lattice_pitch(position: Floats) -> float:
     across = np.concatenate([np.diff(np.unique(position[:, axis].round(6))) for axis in (1, 2)])
     pitch = float(across.min(initial=np.inf))
     steps = (position[:, 1:] - position[0, 1:]) / pitch
-    on = np.isfinite(pitch) and np.abs(steps - steps.round()).max() < 1e-2 and not np.ptp(position[:, 0]) > 1e-6
-    return pitch if on else 0.0
+    on_lattice = np.isfinite(pitch) and np.abs(steps - steps.round()).max() < 1e-2 and not np.ptp(position[:, 0]) > 1e-6
+    return pitch if on_lattice else 0.0

@@ -25,11 +25,11 @@ TERM = 4 * LANES
 
 
 @nb.njit(cache=True, nogil=True, forceinline=True)
-def _store_pair(terms: Any, at: int, x: Any, y: Any, p: Any, q: Any) -> None:
-    store(terms, at, x + p)
-    store(terms, at + LANES, y + q)
-    store(terms, at + 2 * LANES, x - p)
-    store(terms, at + 3 * LANES, y - q)
+def _store_pair(terms: Any, start: int, x: Any, y: Any, p: Any, q: Any) -> None:
+    store(terms, start, x + p)
+    store(terms, start + LANES, y + q)
+    store(terms, start + 2 * LANES, x - p)
+    store(terms, start + 3 * LANES, y - q)
 
 
 @nb.njit(cache=True, nogil=True, forceinline=True)

@@ -38,26 +38,26 @@ from sonarsynth.equations.rays.ray_vertices import (
 def lay_for(depth: Floats, speed: Floats, start: float, end: float, p: float, up: int, vertices: int, chain: Chain,
             family: Ints) -> tuple[int, int, float, float]:  # fmt: skip
     """Lay the weighted chain of a family for rays of about this p: first and last node, and its turns."""
-    at, of = chain.at, chain.of
+    ints, reals = chain.ints, chain.reals
     begin(depth, speed, start, end, chain)
     above, between, below = 0, 1, 0
     if vertices > 0:
-        family_of(up, vertices, at[DESCENDS] == 1, family, 0)
+        family_of(up, vertices, ints[DESCENDS] == 1, family, 0)
         above, between, below = family[0, ABOVE], family[0, BETWEEN], family[0, BELOW]
         while True:
-            of[AFTER] = math.inf
+            reals[AFTER] = math.inf
             extend_up(depth, speed, chain)
             extend_down(depth, speed, chain)
-            if not of[AFTER] * p < 1.0:
+            if not reals[AFTER] * p < 1.0:
                 break
-            of[FASTEST] = of[AFTER]
+            reals[FASTEST] = reals[AFTER]
     else:
-        of[AFTER] = math.inf
-    first = at[FIRST] if above > 0 else at[UPPER_END]
-    last = at[LAST] if below > 0 else at[LOWER_END]
+        reals[AFTER] = math.inf
+    first = ints[FIRST] if above > 0 else ints[UPPER_END]
+    last = ints[LAST] if below > 0 else ints[LOWER_END]
     weigh(above, between, below, first, last, chain)
-    offsets(chain.c, first, last, of[FASTEST], chain.d)
-    return first, last, above * of[GRADIENT_UP], below * of[GRADIENT_DOWN]
+    offsets(chain.c, first, last, reals[FASTEST], chain.d)
+    return first, last, above * reals[GRADIENT_UP], below * reals[GRADIENT_DOWN]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -68,7 +68,7 @@ def approach(
 
     Returns (s_m, p, X/p, dX/dp); NaN where it leaves the interval.
     """
-    fastest, after = chain.of[FASTEST], chain.of[AFTER]
+    fastest, after = chain.reals[FASTEST], chain.reals[AFTER]
     extent = math.sqrt((after - fastest) * (after + fastest)) if after < math.inf else math.inf
     v = math.sqrt(max(1.0 - (p * fastest) ** 2, 0.0)) / max(p, 1e-9 / fastest)
     for _ in range(12):
@@ -98,12 +98,12 @@ def rays_nearby(
     chain = new_chain(len(depth))
     family = np.zeros((1, COLUMNS), np.int64)
     for i in range(len(start)):
-        near, was, first, last, turn_up, turn_down = slowness[i], -1, 0, 0, 0.0, 0.0
+        near, laid_depth, first, last, turn_up, turn_down = slowness[i], -1, 0, 0, 0.0, 0.0
         for j in range(len(depth_of_end)):
-            if depth_of_end[j] != was:
-                was = depth_of_end[j]
+            if depth_of_end[j] != laid_depth:
+                laid_depth = depth_of_end[j]
                 first, last, turn_up, turn_down = lay_for(
-                    depth, speed, start[i], end[was], near, up[i], vertices[i], chain, family
+                    depth, speed, start[i], end[laid_depth], near, up[i], vertices[i], chain, family
                 )
             time[i, j] = sine[i, j] = amplitude[i, j] = math.nan
             if first == last and turn_up + turn_down == 0.0:
@@ -112,8 +112,8 @@ def rays_nearby(
             if math.isnan(p):
                 continue
             misfit = distance[i, j] - p * over_p
-            c, d, descends = chain.c, chain.d, chain.at[DESCENDS] == 1
-            start_node, end_node = chain.at[UPPER_END], chain.at[LOWER_END]
+            c, d, descends = chain.c, chain.d, chain.ints[DESCENDS] == 1
+            start_node, end_node = chain.ints[UPPER_END], chain.ints[LOWER_END]
             if not descends:
                 start_node, end_node = end_node, start_node
             leaves, arrives = math.sqrt(s_m * s_m + p * p * d[start_node]), math.sqrt(s_m * s_m + p * p * d[end_node])

@@ -68,13 +68,13 @@ def families_of_pair(
     family (2 vertices, COLUMNS): room for their list; reflections: most from surface and bottom together; steepest:
     tangent, at the slowest depth of the water, of the steepest ray that turns anywhere.
     """
-    of = chain.of
+    reals = chain.reals
     begin(depth, speed, start, end, chain)
     for f in range(len(family)):  # launched down, then up, with 1, 2, ... vertices
-        family_of(f % 2, 1 + f // 2, chain.at[DESCENDS] == 1, family, f)
+        family_of(f % 2, 1 + f // 2, chain.ints[DESCENDS] == 1, family, f)
     fresh, count = True, 0
     while True:
-        of[AFTER] = math.inf
+        reals[AFTER] = math.inf
         joined_up, joined_down = extend_up(depth, speed, chain) <= 1, extend_down(depth, speed, chain) <= 1
         ray_count = 0
         if possible(distance, reflections, steepest, family, chain):
@@ -84,25 +84,25 @@ def families_of_pair(
         if ray_count < 0:
             return -1
         count += ray_count
-        if of[AFTER] == math.inf or family[:, ALIVE].sum() == 0:
+        if reals[AFTER] == math.inf or family[:, ALIVE].sum() == 0:
             return count
-        of[FASTEST], fresh = of[AFTER], False
+        reals[FASTEST], fresh = reals[AFTER], False
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def possible(distance: float, reflections: int, steepest: float, family: Ints, chain: Chain) -> bool:
     """Whether any family may have a ray with vertices where the chain now ends; others are marked."""
-    at, of = chain.at, chain.of
-    after, slowest = of[AFTER], of[SLOWEST]
+    ints, reals = chain.ints, chain.reals
+    after, slowest = reals[AFTER], reals[SLOWEST]
     farthest = distance * math.sqrt((after - slowest) * (after + slowest)) / slowest if after < math.inf else math.inf
     any_possible = False
     for f in range(len(family)):
         if family[f, ALIVE] == 0:
             continue
         above, between, below = family[f, ABOVE], family[f, BETWEEN], family[f, BELOW]
-        height = 2 * above * (of[Z_TOP] - of[Z_UP]) + 2 * below * (of[Z_DOWN] - of[Z_BOTTOM])
-        height += between * (of[Z_BOTTOM] - of[Z_TOP])
-        reflected = above * at[ON_SURFACE] + below * at[ON_BED]
+        height = 2 * above * (reals[Z_TOP] - reals[Z_UP]) + 2 * below * (reals[Z_DOWN] - reals[Z_BOTTOM])
+        height += between * (reals[Z_BOTTOM] - reals[Z_TOP])
+        reflected = above * ints[ON_SURFACE] + below * ints[ON_BED]
         if reflected > reflections or (reflections == 0 and height > distance * steepest):
             family[f, ALIVE] = 0
         elif height > farthest:
@@ -115,13 +115,13 @@ def possible(distance: float, reflections: int, steepest: float, family: Ints, c
 @njit(cache=True, error_model="numpy", nogil=True)
 def sum_legs(chain: Chain, extent: float) -> None:
     """Sum the legs of the chain for rays with v = c_m tan(grazing angle) up to `extent`."""
-    at, of, d, sums = chain.at, chain.of, chain.d, chain.sums
-    offsets(chain.c, at[FIRST], at[LAST], of[FASTEST], d)
-    sums[0] = leg(GRAZING, extent, chain.c, chain.dz, d, at[FIRST], at[UPPER_END])
-    sums[1] = leg(GRAZING, extent, chain.c, chain.dz, d, at[UPPER_END], at[LOWER_END])
-    sums[2] = leg(GRAZING, extent, chain.c, chain.dz, d, at[LOWER_END], at[LAST])
-    sums[3] = turn(GRAZING, extent, d[at[FIRST]], of[GRADIENT_UP])
-    sums[4] = turn(GRAZING, extent, d[at[LAST]], of[GRADIENT_DOWN])
+    ints, reals, d, sums = chain.ints, chain.reals, chain.d, chain.sums
+    offsets(chain.c, ints[FIRST], ints[LAST], reals[FASTEST], d)
+    sums[0] = leg(GRAZING, extent, chain.c, chain.dz, d, ints[FIRST], ints[UPPER_END])
+    sums[1] = leg(GRAZING, extent, chain.c, chain.dz, d, ints[UPPER_END], ints[LOWER_END])
+    sums[2] = leg(GRAZING, extent, chain.c, chain.dz, d, ints[LOWER_END], ints[LAST])
+    sums[3] = turn(GRAZING, extent, d[ints[FIRST]], reals[GRADIENT_UP])
+    sums[4] = turn(GRAZING, extent, d[ints[LAST]], reals[GRADIENT_DOWN])
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -145,9 +145,9 @@ def search(
 
     joined_up, joined_down: the range goes on without a jump from that of the interval before.
     """
-    of, sums = chain.of, chain.sums
-    bounded = of[AFTER] < math.inf
-    extent = math.sqrt((of[AFTER] - of[FASTEST]) * (of[AFTER] + of[FASTEST])) if bounded else GRAZING
+    reals, sums = chain.reals, chain.sums
+    bounded = reals[AFTER] < math.inf
+    extent = math.sqrt((reals[AFTER] - reals[FASTEST]) * (reals[AFTER] + reals[FASTEST])) if bounded else GRAZING
     sum_legs(chain, extent)
     count = 0
     for f in range(len(family)):
@@ -174,9 +174,9 @@ def search(
 @njit(cache=True, error_model="numpy", nogil=True)
 def weigh(above: int, between: int, below: int, first: int, last: int, chain: Chain) -> None:
     """How often a family crosses each layer from node first to last, and its weighted chain."""
-    at = chain.at
+    ints = chain.ints
     for i in range(first, last):
-        times = 2 * above if i < at[UPPER_END] else (between if i < at[LOWER_END] else 2 * below)
+        times = 2 * above if i < ints[UPPER_END] else (between if i < ints[LOWER_END] else 2 * below)
         chain.crossings[i] = times
         chain.k[i] = times * chain.dz[i] * (chain.c[i] + chain.c[i + 1])
 
@@ -194,21 +194,21 @@ def roots_of(
     row: int,
 ) -> int:
     """Rays of one family into rows of out: their number, -1 when it is full."""
-    at, of, roots = chain.at, chain.of, chain.roots
+    ints, reals, roots, fastest = chain.ints, chain.reals, chain.roots, chain.reals[FASTEST]
     above, below = family[f, ABOVE], family[f, BELOW]
-    first = at[FIRST] if above else at[UPPER_END]
-    last = at[LAST] if below else at[LOWER_END]
+    first = ints[FIRST] if above else ints[UPPER_END]
+    last = ints[LAST] if below else ints[LOWER_END]
     weigh(above, family[f, BETWEEN], below, first, last, chain)
     root_count = 1
     if bounded:
-        turn_up, turn_down = above * of[GRADIENT_UP], below * of[GRADIENT_DOWN]
+        turn_up, turn_down = above * reals[GRADIENT_UP], below * reals[GRADIENT_DOWN]
         root_count = turns(
-            short, of[FASTEST], extent, distance, chain.d, chain.k, first, last, turn_up, turn_down, chain.stack, roots
+            short, fastest, extent, distance, chain.d, chain.k, first, last, turn_up, turn_down, chain.stack, roots
         )
     elif first == last:
         return 0  # from a boundary to itself
     else:
-        _, roots[0, 0], roots[0, 1] = straight(distance, of[FASTEST], chain.d, chain.k, first, last, True)
+        _, roots[0, 0], roots[0, 1] = straight(distance, fastest, chain.d, chain.k, first, last, True)
     if row + root_count > len(out):
         return -1
     for i in range(root_count):
@@ -238,18 +238,18 @@ def keep(
     row: int,
 ) -> None:
     """Write a ray of a family."""
-    at, of, c, d = chain.at, chain.of, chain.c, chain.d
+    ints, reals, c, d = chain.ints, chain.reals, chain.c, chain.d
     above, below = family[f, ABOVE], family[f, BELOW]
-    turning = (0 if at[ON_SURFACE] else above) + (0 if at[ON_BED] else below)
-    start, end = (at[UPPER_END], at[LOWER_END]) if at[DESCENDS] else (at[LOWER_END], at[UPPER_END])
+    turning = (0 if ints[ON_SURFACE] else above) + (0 if ints[ON_BED] else below)
+    start, end = (ints[UPPER_END], ints[LOWER_END]) if ints[DESCENDS] else (ints[LOWER_END], ints[UPPER_END])
     emit(
         out, row, s_m, p, distance, c, d, chain.k, chain.dz, chain.crossings, first, last,
-        above * of[GRADIENT_UP], below * of[GRADIENT_DOWN], start, end, turning,
+        above * reals[GRADIENT_UP], below * reals[GRADIENT_DOWN], start, end, turning,
     )  # fmt: skip
-    out[row, SURFACE], out[row, BOTTOM] = above * at[ON_SURFACE], below * at[ON_BED]
+    out[row, SURFACE], out[row, BOTTOM] = above * ints[ON_SURFACE], below * ints[ON_BED]
     if above:
-        out[row, UPPER] = of[Z_UP] - beyond(s_m, p, c[first], d[first], of[GRADIENT_UP])
+        out[row, UPPER] = reals[Z_UP] - beyond(s_m, p, c[first], d[first], reals[GRADIENT_UP])
     if below:
-        out[row, LOWER] = of[Z_DOWN] + beyond(s_m, p, c[last], d[last], of[GRADIENT_DOWN])
+        out[row, LOWER] = reals[Z_DOWN] + beyond(s_m, p, c[last], d[last], reals[GRADIENT_DOWN])
     out[row, START_SINE] *= 1.0 if family[f, UP] else -1.0
     out[row, END_SINE] *= -1.0 if family[f, DOWN] else 1.0

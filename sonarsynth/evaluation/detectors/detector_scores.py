@@ -86,8 +86,8 @@ class DetectorReport:
         """Share of the wanted objects (row,) that are found at so many false alarms a frame, with a band of 95 %."""
         matched = self.by_distance[NEAR]
         least = threshold_at(self.detections.score, matched >= 0, false_alarms * self.frames)
-        of = matched[(matched >= 0) & (self.detections.score >= least)]
-        hits, trials = int(wanted[of].sum()), int(wanted.sum())
+        hit_objects = matched[(matched >= 0) & (self.detections.score >= least)]
+        hits, trials = int(wanted[hit_objects].sum()), int(wanted.sum())
         low, high = binomial_band(hits, trials)
         share = hits / trials if trials else float("nan")
         return {"false_alarms_a_frame": false_alarms, "detected": share, "low": low, "high": high}
@@ -124,10 +124,10 @@ class DetectorReport:
 
     def conditions(self) -> Iterator[tuple[str, list[tuple[str, np.ndarray]]]]:
         """Masks (row,) of objects by category, range, aspect, snr and visibility; empty ones are left out."""
-        of = self.objects
-        yield "category", _held((name, of.category == n) for n, name in enumerate(self.categories))
+        objects = self.objects
+        yield "category", _held((name, objects.category == n) for n, name in enumerate(self.categories))
         for name, (unit, edges) in EDGES.items():
-            values = getattr(of, name)
+            values = getattr(objects, name)
             last = len(edges) - 2  # its upper limit belongs to it
             interval = np.minimum(np.searchsorted(edges, values, "right") - 1, last)
             interval = np.where(np.isfinite(values), interval, -1)

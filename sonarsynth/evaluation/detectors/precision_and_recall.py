@@ -26,8 +26,8 @@ def average_precision(score: Floats, hit: np.ndarray, objects: int) -> float:
     hits = np.cumsum(hit[order])
     precision = hits / np.arange(1, len(hits) + 1)
     best = np.maximum.accumulate(precision[::-1])[::-1]
-    at = np.searchsorted(hits / objects, RECALLS, side="left")
-    return float(np.where(at < len(best), np.append(best, 0.0)[np.minimum(at, len(best))], 0.0).mean())
+    first = np.searchsorted(hits / objects, RECALLS, side="left")
+    return float(np.where(first < len(best), np.append(best, 0.0)[np.minimum(first, len(best))], 0.0).mean())
 
 
 def threshold_at(score: Floats, hit: np.ndarray, false_alarms: float) -> float:

@@ -66,28 +66,28 @@ def true_objects(tree: xr.DataTree, frames: np.ndarray) -> TrueObjects:
 
 def _some(tree: xr.DataTree, frames: np.ndarray) -> dict[str, np.ndarray]:
     targets = tree["truth/targets"].dataset.isel(frame=frames)
-    of = {name: np.asarray(targets[name].values) for name in _OF_TARGETS}
-    wanted = (of["present"] == 1) & (of["clutter"] == 0)
-    wanted &= np.isin(of["view"], (View.IN_VIEW, View.PARTLY_IN_VIEW)) & np.isfinite(of["pixel_box"]).all(axis=-1)
+    table = {name: np.asarray(targets[name].values) for name in _OF_TARGETS}
+    wanted = (table["present"] == 1) & (table["clutter"] == 0)
+    wanted &= np.isin(table["view"], (View.IN_VIEW, View.PARTLY_IN_VIEW)) & np.isfinite(table["pixel_box"]).all(axis=-1)
     row, slot = np.nonzero(wanted)
-    of = {name: values[row, slot] for name, values in of.items()}
-    centre, away = of["box_centre"], np.linalg.norm(of["box_centre"], axis=1)
+    table = {name: values[row, slot] for name, values in table.items()}
+    centre, away = table["box_centre"], np.linalg.norm(table["box_centre"], axis=1)
     ahead = np.array([[1.0, 0.0, 0.0]])
-    bow = [Pose(np.zeros(3), turned).turn_to_world(ahead)[0] for turned in of["box_orientation"]]
+    bow = [Pose(np.zeros(3), turned).turn_to_world(ahead)[0] for turned in table["box_orientation"]]
     to_sonar = -(centre * np.reshape(bow, (-1, 3))).sum(axis=1) / away
     return {
         "frame": frames[row].astype(int),
-        "category": of["category"].astype(int),
+        "category": table["category"].astype(int),
         "target": slot,
-        "box": of["pixel_box"],
+        "box": table["pixel_box"],
         "azimuth": np.rad2deg(np.arctan2(centre[:, 1], centre[:, 0])),
         "elevation": np.rad2deg(np.arcsin(np.clip(centre[:, 2] / away, -1.0, 1.0))),
         "range": away,
         "aspect": np.rad2deg(np.arccos(np.clip(to_sonar, -1.0, 1.0))),
-        "visible": of["visible_fraction"],
+        "visible": table["visible_fraction"],
         "snr": np.asarray(targets["snr"].values)[row, slot]
         if "snr" in targets
-        else _over_median(tree, frames, row, of["pixel_box"]),
+        else _over_median(tree, frames, row, table["pixel_box"]),
     }
 
 
@@ -99,8 +99,8 @@ def _over_median(tree: xr.DataTree, frames: np.ndarray, row: Ints, box: Floats) 
     energy = np.asarray(tree["image"].dataset["energy"].isel(frame=frames).values)
     first = np.floor(box[:, :2]).astype(int)
     stop = np.maximum(np.ceil(box[:, 2:]).astype(int), first + 1)
-    for n, (at, (x0, y0), (x1, y1)) in enumerate(zip(row, first, stop, strict=True)):
-        own, every = (pixels[np.isfinite(pixels)] for pixels in (energy[at, y0:y1, x0:x1], energy[at]))
+    for n, (frame, (x0, y0), (x1, y1)) in enumerate(zip(row, first, stop, strict=True)):
+        own, every = (pixels[np.isfinite(pixels)] for pixels in (energy[frame, y0:y1, x0:x1], energy[frame]))
         if own.size and np.median(every) > 0.0:
             contrast[n] = 10.0 * np.log10(own.max() / np.median(every))
     return contrast

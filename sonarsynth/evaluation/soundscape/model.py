@@ -59,10 +59,10 @@ class SoundModel:
 
     def coherence(self, frequency: float, offset: Floats) -> Floats:
         """Coherence (pair,), the real part, of hydrophones at offsets (pair, xyz) m, sonar frame, with another."""
-        at = np.array([frequency])
+        frequencies = np.array([frequency])
         total, alone = np.zeros(len(offset), complex), 0.0
         offsets = np.concatenate([np.zeros((1, 3)), offset])
-        for name, density in self.parts(at).items():
+        for name, density in self.parts(frequencies).items():
             waves = self._waves(name, frequency, float(np.linalg.norm(offsets, axis=1).max()))
             alone += float(density[0])
             if waves is not None:

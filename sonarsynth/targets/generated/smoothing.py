@@ -123,12 +123,12 @@ def _pairs(faces: Ints) -> tuple[Ints, Ints, Ints]:
     edge = sides(faces)[1].ravel()
     order = np.argsort(edge, kind="stable")
     first, count = np.unique(edge[order], return_index=True, return_counts=True)[1:]
-    at, to = order[first[count == 2]], order[first[count == 2] + 1]
-    ends = [np.stack([x, x - x % 3 + (x + 1) % 3], axis=1) for x in (at, to)]
+    half_edge, opposite = order[first[count == 2]], order[first[count == 2] + 1]
+    ends = [np.stack([x, x - x % 3 + (x + 1) % 3], axis=1) for x in (half_edge, opposite)]
     same = faces.ravel()[ends[0][:, 0]] == faces.ravel()[ends[1][:, 0]]  # wound against each other
     second = np.where(same[:, None], ends[1], ends[1][:, ::-1])
     joint = np.stack([ends[0][:, 0], ends[0][:, 1], second[:, 0], second[:, 1]], axis=1)
-    return at // 3, to // 3, joint
+    return half_edge // 3, opposite // 3, joint
 
 
 class _Curves(NamedTuple):

@@ -53,15 +53,15 @@ def read_ply(data: bytes) -> Surface:
     if kind == "ascii":
         body = _text(body)
         elements = [_all_double(e) for e in elements]
-    at, columns = 0, {}
+    offset, columns = 0, {}
     for element in elements:
         try:
-            columns[element.name], at = _rows(element, body, at, ORDERS[kind])
+            columns[element.name], offset = _rows(element, body, offset, ORDERS[kind])
         except (struct.error, ValueError, OverflowError, MemoryError) as error:
             reason = "its numbers end before" if isinstance(error, struct.error) else error
             raise MeshError(f"is cut off, or damaged, in its element '{element.name}' ({reason})") from None
-    if at != len(body):
-        over = f"{(len(body) - at) // 8} numbers" if kind == "ascii" else f"{len(body) - at} bytes"
+    if offset != len(body):
+        over = f"{(len(body) - offset) // 8} numbers" if kind == "ascii" else f"{len(body) - offset} bytes"
         raise MeshError(f"holds {over} more than its header says")
     return _surface(as_written, columns)
 
@@ -110,62 +110,62 @@ def _all_double(element: _Element) -> _Element:
     )
 
 
-def _rows(element: _Element, body: bytes, at: int, order: str) -> tuple[dict[str, Any], int]:
+def _rows(element: _Element, body: bytes, offset: int, order: str) -> tuple[dict[str, Any], int]:
     """Columns of an element that begins at a byte, and where the next one begins: a scalar's is an array, a list's its
     counts and all its members in a row. Raises ValueError or struct.error where the body ends before."""
     if not element.count or not element.order:
-        return {name: (np.empty(0, int), np.empty(0)) for name in element.order}, at
-    first, _ = _row(element, body, at, order)
+        return {name: (np.empty(0, int), np.empty(0)) for name in element.order}, offset
+    first, _ = _row(element, body, offset, order)
     counts = {name: len(first[name]) for name in element.lists}
     alike: list[Any] = []
     for name in element.order:
         if name in element.lists:
-            many, of = element.lists[name]
-            alike += [(f"{name} count", order + many), (name, order + of, (counts[name],))]
+            count_dtype, dtype = element.lists[name]
+            alike += [(f"{name} count", order + count_dtype), (name, order + dtype, (counts[name],))]
         else:
             alike.append((name, order + element.scalars[name]))
     size = np.dtype(alike).itemsize
-    if element.count * size <= len(body) - at:
-        table = np.frombuffer(body, alike, element.count, at)
+    if element.count * size <= len(body) - offset:
+        table = np.frombuffer(body, alike, element.count, offset)
         if all((table[f"{name} count"] == counts[name]).all() for name in counts):  # then all rows begin where they do
             columns = {
                 name: (np.full(element.count, counts[name]), table[name].ravel()) if name in counts else table[name]
                 for name in element.order
             }
-            return columns, at + element.count * size
-    return _one_by_one(element, body, at, order)
+            return columns, offset + element.count * size
+    return _one_by_one(element, body, offset, order)
 
 
-def _one_by_one(element: _Element, body: bytes, at: int, order: str) -> tuple[dict[str, Any], int]:
+def _one_by_one(element: _Element, body: bytes, offset: int, order: str) -> tuple[dict[str, Any], int]:
     """As `_rows`, of lists of different lengths."""
     members: dict[str, list[Any]] = {name: [] for name in element.order}
     counts: dict[str, list[int]] = {name: [] for name in element.lists}
     for number in range(element.count):
-        if at >= len(body):
+        if offset >= len(body):
             raise ValueError(f"{number} of {element.count} are there")
-        row, at = _row(element, body, at, order)
+        row, offset = _row(element, body, offset, order)
         for name, values in row.items():
             members[name].extend(values)
             if name in counts:
                 counts[name].append(len(values))
     columns = {name: np.array(values) for name, values in members.items()}
-    return {n: (np.array(counts[n], np.int64), c) if n in counts else c for n, c in columns.items()}, at
+    return {n: (np.array(counts[n], np.int64), c) if n in counts else c for n, c in columns.items()}, offset
 
 
-def _row(element: _Element, body: bytes, at: int, order: str) -> tuple[dict[str, tuple[Any, ...]], int]:
+def _row(element: _Element, body: bytes, offset: int, order: str) -> tuple[dict[str, tuple[Any, ...]], int]:
     """Values of the row that begins at a byte, and where the next one begins."""
     values = {}
     for name in element.order:
-        count, of = 1, element.scalars.get(name, "")
+        count, dtype = 1, element.scalars.get(name, "")
         if name in element.lists:
-            many, of = element.lists[name]
-            (length,) = struct.unpack_from(order + np.dtype(many).char, body, at)
+            count_dtype, dtype = element.lists[name]
+            (length,) = struct.unpack_from(order + np.dtype(count_dtype).char, body, offset)
             if length != length // 1 or not 0 <= length <= len(body):
                 raise ValueError(f"a list of {length:g}")
-            count, at = int(length), at + np.dtype(many).itemsize
-        values[name] = struct.unpack_from(f"{order}{count}{np.dtype(of).char}", body, at)
-        at += count * np.dtype(of).itemsize
-    return values, at
+            count, offset = int(length), offset + np.dtype(count_dtype).itemsize
+        values[name] = struct.unpack_from(f"{order}{count}{np.dtype(dtype).char}", body, offset)
+        offset += count * np.dtype(dtype).itemsize
+    return values, offset
 
 
 def _surface(elements: list[_Element], columns: dict[str, Any]) -> Surface:

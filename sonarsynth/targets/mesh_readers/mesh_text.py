@@ -158,15 +158,15 @@ def _off_in_a_row(
     """The numbers of an OFF that minds no line ends: no colours then, and not one number over."""
     promised = f"{len(rows)} lines where its header says {of_vertices + of_facets}"
     words = [word for row in rows for word in row]
-    at, facets = 3 * of_vertices, []
-    if len(words) < at + 4 * of_facets:
+    position, facets = 3 * of_vertices, []
+    if len(words) < position + 4 * of_facets:
         raise MeshError(f"is cut off: {promised}")
     for _ in range(of_facets):
-        if at >= len(words):
+        if position >= len(words):
             raise MeshError(f"is cut off: {promised}")
-        facets.append(_off_facet(words[at : at + 1 + min(int(words[at]), len(words))]))
-        at += 1 + len(facets[-1])
-    if at != len(words):
+        facets.append(_off_facet(words[position : position + 1 + min(int(words[position]), len(words))]))
+        position += 1 + len(facets[-1])
+    if position != len(words):
         raise MeshError(f"holds more than it says: {promised}")
     return [numbers(words[n : n + 3]) for n in range(0, 3 * of_vertices, 3)], facets
 
@@ -174,9 +174,9 @@ def _off_in_a_row(
 def _checked(vertices: Floats, facets: list[list[int]]) -> Ints:
     """Triangles of facets given by their corners from 0. Raises MeshError with the number of the facet."""
     counts, flat = np.array([len(f) for f in facets], np.int64), np.array([c for f in facets for c in f], object)
-    for at in np.flatnonzero([not 0 <= c < len(vertices) for c in flat])[:1]:
-        facet = int(np.searchsorted(np.cumsum(counts), at, side="right"))
-        raise MeshError(f"facet {facet} has index {flat[at]}, out of range: there are {len(vertices)} vertices")
+    for position in np.flatnonzero([not 0 <= c < len(vertices) for c in flat])[:1]:
+        facet = int(np.searchsorted(np.cumsum(counts), position, side="right"))
+        raise MeshError(f"facet {facet} has index {flat[position]}, out of range: there are {len(vertices)} vertices")
     return polygons(vertices, counts, flat.astype(np.int64))
 
 
@@ -200,9 +200,7 @@ def read_text_stl(data: bytes) -> Surface:
     if max(map(len, words), default=0) > 64:
         raise MeshError("cannot be read as STL (a word of more than 64 letters)")
     table = np.array(words[: len(words) // 21 * 21]).reshape(-1, 21)
-    wrong = (
-        np.any([table[:, at] != word for at, word in _STL_WORDS.items()], axis=0) if len(table) else np.zeros(0, bool)
-    )
+    wrong = np.any([table[:, n] != word for n, word in _STL_WORDS.items()], axis=0) if len(table) else np.zeros(0, bool)
     if wrong.any() or len(words) % 21:
         facet = int(np.argmax(wrong)) if wrong.any() else len(table)
         raise MeshError(f"facet {facet} is not a 'facet normal', an 'outer loop' of three 'vertex', and their ends")
