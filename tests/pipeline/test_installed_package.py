@@ -1,8 +1,9 @@
-"""A wheel and an sdist build, hold what they must, and the wheel runs the first dataset where it is installed alone."""
+"""A wheel and an sdist build, hold what they must, install into a bare environment, and run the first dataset there."""
 
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tarfile
@@ -34,23 +35,31 @@ def test_the_wheel_and_the_sdist_hold_recipes_schema_and_notebooks(built: Path) 
     assert {"pyproject.toml", "configs/remus.yaml", "tools/docs/mkdocs.yml", "README.md", "LICENSE"} <= inside
 
 
-def test_the_wheel_runs_the_first_dataset_from_anywhere(built: Path, tmp_path: Path) -> None:
-    """In a folder of its own: libraries are those of this environment, sonarsynth is that of the wheel alone."""
-    (wheel,) = built.glob("*.whl")
-    with zipfile.ZipFile(wheel) as file:
-        file.extractall(tmp_path / "site")
-    environment = os.environ | {"PYTHONPATH": str(tmp_path / "site"), "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
-    where = "import sonarsynth; print(sonarsynth.__file__)"
-    for arguments in (
-        ["-c", where],
-        ["-m", "sonarsynth", "init", "mine.yaml", "--from", "remus"],
-        ["-m", "sonarsynth", "build", "mine.yaml", "mine.zarr", "--frames", "0:2", "--workers", "0", "--no-predict"],
-        ["-m", "sonarsynth", "verify", "mine.zarr"],
-        ["-m", "sonarsynth", "notebooks", "notebooks"],
-    ):
-        done = subprocess.run(
-            [sys.executable, *arguments], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
-        )
-        if where in arguments:
+@pytest.mark.parametrize("kind", ["whl", "tar.gz"])
+def test_what_is_built_installs_into_a_bare_environment_and_runs_the_first_dataset(
+    kind: str, built: Path, tmp_path: Path
+) -> None:
+    """Nothing but what the package itself asks for, in the versions of the lock; away from the checkout."""
+    (package,) = built.glob(f"*.{kind}")
+    locked = re.findall(r"^[a-z0-9][\w.-]*==[^\\\n]+", (ROOT / "tools" / "requirements.lock").read_text(), re.MULTILINE)
+    (tmp_path / "constraints.txt").write_text("\n".join(locked))
+    python = tmp_path / "bare" / "bin" / "python"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(python.parents[1])], check=True)
+    install = [Path(sys.executable).with_name("uv"), "pip", "install", "--quiet", "--python", python]
+    subprocess.run([*install, "--constraint", tmp_path / "constraints.txt", package], check=True)
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONHOME")}
+    command = str(python.with_name("sonarsynth"))
+    first_dataset = (
+        [command, "init", "mine.yaml", "--from", "remus"],
+        [command, "build", "mine.yaml", "mine.zarr", "--frames", "0:2", "--workers", "0", "--no-predict"],
+        [command, "verify", "mine.zarr"],
+        [command, "notebooks", "notebooks"],
+    )
+    where = [str(python), "-c", "import sonarsynth; print(sonarsynth.__file__)"]
+    for arguments in (where, *(first_dataset if kind == "whl" else first_dataset[:1])):
+        done = subprocess.run(arguments, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        if arguments is where:
             assert done.stdout.startswith(str(tmp_path))
-    assert (tmp_path / "notebooks" / "first_frame.ipynb").is_file()
+    assert (tmp_path / "mine.yaml").is_file()
+    assert kind != "whl" or (tmp_path / "notebooks" / "first_frame.ipynb").is_file()
