@@ -9,6 +9,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.equations.bubble.pulses import Pulse
 from sonarsynth.pictures.figures.snap_comparison import SnapComparison, compare_snaps
 from sonarsynth.pictures.figures.snap_figure import snap_figure
+from sonarsynth.pictures.figures.style import save
 from sonarsynth.recipe import Recipe
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.sources.recordings import RecordedSnap, RecordingError, read_recording
@@ -55,9 +56,7 @@ def draw_snap(recipe: Recipe, out: Path, compare: Path | str | None = None) -> t
         raise
     except ValueError as error:
         raise FieldError(("scene", "world", "sources", 0, sources[0].pulse_field), str(error)) from None
-    out.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(out)
-    return out, found
+    return save(figure, out), found
 
 
 def _compared(file: Path | str, model: Callable[[float], Pulse], band: tuple[float, float]) -> SnapComparison:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,6 +60,14 @@ def figure(width: float, height: float, layout: str = "constrained", **more: Any
     return made
 
 
+def save(made: Figure, out: Path, **how: Any) -> Path:
+    """Write a figure into a file, a PNG where the name does not say, and its folder; returns the file."""
+    file = out if out.suffix else out.with_suffix(".png")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    made.savefig(file, **how)
+    return file
+
+
 def settle(made: Figure) -> None:
     """Give the axes of a figure their place, once: later drawings need not look for it."""
     engine = made.get_layout_engine()
@@ -80,7 +89,7 @@ def label(axes: Axes, x: str, y: str, title: str = "") -> None:
     axes.set_xlabel(x, fontsize=9, color=INK)
     axes.set_ylabel(y, fontsize=9, color=INK)
     axes.set_title(title, fontsize=10, color=INK, loc="left")
-    axes.tick_params(labelsize=8, colors=INK)
+    axes.tick_params(which="both", labelsize=8, colors=INK)
     for side in axes.spines.values():
         side.set_color(PALE)
         side.set_linewidth(0.6)

@@ -18,6 +18,7 @@ from sonarsynth.pictures.ray_figures.scene_drawing import (
     TRACK,
     VIEW,
     bodies_in_space,
+    lift_names,
     name_beside,
     one_scale,
     profile_axes,
@@ -91,6 +92,8 @@ def overview_figure(overview: Overview) -> Figure:
     above.set_ylim(low - 0.5 * (factor - 1.0) * (high - low), high + 0.5 * (factor - 1.0) * (high - low))
     deep = f"; the bottom is at {overview.geometry.bottom:.4g} m" if overview.bottom_is_far else ""
     side.set_title(f"from the side, {scale_words(_widen(side))}{deep}", fontsize=10, color=INK, loc="left")
+    lift_names(above)
+    lift_names(side)
     return made
 
 
@@ -164,7 +167,8 @@ def _in_space(axes: Axes3D, overview: Overview) -> None:
                 axes.plot(*corners[[a, b]].T, color=overview.colour(name), linewidth=0.8, alpha=strength)
     axes.scatter(*overview.snaps.T, s=22, marker="*", color=SNAP, depthshade=False)
     axes.scatter(*geometry.sensors.T, s=0.5, color=INK, depthshade=False)
-    axes.text(*geometry.array, "  array", fontsize=9, color=INK)
+    over = np.append(geometry.array[:2], geometry.sensors[:, 2].max())
+    axes.text(*over, "array", fontsize=9, color=INK, ha="center", va="bottom")
     one_scale(axes, overview.points, geometry.bearing)
     axes.set_title("in space, one scale", fontsize=10, color=INK, loc="left")
 

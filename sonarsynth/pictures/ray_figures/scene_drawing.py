@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -43,6 +43,16 @@ def name_beside(axes: Axes, name: str, place: Floats, over: bool = False) -> Non
     offset = {"xytext": (0, 5), "ha": "center"} if over else {"xytext": (6, -11)}
     text = axes.annotate(name, place, textcoords="offset points", fontsize=9, color=INK, zorder=6, **offset)  # type: ignore[arg-type]
     text.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
+
+
+def lift_names(axes: Axes) -> None:
+    """Lift names that lie on others, in a figure that has its layout; from the lowest on."""
+    names: list[Any] = [text for text in axes.texts if text.get_text()]
+    taken: list[Any] = []
+    for name in sorted(names, key=lambda name: float(name.get_window_extent().y0)):
+        while any(name.get_window_extent().overlaps(box) for box in taken):
+            name.xyann = (name.xyann[0], name.xyann[1] + 2.0)
+        taken.append(name.get_window_extent())
 
 
 def profile_axes(axes: Axes, depth: Floats, speed: Floats, bottom_depth: float) -> None:

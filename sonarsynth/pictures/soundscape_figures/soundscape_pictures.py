@@ -15,6 +15,7 @@ from sonarsynth.evaluation.soundscape.predicted import PASCAL, PredictedFigures,
 from sonarsynth.evaluation.soundscape.recorded_sound import SeaRecording, recorded_sound
 from sonarsynth.evaluation.soundscape.sound import NothingHeard
 from sonarsynth.evaluation.soundscape.stored_sound import recipe_of_store, stored_sound
+from sonarsynth.pictures.figures.style import save
 from sonarsynth.pictures.soundscape_figures.soundscape_figure import soundscape_figure
 from sonarsynth.pictures.store_reading import NothingToDraw, opened
 from sonarsynth.recipe import Recipe
@@ -102,9 +103,8 @@ def _recording(recipe: Recipe, compare: SeaRecording | None) -> MeasuredFigures 
 
 def draw_soundscape(found: Soundscape, out: Path) -> Path:
     """Draw the sheet of figures into a file; returns it."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    soundscape_figure(found.title, found.measured, found.predicted, found.recording).savefig(out, dpi=110)
-    return out
+    made = soundscape_figure(found.title, found.measured, found.predicted, found.recording)
+    return save(made, out, dpi=110)
 
 
 def soundscape(
