@@ -122,16 +122,16 @@ class CastingMesh:
         rays, passed, ahead = np.arange(len(start)), np.zeros(len(start)), start
         for _ in range(ROUNDS):
             proposed, at = self.caster.nearest(ahead, heading, limit - passed)
-            some = np.flatnonzero((proposed >= 0) & (proposed < len(self.faces)))  # of most rays, nothing
-            rays, start, heading, limit = rays[some], start[some], heading[some], limit[some]
-            beyond = passed[some] + at[some]
-            hit, along = np.empty(len(some), np.int64), np.empty(len(some))
+            candidate = np.flatnonzero((proposed >= 0) & (proposed < len(self.faces)))  # of most rays, nothing
+            rays, start, heading, limit = rays[candidate], start[candidate], heading[candidate], limit[candidate]
+            beyond = passed[candidate] + at[candidate]
+            hit, along = np.empty(len(candidate), np.int64), np.empty(len(candidate))
             intersections.confirm(
                 start,
                 heading,
-                np.zeros(len(some)),
+                np.zeros(len(candidate)),
                 np.fmin(limit, beyond + SLACK),
-                proposed[some],
+                proposed[candidate],
                 self.vertices,
                 self.faces,
                 *self.around,

@@ -98,7 +98,7 @@ def _cast_profile(cast: Cast) -> Profile:
     table = read_cast(Path(cast.path), cast.profile, *own_place)
     salt = table.columns.get("salinity")
     if cast.salinity is not None and salt is not None and not np.isfinite(salt.values).any():  # its sensor failed
-        table = replace(table, columns={name: one for name, one in table.columns.items() if name != "salinity"})
+        table = replace(table, columns={name: column for name, column in table.columns.items() if name != "salinity"})
     site = _place(cast, table)
     water = {name: column.values for name, column in table.columns.items()}
     if "sound speed" in water:

@@ -36,8 +36,8 @@ def neighbours(mesh: Mesh) -> Neighbours:
     order = np.argsort(edge, kind="stable")
     first, count = np.unique(edge[order], return_index=True, return_counts=True)[1:]
     shared = first[count == 2]
-    side, neighbour = order[shared], order[shared + 1] // 3
-    facet, corner = side // 3, side % 3
+    edge_start, neighbour = order[shared], order[shared + 1] // 3
+    facet, corner = edge_start // 3, edge_start % 3
     turn = np.linalg.norm(mesh.normal[facet] - mesh.normal[neighbour], axis=1)
     start, stop = (mesh.vertices[mesh.faces[facet, n]] for n in (corner, (corner + 1) % 3))
     return Neighbours(facet, neighbour, start, stop, turn)

@@ -34,10 +34,10 @@ def _with_relief(scene: Scene, stamp: tuple[int, int] | None) -> Scene:
     assert world.relief is not None
     if (rise := world.relief.target(depth)) is None:
         return scene
-    made = replace(scene, world=replace(world, targets=(*world.targets, rise)))
-    ground = partial(highest_within, made.mesh_of(len(world.targets)), radius=0.0)
+    risen = replace(scene, world=replace(world, targets=(*world.targets, rise)))
+    ground = partial(highest_within, risen.mesh_of(len(world.targets)), radius=0.0)
     sources = tuple(source.on_relief(depth, ground) for source in world.sources)
-    return replace(made, world=replace(made.world, sources=sources))
+    return replace(risen, world=replace(risen.world, sources=sources))
 
 
 def relief_of(scene: Scene) -> Mesh | None:

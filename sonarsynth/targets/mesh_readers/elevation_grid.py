@@ -43,8 +43,8 @@ def grid_surface(x: Floats, y: Floats, z: Floats) -> Surface:
         raise MeshError(f"has a grid of {z.shape[1]} by {z.shape[0]}: it takes two by two at least")
     if 2 * z.size > max_facets():
         raise MeshError(f"has a grid of {z.shape[1]} by {z.shape[0]}, more than {max_facets()} facets")
-    for name, some in (("x", x), ("y", y)):
-        if not (np.isfinite(some).all() and ((np.diff(some) > 0).all() or (np.diff(some) < 0).all())):
+    for name, numbers in (("x", x), ("y", y)):
+        if not (np.isfinite(numbers).all() and ((np.diff(numbers) > 0).all() or (np.diff(numbers) < 0).all())):
             raise MeshError(f"has numbers {name} that neither only rise nor only fall")
     if not np.isfinite(z).all():
         row, column = np.argwhere(~np.isfinite(z))[0]
@@ -69,12 +69,12 @@ def read_grid_text(data: bytes) -> Surface:
     order, sign = [0, 1, 2], 1.0
     if rows and not _number(rows[0][1][0]):
         line = re.sub(rb"[\[(][^\])]*[\])]", b"", lines_of(data)[rows[0][0] - 1])
-        found = [word for word in re.split(r"[,;\s]+", line.decode("utf-8", "replace").strip().lower()) if word]
-        places = {axis: [n for n, word in enumerate(found) if word in names] for axis, names in NAMES.items()}
-        if any(len(some) != 1 for some in places.values()):
-            raise MeshError(f"line {rows[0][0]}: names {', '.join(found[:8])} are not x, y and z (or depth)")
+        heads = [word for word in re.split(r"[,;\s]+", line.decode("utf-8", "replace").strip().lower()) if word]
+        places = {axis: [n for n, word in enumerate(heads) if word in names] for axis, names in NAMES.items()}
+        if any(len(columns) != 1 for columns in places.values()):
+            raise MeshError(f"line {rows[0][0]}: names {', '.join(heads[:8])} are not x, y and z (or depth)")
         order = [places[axis][0] for axis in "xyz"]
-        sign, rows = -1.0 if found[order[2]] == "depth" else 1.0, rows[1:]
+        sign, rows = -1.0 if heads[order[2]] == "depth" else 1.0, rows[1:]
     table = np.empty((len(rows), 3))
     for at, (number, words) in enumerate(rows):
         try:
@@ -98,12 +98,12 @@ def read_npz(data: bytes) -> Surface:
         if unpacked > 64 * max_facets():
             raise MeshError(f"would unpack to {unpacked} bytes")
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            held = {name: np.asarray(archive[name], float) for name in archive.files}
+            arrays = {name: np.asarray(archive[name], float) for name in archive.files}
     except MeshError:
         raise
     except Exception as error:  # whatever a damaged file may bring
         raise MeshError(f"cannot be read as npz ({type(error).__name__})") from None
-    return grid_surface(*_picked(held))
+    return grid_surface(*_picked(arrays))
 
 
 def read_netcdf_grid(data: bytes) -> Surface:
@@ -124,12 +124,12 @@ def read_netcdf_grid(data: bytes) -> Surface:
     flat: dict[str, Floats] = {}
     for name, variable in grid.variables.items():
         unit = str(variable.attrs.get("units", "m")).lower()
-        known = str(name).lower() in sum(NAMES.values(), ())
+        wanted = str(name).lower() in sum(NAMES.values(), ())
         if "degree" in unit and str(name).lower() in ("lat", "lon", "latitude", "longitude", *NAMES["x"], *NAMES["y"]):
             raise MeshError(f"has '{name}' in degrees: a grid in metres, east and north, is needed")
-        if known and unit not in ("m", "metre", "metres", "meter", "meters", "1", ""):
+        if wanted and unit not in ("m", "metre", "metres", "meter", "meters", "1", ""):
             raise MeshError(f"has '{name}' in {unit[:20]}: it must be in m")
-        if known:
+        if wanted:
             down = str(variable.attrs.get("positive", "")).lower() == "down" and str(name).lower() != "depth"
             order = [str(d) for d in variable.dims]
             values = np.asarray(variable.values, float)
@@ -138,16 +138,16 @@ def read_netcdf_grid(data: bytes) -> Surface:
     return grid_surface(*_picked(flat))
 
 
-def _picked(held: dict[str, Any]) -> tuple[Floats, Floats, Floats]:
+def _picked(arrays: dict[str, Any]) -> tuple[Floats, Floats, Floats]:
     """x, y and z by their names; heights that are depths with their sign turned."""
-    found = []
+    picked = []
     for axis, names in NAMES.items():
-        some = [name for name in held if name.lower() in names]
-        if len(some) != 1:
-            known = ", ".join(list(held)[:8]) or "nothing"
-            raise MeshError(f"must hold {' or '.join(names)} once, for {axis}; it holds {known}")
-        found.append(held[some[0]] * (-1.0 if some[0].lower() == "depth" else 1.0))
-    return found[0], found[1], found[2]
+        matching = [name for name in arrays if name.lower() in names]
+        if len(matching) != 1:
+            listed = ", ".join(list(arrays)[:8]) or "nothing"
+            raise MeshError(f"must hold {' or '.join(names)} once, for {axis}; it holds {listed}")
+        picked.append(arrays[matching[0]] * (-1.0 if matching[0].lower() == "depth" else 1.0))
+    return picked[0], picked[1], picked[2]
 
 
 def _number(word: bytes) -> bool:
