@@ -190,9 +190,12 @@ class DiffuseKirchhoff:
 
 @dataclass(frozen=True)
 class Shadow:
-    """The wave that makes the shadow behind lit facets, seen or not (`kirchhoff_integral.shadow_amplitude`).
+    """The wave that makes the shadow behind lit facets, seen or not: what the textbook's factor holds besides the echo.
 
-    f = (i k/4 pi) A n.(ki + ks) 2 exp[corners], whatever the surface is made of and however rough it is.
+    f = (i k/4 pi) A n.(ki + ks) 2 exp[corners], whatever the surface is made of and however rough it is: -i k/2 pi
+    times the outline's area straight ahead, where it and the direct wave cancel; 0 at backscatter and in the mirror
+    direction. So either the direct wave and this, over all lit facets, or echoes alone and no direct wave through the
+    body; never both. Not reciprocal off the axis.
     """
 
     def amplitude(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:

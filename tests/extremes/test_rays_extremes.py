@@ -8,7 +8,6 @@ import pytest
 from sonarsynth.equations.rays import ray_solutions
 
 UNIFORM = ray_solutions.water(np.array([0.0]), np.array([1500.0]), 50.0)
-CHANNEL = ray_solutions.water(np.array([0.0, 20.0, 50.0]), np.array([1510.0, 1500.0, 1515.0]), 50.0)
 
 
 def one(water: ray_solutions.Water, start: float, end: float, distance: float) -> ray_solutions.Eigenrays:

@@ -16,8 +16,6 @@ from sonarsynth import (
     Munk,
     RayArrivals,
     Tabulated,
-    TemperatureSalinity,
-    Thermocline,
     eigenrays,
     eigenrays_between,
 )
@@ -25,13 +23,6 @@ from sonarsynth.environment.sea import SoundSpeed
 
 WATER = Isovelocity(speed=1540.0)
 LAYERS = Tabulated(depth=(0.0, 5.0, 6.5, 20.0), speed=(1540.0, 1540.0, 1533.55, 1533.8))
-WATERS = [
-    WATER,
-    LAYERS,
-    Linear(surface_speed=1535.0, gradient=0.1),
-    Thermocline(),
-    TemperatureSalinity(depth=(0.0, 8.0, 20.0), temperature=(29.0, 28.5, 26.0), salinity=(32.0, 32.5, 33.0)),
-]
 FIELDS = [field.name for field in dataclasses.fields(RayArrivals)]
 
 

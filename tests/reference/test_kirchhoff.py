@@ -7,7 +7,6 @@ import itertools
 import mpmath as mp
 import numpy as np
 import pytest
-from scipy.special import j1
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.scattering.kirchhoff_integral import (
@@ -16,30 +15,16 @@ from sonarsynth.equations.scattering.kirchhoff_integral import (
     facet_amplitude,
     local_grazing,
     rectangular_plate,
-    shadow_amplitude,
     shadow_taper,
     triangle_integral,
 )
 from sonarsynth.equations.scattering.kirchhoff_kernels import facet_amplitudes, mesh_amplitude
 from sonarsynth.equations.scattering.lobes import lit_and_seen
-from sonarsynth.equations.scattering.modal_series import sphere_amplitude
 from sonarsynth.equations.scattering.roughness import coherent_factor, roughness_parameter
 from sonarsynth.equations.water.boundary_reflection import rayleigh
 from sonarsynth.geometry import unit
-from sonarsynth.targets.generated.generation import sphere
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
-
-C = 1500.0
-
-
-def round_mesh(radius: float, edge: float) -> tuple[Floats, Floats]:
-    """Corners and normals of a sphere of flat facets, blown up to the volume of the sphere."""
-    vertices, faces = sphere(radius, edge)
-    corners = vertices[faces]
-    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    volume = np.sum(corners.mean(axis=1) * doubled) / 6
-    return corners * (4 / 3 * np.pi * radius**3 / volume) ** (1 / 3), unit(doubled)
 
 
 def exact_difference(phases: Floats) -> complex:
@@ -198,20 +183,3 @@ def test_the_compiled_sum_is_the_sum_of_the_facets() -> None:
     assert abs(one_by_one[5]).max() == 0.0 == abs(one_by_one[:, 0]).max()
     with pytest.raises(ValueError, match="facet, 3, xyz"):
         mesh_amplitude(corners[0], a, b, k)
-
-
-def test_the_shadow_of_a_sphere_is_that_of_a_disc_and_of_the_exact_series() -> None:
-    k, radius, towards = 2 * np.pi * 50e3 / C, 0.25, np.array([1.0, 0, 0])
-    corners, normal = round_mesh(radius, 0.008)
-    lit = normal @ towards < 0
-    for angle, most in ((0.0, 0.6), (3.0, 0.6), (10.0, 0.5)):
-        on = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
-        shadow = shadow_amplitude(corners[lit], towards, on, k).sum()
-        x = k * radius * np.sin(np.radians(angle)) + 1e-9
-        assert abs(shadow / (-0.5j * k * radius**2 * 2 * j1(x) / x) - 1) < 0.1
-        both = shadow + mesh_amplitude(corners[lit], towards, on, [k])[0]
-        exact = sphere_amplitude(50e3, np.radians(angle), radius=radius)
-        assert abs(20 * np.log10(abs(both / exact))) < most
-    assert abs(shadow_amplitude(corners[lit], towards, -towards, k)).max() == 0.0
-    mirror = towards - 2 * (normal[lit] @ towards)[:, None] * normal[lit]
-    assert abs(shadow_amplitude(corners[lit], towards, mirror, k)).max() < 1e-12

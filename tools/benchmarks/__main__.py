@@ -11,7 +11,6 @@ BENCHMARKS = (
     "build",
     "rays",
     "reflections",
-    "scattering",
     "scheduling",
     "reading",
     "laws",

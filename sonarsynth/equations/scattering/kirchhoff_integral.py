@@ -104,21 +104,6 @@ def facet_amplitude(
     return _amplitude(dot(np.cross(second, third), wave), _half_mean(first, second, third, -wave), reflection)
 
 
-def shadow_amplitude(
-    corners: npt.ArrayLike, incident: npt.ArrayLike, scattered: npt.ArrayLike, wavenumber: npt.ArrayLike
-) -> Complexes:
-    """Far-field amplitude (...) (m) of the shadow behind lit triangles, (i k/4 pi) n.(ki + ks) int exp(-i w.x) dS.
-
-    What the textbook's factor holds besides the echo: no V in it, 0 at backscatter and in the mirror direction, -i k/2
-    pi times the outline's area straight ahead, where it and the direct wave cancel. So either the direct wave and this,
-    over all lit facets, or echoes alone and no direct wave through the body; never both. Not reciprocal off the axis.
-    """
-    first, second, third = _edges(corners)
-    along = np.asarray(incident, float) + np.asarray(scattered, float)
-    across = dot(np.cross(second, third), np.asarray(wavenumber, float)[..., None] * along)
-    return _amplitude(across, _half_mean(first, second, third, -_wave(incident, scattered, wavenumber)), -1.0)
-
-
 def local_grazing(incident: npt.ArrayLike, scattered: npt.ArrayLike) -> Floats:
     """Grazing angle (rad) (...) at which a facet would mirror one way into the other: sin q = |ki - ks|/2.
 
