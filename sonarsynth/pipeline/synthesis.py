@@ -6,10 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import depth
+from sonarsynth.conventions import Floats, depth
 from sonarsynth.geometry.motion import pose, velocity
 from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.planning import Plan, arrivals_of, context_of, frame_start
@@ -93,8 +94,11 @@ def digitise(plan: Plan, frame: Frame, signals: Signals, hearing: Hearing = told
     sound_speed = float(plan.profile.at(depth(here.position)))
     noises = plan.scene.world.environment.noises
     for number, (name, noise) in enumerate(zip(part_names(noises), noises, strict=True)):
-        random = stream(frame.seed, "noise", frame.key, frame.step, *([number] if number else []))
-        signals = add_noise(signals, noise, sonar, plan.elements, random, here, sound_speed)
+        if noise.played:
+            signals = _with_played_noise(plan, frame, signals, noise, number)
+        else:
+            random = stream(frame.seed, "noise", frame.key, frame.step, *([number] if number else []))
+            signals = add_noise(signals, noise, sonar, plan.elements, random, here, sound_speed)
         mark_stage(name)
     for number, source in enumerate(plan.scene.world.noise_sources):
         signals = _with_noise_source(plan, frame, signals, source, number)
@@ -102,6 +106,20 @@ def digitise(plan: Plan, frame: Frame, signals: Signals, hearing: Hearing = told
     hearing("noise", signals)
     signals = _through_channels(plan, frame, signals, sound_speed, hearing)
     return signals if sonar.converter is None else convert(signals, sonar.converter)
+
+
+def _with_played_noise(plan: Plan, frame: Frame, signals: Signals, noise: Any, number: int) -> Signals:
+    """Signals with a recording; where each stretch of it comes from is drawn once a sequence."""
+    from sonarsynth.signals.noise.played_noise import add_played_noise  # seldom needed
+
+    def even(stretch: int) -> Floats:
+        return stream(frame.seed, "played noise", frame.key, number, stretch).random(2)
+
+    here = frame.sonar_pose
+    sound_speed = float(plan.profile.at(depth(here.position)))
+    return add_played_noise(
+        signals, noise, plan.scene.sonar, plan.elements, here, sound_speed, time=frame.time, even=even
+    )
 
 
 def _with_noise_source(plan: Plan, frame: Frame, signals: Signals, source: NoiseSource, number: int) -> Signals:

@@ -25,6 +25,8 @@ ELECTRONICS, SENSORS, DISTANT_CHORUS = "electronics", "sensors", "distant chorus
 SIGNAL_TO_NOISE = "signal to noise"
 PATH_SECONDS = 150e-9
 """Of one core for a sample of one hydrophone of a source of noise."""
+PLAYED_SECONDS = 70e-9
+"""Of one core for a sample of one hydrophone of a recording that is played."""
 ERROR_SECONDS = 40e-9
 """Of one core to filter a sample of one channel."""
 NoiseRow = tuple[str, str, str, str, float, int]
@@ -75,6 +77,9 @@ def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
                 f"{wrong:.2g} of the coherence",
             )
             work = seconds(noise.directions, elements, plan.sizes["sample"])
+        if noise.played:
+            way, error = f"{getattr(noise.directions, 'kind', 'one')}: a plane wave each 2 ms", "none on average"
+            work = PLAYED_SECONDS * plan.sizes["sensor"] * plan.sizes["sample"]
         elif noise.correlated:
             way = "by its cross spectral density"
         rows.append((name, f"{noise.row()}, {way}", said, error, work, 0))

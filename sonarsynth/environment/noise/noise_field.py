@@ -54,6 +54,11 @@ class NoiseField(Method):
         """Whether it states a cross spectral density of its own."""
         return self.factors(np.array([1e4]), np.eye(2, 3)) is not None
 
+    @property
+    def played(self) -> bool:
+        """Whether it is heard as it was recorded, and nothing is drawn but where it comes from."""
+        return False
+
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`."""
         products = size.samples // 2 * size.sensors**3 / 3.0 if self.correlated else 0.0

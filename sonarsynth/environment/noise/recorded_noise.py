@@ -1,4 +1,4 @@
-"""Noise of the spectrum of a recording."""
+"""Noise of the spectrum of a recording, or the recording itself."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt
+from pydantic import model_validator
 
-from sonarsynth.conventions import Floats, Number, PositiveHertz
+from sonarsynth.conventions import Floats, Number, PositiveHertz, Seconds
 from sonarsynth.description import description, named_files, waveform_files
 from sonarsynth.environment.noise.directions import Directions
 from sonarsynth.environment.noise.noise_field import NoiseField
@@ -21,11 +22,13 @@ SHORTEST, LONGEST = 256, 1 << 25
 
 @description
 class RecordedNoise(NoiseField):
-    """Gaussian noise that has the power spectral density of a recording of the sea (WAV or HDF5), by Welch's method.
+    """A recording of the sea (WAV or HDF5): Gaussian noise of its power spectral density, or its samples, played.
 
-    Of the recording its mean spectrum alone is kept: neither its samples nor its snaps, which a chorus makes, are
-    played. Beyond half its sampling frequency there is nothing. Of a recording of more than 2^25 samples, as many of
-    its beginning are used.
+    The spectrum is by Welch's method, of 2^25 samples of the beginning at most. Samples are played again and again,
+    2 ms at a time, each stretch a plane wave from one of the directions: in the middle of the array hydrophones hear
+    the recording itself, farther off the same sound earlier or later, with the mean coherence of the directions. Its
+    snaps come with it: beside a chorus, or snaps of the recipe, there are both. Beyond half its sampling frequency
+    there is nothing.
     """
 
     kind: Literal["recording"] = "recording"
@@ -41,6 +44,25 @@ class RecordedNoise(NoiseField):
     """Of the file, from 0."""
     directions: Directions | None = None
     """As of `flat`: one hydrophone does not tell where its sound came from."""
+    play: Literal["spectrum", "samples"] = "spectrum"
+    """What is kept of it; samples need `directions`."""
+    start: Seconds = 0.0
+    """Time of the recording that is played at time 0 of the motions."""
+
+    @model_validator(mode="after")
+    def _check(self) -> RecordedNoise:
+        if self.play == "samples" and self.directions is None:
+            raise ValueError("samples come from somewhere: give `directions`, such as {kind: isotropic}")
+        return self
+
+    @property
+    def played(self) -> bool:
+        """As `NoiseField.played`."""
+        return self.play == "samples"
+
+    def row(self) -> str:
+        """As `Method.row`."""
+        return "samples of a recording" if self.played else self.kind
 
     def density(self, frequency: Floats) -> Floats:
         """As `NoiseField.density`: straight lines between the bins of the spectrum. Raises ValueError for a file that
