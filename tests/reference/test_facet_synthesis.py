@@ -13,23 +13,28 @@ from sonarsynth.conventions import Floats
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.equations.scattering.kirchhoff_integral import shadow_taper
 from sonarsynth.products import Arrivals
-from sonarsynth.receiver import BandPass, LowPass, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import LowPass, PositionTable, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.array_paths import array_paths
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.pulse_shapes import MOST_PHASE, shape_modes
-from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
-from sonarsynth.state import Emission
-from tests.laws.test_synthesis import C, absorption, arrivals, error, some_of, target_at
+from tests.laws.test_synthesis import (
+    FACES,
+    MODEL,
+    SHARP,
+    SNAPS,
+    SONAR,
+    C,
+    absorption,
+    arrivals,
+    error,
+    some_of,
+    target_at,
+)
 
-MODEL = LogarithmicBubble()
-SNAPS = (Emission(np.zeros(3), 0.0, MODEL, None),)
-SONAR = Sonar()
-SHARP = Sonar(filter=BandPass(low=35e3, high=75e3, transition=15e3, attenuation=160))  # nothing beyond 98 kHz
 LOW = Sonar(filter=LowPass(cutoff=60e3, attenuation=140), sampling_frequency=250e3)
-FACES = elements(Romanis())
 PRECISE = GriddedSynthesis(precision="float64", width=14, tolerance=1e-10)
 
 
