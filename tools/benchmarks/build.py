@@ -65,15 +65,16 @@ def stages(plan: Plan, folder: Path) -> tuple[dict[str, float], float]:
     made = [one(plan, index) for index in range(WARM + FRAMES)][WARM:]
     laps, values = [seconds for _, seconds in made], [found for found, _ in made]
     ms = {stage: 1e3 * float(np.median([lap[stage] for lap in laps])) for stage in pipeline.STAGES if stage in laps[0]}
-    compressing, writing = written(plan, folder / "few.zarr", values)
-    many = written(replace(plan, shard_frames=FRAMES), folder / "many.zarr", values)
+    compressing, writing = written(plan, folder, values)
+    many = written(replace(plan, shard_frames=FRAMES), folder, values)
     return ms | {"compress": compressing, "digest and write": writing}, sum(many)
 
 
-def written(plan: Plan, path: Path, values: list[pipeline.Values]) -> tuple[float, float]:
+def written(plan: Plan, folder: Path, values: list[pipeline.Values]) -> tuple[float, float]:
     """Processor time (ms) a frame to compress some frames, as if they were the first, and to write them besides."""
+    path, step = folder / f"{len(plan.products)} {plan.shard_frames}.zarr", plan.shard_frames
     store.create(path, plan)
-    layout, step = store.layout_of(plan), plan.shard_frames
+    layout = store.layout_of(plan)
     writing = compressing = 0.0
     for first in range(0, len(values), step):
         began = time.process_time()
@@ -115,8 +116,8 @@ def bench() -> dict[str, Any]:
     """Stages; the dataset by 1 and by 2 workers, compared; start-up."""
     plan = planning.plan(reading.load(RECIPE))
     with tempfile.TemporaryDirectory() as folder:
-        by_stage, many = stages(plan, Path(folder) / "stages")
-        few, few_many = stages(planning.plan(plan.recipe, FEW), Path(folder) / "few")
+        by_stage, many = stages(plan, Path(folder))
+        few, few_many = stages(planning.plan(plan.recipe, FEW), Path(folder))
         paths = {workers: Path(folder) / f"{workers}.zarr" for workers in (1, 2)}
         alone = built(plan, paths[1], 1)
         runs = [built(plan, paths[2], 2) for _ in range(BUILDS)]
