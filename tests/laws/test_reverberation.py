@@ -79,16 +79,20 @@ def test_energy_is_that_of_the_sonar_equation_and_not_of_the_number_of_scatterer
     fine = np.linspace(edges[0], edges[-1], 60_001)
     rate = lambert_rate(fine, HEIGHT, 10.0 ** (MU / 10.0), SPEED)
     known = np.histogram(fine, edges, weights=rate * (fine[1] - fine[0]))[0]
-    counts = []
+    counts, draws = [], 16
     for speckle in (1.0, 0.1, 0.02):
-        drawn = [plan(recipe(seed=seed, speckle=speckle)) for seed in (1, 2, 3)]
-        found = [(heard(made), sent(made)) for made in drawn]
-        counts.append(np.mean([len(a.delay) for a, _ in found]))
-        got = np.mean([np.histogram(a.delay, edges, weights=a.energy)[0] / s for a, s in found], axis=0)
-        off = np.abs(10.0 * np.log10(got / known))
-        assert off[:-1].max() < (0.6 if speckle == 1.0 else 0.3) and (speckle > 0.02 or off[-1] < 0.4), speckle
-        # of some 1000 scatterers in three draws, 0.12 dB rms by chance
-        assert 10.0 * np.log10(got.sum() / known.sum()) == pytest.approx(0.0, abs=0.45 if speckle == 1.0 else 0.15)
+        shares, squares = np.zeros((2, draws, len(known)))
+        frames = [plan(recipe(seed=seed, speckle=speckle)) for seed in range(draws)]
+        arrivals = [heard(frame) for frame in frames]
+        for n, (a, frame) in enumerate(zip(arrivals, frames, strict=True)):
+            shares[n] = np.histogram(a.delay, edges, weights=a.energy)[0] / sent(frame) / known
+            squares[n] = np.histogram(a.delay, edges, weights=a.energy**2)[0] / (sent(frame) * known) ** 2
+        counts.append(np.mean([len(a.delay) for a in arrivals]))
+        total = shares @ known / known.sum()
+        for share in (*shares.T, total):  # four standard errors of the mean of the draws
+            assert share.mean() == pytest.approx(1.0, abs=4.0 * share.std(ddof=1) / draws**0.5), speckle
+        poisson = squares.mean(axis=0)  # variance where nothing evened scatterers out over cells
+        assert total.std(ddof=1) < 0.8 * np.sqrt(poisson @ known**2) / known.sum(), speckle
     assert counts[2] > 4.0 * counts[1] > 30.0 * counts[0]
 
 
