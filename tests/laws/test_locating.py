@@ -16,7 +16,7 @@ from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.refraction import first_rays
-from sonarsynth.ranging.location.source_position import bending_covariance
+from sonarsynth.ranging.location.source_position import ACCEPTED, UNRESOLVED, bending_covariance
 from sonarsynth.receiver import PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.state import Receiver, Survey
 from tests.heard import RATE, envelope_late, hear, hear_direct, silence
@@ -98,6 +98,28 @@ def test_an_echo_close_behind_the_pulse_does_little():
     found = locate(signals, ROMANIS, source)
     assert abs(found.elevation[0] - azimuth_elevation(source)[1]) < 1e-4
     assert np.linalg.norm(found.position[0] - source) < 0.02
+
+
+@pytest.mark.parametrize("decibels", [1.0, 2.5, 4.0])
+def test_unlike_gains_are_not_another_pulse(decibels):
+    """Gains are positive and in phase, whatever their spread: the place stays within three predicted errors."""
+    source = np.array([9.0, 5.0, -4.0])
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        signals = hear_direct(SMALL, source, C, 0.003 * 20.0 / np.linalg.norm(source), random, samples=700)
+        gain = 10.0 ** (decibels * random.standard_normal((SMALL.count, 1)) / 20.0)
+        found = locate(replace(signals, pressure=(signals.pressure * gain).astype(np.float32)), SMALL, source)
+        assert found.reason[0] == ACCEPTED
+        off = found.position[0] - source
+        assert (np.abs(off) < 3.0 * np.sqrt(np.diag(found.position_covariance[0]))).all()
+
+
+def test_another_pulse_at_the_same_time_is_told():
+    """As loud by half and from elsewhere: no place is claimed."""
+    source, other = np.array([12.0, 6.0, -5.0]), np.array([12.0, -4.0, -5.0])
+    late = (np.linalg.norm(source) - np.linalg.norm(other)) / C
+    signals = hear(hear_direct(SMALL, source, samples=700), SMALL, other, late, 0.5)
+    assert locate(signals, SMALL, source).reason[0] == UNRESOLVED
 
 
 def test_the_face_of_the_elements_is_known():

@@ -246,6 +246,8 @@ def measure(
     left = float(np.sum(rest[live]))
     held = float(wave.power @ np.abs(wave.template) ** 2)
     share = left / (held + left) if held + left > 0 else 1.0
+    if share > ranging_kernels.UNLIKE:
+        share = min(share, ranging_kernels.share_beyond_gains(wave.spectrum[live], wave.response[live], wave.template))
     return Pulse(aligned.frequency, wave.template, time, lag, weight, 2 * left / freedom, wave.power, share, None, deaf)
 
 
