@@ -64,7 +64,12 @@ def by_frame(path: Path, names: Sequence[str]) -> Read:
     """As `sonarsynth.loading.Frames` reads: frame by frame, without zarr, decoded as `ss.open` does."""
     reader = FrameReader(path)
     arrays = [reader.array(name) for name in names]
-    return lambda frames: [np.stack([array[f] for f in range(frames.start, frames.stop)]) for array in arrays]
+
+    def some(array: Any, frames: slice) -> np.ndarray:
+        several = [array[f] for f in range(frames.start, frames.stop)]
+        return np.stack(several) if len(several) > 1 else several[0][None]  # a sample is not copied either
+
+    return lambda frames: [some(array, frames) for array in arrays]
 
 
 WAYS: dict[str, Callable[[Path, Sequence[str]], Read]] = {
