@@ -13,7 +13,7 @@ from sonarsynth.frontiers.image_knobs import image_points, range_points
 from sonarsynth.frontiers.peer_rows import image_peers, synthesis_peers
 from sonarsynth.frontiers.picking_knobs import picking_points
 from sonarsynth.frontiers.rows import Point, Verdict, finite, merged
-from sonarsynth.frontiers.signal_knobs import synthesis_points
+from sonarsynth.frontiers.signal_knobs import speckle_points, synthesis_points
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor, trace_points
 from sonarsynth.frontiers.verdicts import set_by_recipe, verdicts
 from sonarsynth.pipeline.synthesis import frame_signals
@@ -124,6 +124,7 @@ def _frame(base: Plan, index: int, hydrophones: int | None, say: Say, *, peers: 
     points += synthesis_points(traced)
     arrivals = arrivals_of(plan, frame)
     signals = frame_signals(plan, frame, arrivals)
+    points += speckle_points(plan, frame, signals)
     full = FullFrame.of(exact, signals)
     say(f"frame {index}: image and range")
     points += image_points(plan, full.beamformed, peers)
@@ -134,6 +135,8 @@ def _frame(base: Plan, index: int, hydrophones: int | None, say: Say, *, peers: 
         points += synthesis_peers(plan, frame, arrivals.seen_from_centre)  # peers know no shade
         points += image_peers(plan, frame, arrivals.seen_from_centre, full.beamformed)
     say(f"frame {index}: everything exact")
-    spent = full.seconds + sum(p.seconds for p in points if p.chosen and p.stage not in ("synthesis", "picking"))
+    spent = full.seconds + sum(
+        p.seconds for p in points if p.chosen and p.stage not in ("synthesis", "reverberation", "picking")
+    )
     points += whole_points(full, traced, spent)
     return points, full.seconds, len(exact.sensor)

@@ -15,6 +15,7 @@ from sonarsynth.pictures.accuracy_figures.frontier_figure import Line, Panel, fr
 TITLES: Final = {
     "trace": "signals: tracing and synthesis, by how paths are traced",
     "synthesis": "synthesis of the traced paths",
+    "reverberation": "reverberation: contrast at a hydrophone, by how many scatterers there are",
     "image": "image: beams within 20 dB of the brightest, root mean square",
     "range": "cloud: largest error of a range by the method",
     "picking": "cloud: median distance of points from the target, by how echoes are picked",

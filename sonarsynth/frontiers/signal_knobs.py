@@ -1,4 +1,7 @@
-"""Knobs of the synthesis: width, tolerance, precision and oversampling of the deposit, and the direct sum."""
+"""Knobs of the synthesis: width, tolerance, precision and oversampling of the deposit, and the direct sum.
+
+That of reverberation: fewer scatterers in place of many, which change its contrast and not its mean.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonarsynth.equations.reverberation.speckle import SINC
 from sonarsynth.frontiers.exact_frame import Pressures, differences, golden, pressures
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
-from sonarsynth.planning import frame_start
+from sonarsynth.pipeline.frame_reverberation import frame_reverberation, with_reverberation
+from sonarsynth.planning import Plan, frame_start
+from sonarsynth.products import Signals
 from sonarsynth.receiver.subarrays import subarray
+from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import DirectSum, GriddedSynthesis, Synthesis
 from sonarsynth.signals.auto_synthesis import PRECISIONS, deposit_for
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.gridded_synthesis import kernel_error
+from sonarsynth.tracing.reverberation.families import STEP
+from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
 
 WIDEST = 14
 OVER_KERNEL = (1.0, 10.0, 100.0)
@@ -26,6 +35,8 @@ FROM, TO = 1e-3, 30.0
 OVERSAMPLINGS = (1.25, 2.0)
 AUTO = tuple(10.0**e for e in (-1.5, -2, -2.5, -3, -3.5, -4, -5, -6, -7))
 """Errors that the planner's own choice is walked over."""
+SPECKLES = (1.0, 0.3, 0.1, 0.03, 0.01)
+"""Errors of the contrast of reverberation that are walked."""
 FINER = 0.01
 """Error of what is compared with, over that of the exact way's synthesis."""
 SUMMED_HYDROPHONES, SUMMED_PATHS = (1, 8), 50
@@ -141,3 +152,47 @@ def direct_sum_point(traced: TracedBySensor) -> Point:
         chosen=isinstance(plan.choices.synthesis, DirectSum),
         note=f"cost from {len(paths)} paths at {few} and {more} hydrophones",
     )
+
+
+def speckle_points(plan: Plan, frame: Frame, signals: Signals) -> Iterator[Point]:
+    """The contrast that a frame's scatterers err by, counted, and how far their energy is from that of the most of
+    them, beside the CPU time of finding and hearing them; nothing where nothing scatters."""
+    if plan.scene.world.reverberation is None:
+        return
+    chosen = plan.recipe.accuracy.speckle
+    band, rows = plan.scene.sonar.band, []
+    for speckle in sorted({*SPECKLES, chosen}, reverse=True):
+        accuracy = replace(plan.recipe.accuracy, speckle=speckle)
+        other = replace(plan, recipe=replace(plan.recipe, accuracy=accuracy))
+        began = time.process_time()
+        try:
+            arrivals = frame_reverberation(other, frame)
+        except ValueError:  # more scatterers than a frame may have
+            break
+        with_reverberation(other, frame, signals, arrivals)
+        if arrivals is None or not len(arrivals.delay):
+            return
+        rows.append((speckle, arrivals, time.process_time() - began))
+    most = float(rows[-1][1].energy.sum())
+    for speckle, arrivals, seconds in rows:
+        level = float(10.0 * np.log10(arrivals.energy.sum() / most))
+        yield Point(
+            stage="reverberation",
+            knob="speckle",
+            setting=f"{speckle:g}",
+            error=contrast_error(arrivals, band.high - band.low),
+            unit="of the contrast",
+            allowed=chosen,
+            seconds=seconds,
+            chosen=speckle == chosen,
+            also={"scatterers": float(len(arrivals.delay)), "level_db": level},
+        )
+
+
+def contrast_error(arrivals: ReverberationArrivals, bandwidth: float) -> float:
+    """By what part <I^2>/<I>^2 of scatterers heard with this bandwidth (Hz) is over that of very many, 2: J/(2 n), n
+    the scatterers within 1/bandwidth that their energies are as good as, in steps of time weighed by their energy."""
+    steps = np.floor(arrivals.delay / STEP).astype(np.int64)
+    _, step = np.unique(steps, return_inverse=True)
+    energy, squares = (np.bincount(step, arrivals.energy**power) for power in (1, 2))
+    return float(0.5 * SINC * bandwidth * STEP * (squares / energy).sum() / energy.sum())

@@ -13,9 +13,11 @@ from sonarsynth.environment.reverberation import Reverberation
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.reverberation.speckle import contrast, lambert_rate, textured
+from sonarsynth.frontiers.signal_knobs import speckle_points
 from sonarsynth.geometry.motion import Still
 from sonarsynth.pipeline import synthesise, trace_at
-from sonarsynth.planning import Plan, frame_start, plan
+from sonarsynth.pipeline.synthesis import frame_signals
+from sonarsynth.planning import Plan, arrivals_of, frame_start, plan
 from sonarsynth.planning.measured.reverberation_levels import frame_scatterers, sent_energy
 from sonarsynth.receiver import Band, BandPass, PlanarLattice, Sonar
 from sonarsynth.recipe import Recipe
@@ -94,6 +96,19 @@ def test_energy_is_that_of_the_sonar_equation_and_not_of_the_number_of_scatterer
         poisson = squares.mean(axis=0)  # variance where nothing evened scatterers out over cells
         assert total.std(ddof=1) < 0.8 * np.sqrt(poisson @ known**2) / known.sum(), speckle
     assert counts[2] > 4.0 * counts[1] > 30.0 * counts[0]
+
+
+def test_the_contrast_counted_in_a_frame_is_what_the_knob_says() -> None:
+    """By the energies of the scatterers that were drawn, not by the formula that says how many there are to be."""
+    made = plan(recipe(), ("signals",))
+    frame = made.recipe.frame(0)[1]
+    signals = frame_signals(made, frame, arrivals_of(made, frame))
+    points = list(speckle_points(made, frame, signals))
+    assert [p.setting for p in points if p.chosen] == ["0.1"]
+    for point in points:
+        few = 0.3 * float(point.setting)  # at 1 a step of time has ten scatterers, of energies that differ by chance
+        assert point.error == pytest.approx(float(point.setting), rel=0.15 + few)
+        assert abs(point.also["level_db"]) < 10.0 * np.log10(1.0 + 4.0 / point.also["scatterers"] ** 0.5)
 
 
 def test_nothing_comes_before_the_first_possible_echo() -> None:
