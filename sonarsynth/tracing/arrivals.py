@@ -42,46 +42,46 @@ def trace(context: FrameContext, propagation: Propagation) -> Arrivals:
     still = all(body.track.still for body in context.bodies) and not any(snap.velocity.any() for snap in snaps)
     if moving is None or (moving.still and still) or not snaps:
         return arrivals(facet_paths(context, propagation, snaps=snaps))
-    parts: list[Arrivals] = []
+    blocks: list[Arrivals] = []
     begun = set[int]()
-    for some in occasions(context, moving):
-        there = replace(receiver, pose=some.meeting.sonar.pose)
-        lights = tuple(snaps[index] for index in some.snaps)
-        met = facet_paths(replace(context, bodies=some.bodies, receiver=there), propagation, some.owners, lights)
-        array = replace(met, meeting=some.meeting)
-        parts += [_direct(_hearing(array, snaps[index], moving), index) for index in set(some.snaps) - begun]
-        parts += _echoes(array, some.snaps)
-        begun |= set(some.snaps)
-    return join(parts, receiver.speed(context.medium), receiver.centre)
+    for group in occasions(context, moving):
+        moved = replace(receiver, pose=group.meeting.sonar.pose)
+        lights = tuple(snaps[index] for index in group.snaps)
+        met = facet_paths(replace(context, bodies=group.bodies, receiver=moved), propagation, group.owners, lights)
+        array = replace(met, meeting=group.meeting)
+        blocks += [_direct(_hearing(array, snaps[index], moving), index) for index in set(group.snaps) - begun]
+        blocks += _echoes(array, group.snaps)
+        begun |= set(group.snaps)
+    return join(blocks, receiver.speed(context.medium), receiver.centre)
 
 
 def _hearing(array: FacetPaths, snap: Emission, sonar: Track) -> FacetPaths:
     """The array where it hears a snap itself."""
     speed = float(array.context.medium.profile.at(depth(sonar.pose.position)))
     arrival_time = float(hearing_times(snap.position, np.asarray(snap.time), sonar, speed))
-    there = sonar.later(arrival_time)
-    context = replace(array.context, receiver=replace(array.context.receiver, pose=there.pose))
-    return replace(array, context=context, meeting=Meeting(np.zeros(0), arrival_time, there))
+    track = sonar.later(arrival_time)
+    context = replace(array.context, receiver=replace(array.context.receiver, pose=track.pose))
+    return replace(array, context=context, meeting=Meeting(np.zeros(0), arrival_time, track))
 
 
 def arrivals(array: FacetPaths) -> Arrivals:
     """As `trace`, of what is at rest, from legs that are traced already; shadows of targets have legs of their own."""
     context, every = array.context, range(len(array.context.snaps))
-    parts = [no_arrivals(array.legs), *(_direct(array, index) for index in every), *_echoes(array, every)]
-    return join(parts, context.receiver.speed(context.medium), context.receiver.centre)
+    blocks = [no_arrivals(array.legs), *(_direct(array, index) for index in every), *_echoes(array, every)]
+    return join(blocks, context.receiver.speed(context.medium), context.receiver.centre)
 
 
 def _echoes(array: FacetPaths, snaps: Iterable[int]) -> list[Arrivals]:
     """Echoes and shadow waves of some snaps."""
-    parts, through, scattering = [], forward_paths(array), array.context.scattering
+    blocks, through, scattering = [], forward_paths(array), array.context.scattering
     for index in snaps:
         if not array.context.snaps[index].illuminates:
             continue
-        parts.append(echoes(array, index, tuple(surface.law.parts for surface in scattering), Kind.ECHO))
+        blocks.append(echoes(array, index, tuple(surface.law.parts for surface in scattering), Kind.ECHO))
         if through is not None:
             shadows = tuple(shadow_parts(surface.law) if surface.mesh is not None else () for surface in scattering)
-            parts.append(echoes(through, index, shadows, Kind.FORWARD))
-    return parts
+            blocks.append(echoes(through, index, shadows, Kind.FORWARD))
+    return blocks
 
 
 def _direct(array: FacetPaths, index: int) -> Arrivals:
@@ -103,11 +103,11 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     variation = fitted(array, gain, legs.spreading)
     legs = replace(legs, spreading=legs.spreading * loud, phase=legs.phase + turned)
     legs = legs if meeting is None else received(legs, met, meeting, medium.profile)
-    made = assemble(
+    direct = assemble(
         legs, over.terms, none_out, index, snap.time, path_loss(array, snap, legs),
         kind=Kind.DIRECT, target=none, facet=none, scattering=one, variation=variation,
         pulses=PulseResponse.plain(count),
     )  # fmt: skip
     if meeting is None:
-        return made
-    return apply_doppler(made, legs, none_out, met, meeting, medium.profile, receiver.elements.aperture)
+        return direct
+    return apply_doppler(direct, legs, none_out, met, meeting, medium.profile, receiver.elements.aperture)

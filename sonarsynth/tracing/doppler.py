@@ -75,25 +75,25 @@ class MotionTerms:
         probes = away if away.ndim == 3 else away[:, None]
         return np.asarray(moved(length, probes, self.apart).reshape(away.shape))
 
-    def turned_back(self, way: Floats) -> Floats:
+    def turned_back(self, direction: Floats) -> Floats:
         """Directions (path, ..., xyz) as the body that has turned sees them, in the axes that it was traced in."""
         if not self.spin.any():
-            return way
-        some = (slice(None), *(None for _ in way.shape[2:]))
-        turn = (self.late[:, None] * self.spin)[some]
-        back = way - np.cross(turn, way)
+            return direction
+        broadcast = (slice(None), *(None for _ in direction.shape[2:]))
+        turn = (self.late[:, None] * self.spin)[broadcast]
+        back = direction - np.cross(turn, direction)
         return np.asarray(back / np.sqrt(dot(back, back))[..., None])
 
 
 def velocities(scattering: tuple[Scatterers, ...], owner: Ints, point: Floats) -> tuple[Floats, Floats]:
     """Velocity (point, xyz) m/s of surface elements (owner of each), world, and the spin of their owner rad/s."""
-    found, spins = np.zeros((2, len(point), 3))
+    motion, spins = np.zeros((2, len(point), 3))
     for number, surface in enumerate(scattering):
-        mine, track = owner == number, surface.track
+        owned, track = owner == number, surface.track
         spin, velocity = track.spin, track.velocity
-        found[mine] = velocity + np.cross(spin, point[mine] - track.pose.position) if spin.any() else velocity
-        spins[mine] = spin
-    return found, spins
+        motion[owned] = velocity + np.cross(spin, point[owned] - track.pose.position) if spin.any() else velocity
+        spins[owned] = spin
+    return motion, spins
 
 
 def path_elongation(length: Floats, along: Floats, moved: Floats) -> Floats:
@@ -118,20 +118,20 @@ def meets(
     late = gone
     for _ in range(ROUNDS):
         late = (gone + path_elongation(out.length, out.arrival, velocity * late[:, None]) / speed) / (1.0 - rate)
-    way = out.length[:, None] * out.arrival + velocity * late[:, None]
-    length = np.sqrt(dot(way, way))
-    there = replace(
-        out, arrival=way / length[:, None], length=length, travel_time=(met - time) + late,
+    ray = out.length[:, None] * out.arrival + velocity * late[:, None]
+    length = np.sqrt(dot(ray, ray))
+    lengthened = replace(
+        out, arrival=ray / length[:, None], length=length, travel_time=(met - time) + late,
         spreading=out.spreading * (out.length / length),
     )  # fmt: skip
-    return there, late
+    return lengthened, late
 
 
 def mirrored(velocity: Floats, bounces: Ints) -> Floats:
     """Velocities (path, xyz) of images after so many reflections (path,) from level surfaces."""
-    seen = velocity.copy()
-    seen[bounces % 2 == 1, 2] *= -1.0
-    return seen
+    image = velocity.copy()
+    image[bounces % 2 == 1, 2] *= -1.0
+    return image
 
 
 def met_paths(
@@ -158,20 +158,21 @@ def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, profile: Pro
         arrival_time = (
             gone + path_elongation(legs.length, legs.arrival, u * arrival_time[:, None] - image) / c_array
         ) / (1.0 - of_array)
-    seen = legs.radius[:, None] * legs.direction + pose.turn_to_body(image - u * arrival_time[:, None])
-    radius = np.sqrt(dot(seen, seen))
-    arrival = -pose.turn_to_world(seen) / radius[:, None]
+    apparent = legs.radius[:, None] * legs.direction + pose.turn_to_body(image - u * arrival_time[:, None])
+    radius = np.sqrt(dot(apparent, apparent))
+    arrival = -pose.turn_to_world(apparent) / radius[:, None]
     if meeting.sonar.spin.any():
-        seen = seen - np.cross(pose.turn_to_body(meeting.sonar.spin), seen) * arrival_time[:, None]
+        apparent = apparent - np.cross(pose.turn_to_body(meeting.sonar.spin), apparent) * arrival_time[:, None]
     return replace(
         legs, point=legs.point + moved, departure=of.departure(legs.length, legs.departure), arrival=arrival,
-        direction=seen / np.sqrt(dot(seen, seen))[:, None], radius=radius, length=legs.length + (radius - legs.radius),
-        spreading=legs.spreading * (legs.radius / radius), travel_time=meeting.arrival_time - begun + arrival_time,
+        direction=apparent / np.sqrt(dot(apparent, apparent))[:, None], radius=radius,
+        length=legs.length + (radius - legs.radius), spreading=legs.spreading * (legs.radius / radius),
+        travel_time=meeting.arrival_time - begun + arrival_time,
     )  # fmt: skip
 
 
 def apply_doppler(
-    made: Arrivals, legs: ReceivePaths, out: TransmitPaths, of: MotionTerms, meeting: Meeting, profile: Profile,
+    arrivals: Arrivals, legs: ReceivePaths, out: TransmitPaths, of: MotionTerms, meeting: Meeting, profile: Profile,
     aperture: float,
 ) -> Arrivals:  # fmt: skip
     """Arrivals with their Doppler, that of the array centre; legs and ways: those of `received` and `meets`.
@@ -185,7 +186,7 @@ def apply_doppler(
     of_array = dot(legs.arrival, array.velocity) / c_array
     doppler = (1.0 - out.approach) * (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
     if not array.velocity.any() or not aperture:
-        return replace(made, doppler=doppler)
-    terms = made.delay_terms.copy() if made.delay_terms.shape[1] else np.zeros((len(doppler), TERMS))
+        return replace(arrivals, doppler=doppler)
+    terms = arrivals.delay_terms.copy() if arrivals.delay_terms.shape[1] else np.zeros((len(doppler), TERMS))
     terms[:, 1:4] -= (of_array / (1.0 - of_array) * aperture / c_array)[:, None] * legs.direction
-    return replace(made, doppler=doppler, delay_terms=terms)
+    return replace(arrivals, doppler=doppler, delay_terms=terms)

@@ -83,35 +83,35 @@ def echo_batches(
     array: FacetPaths,
     out: TransmitPaths,
     leg: Ints,
-    parts: tuple[tuple[Component, ...], ...],
+    components: tuple[tuple[Component, ...], ...],
     carried: MotionTerms | None,
 ) -> list[EchoBatch]:
     """Echoes of pairs of a way and a leg (pair,), by owner and part; those that are nothing are left out; carried: by
     how much pairs differ from those that were traced, where anything moves."""
-    facets, context, receiver, found = array.facets, array.context, array.context.receiver, []
+    facets, context, receiver, batches = array.facets, array.context, array.context.receiver, []
     looked_for = context.tolerances.occlusion == "sensors" and receiver.elements.count > 1
     owner = facets.owner[out.facet]
-    for number, (surface, of_law) in enumerate(zip(context.scattering, parts, strict=True)):
-        mine = picked(owner == number)
-        row, legs, facet = np.arange(len(owner))[mine], leg[mine], facets.facet[out.facet[mine]]
-        arrival, departure = out.arrival[mine], array.legs.departure[legs]
+    for number, (surface, of_law) in enumerate(zip(context.scattering, components, strict=True)):
+        owned = picked(owner == number)
+        row, owned_leg, facet = np.arange(len(owner))[owned], leg[owned], facets.facet[out.facet[owned]]
+        arrival, departure = out.arrival[owned], array.legs.departure[owned_leg]
         if carried is not None:
-            moved = carried.select(mine)
+            moved = carried.select(owned)
             arrival = moved.turned_back(arrival)
-            departure = moved.turned_back(moved.departure(array.legs.length[legs], departure))
+            departure = moved.turned_back(moved.departure(array.legs.length[owned_leg], departure))
         incident, scattered = surface.pose.turn_to_body(arrival), surface.pose.turn_to_body(departure)
-        speed = context.medium.profile.at(depth(array.legs.point[legs]))
+        speed = context.medium.profile.at(depth(array.legs.point[owned_leg]))
         wavenumber = 2.0 * np.pi * receiver.centre / speed
-        for part in (
+        for component in (
             replace(p, beyond=True) if looked_for and isinstance(p, Lobe | CoherentKirchhoff | DiffuseKirchhoff) else p
             for p in of_law
         ):
-            patch = surface.geometry(not isinstance(part, Lobe)).select(facet)
-            amplitude = part.amplitude(incident, scattered, patch, wavenumber)
-            sign = surface.polarity(part)[facet]
-            group = EchoBatch(surface, part, row, patch, incident, scattered, wavenumber, amplitude, sign)
-            found.append(group.select(picked(amplitude != 0.0)))
-    return found
+            patch = surface.geometry(not isinstance(component, Lobe)).select(facet)
+            amplitude = component.amplitude(incident, scattered, patch, wavenumber)
+            sign = surface.polarity(component)[facet]
+            batch = EchoBatch(surface, component, row, patch, incident, scattered, wavenumber, amplitude, sign)
+            batches.append(batch.select(picked(amplitude != 0.0)))
+    return batches
 
 
 def in_band(pulses: PulseResponse, band: tuple[float, float]) -> Floats:

@@ -58,7 +58,7 @@ class _EchoBlock:
         groups = [g.select(np.flatnonzero(keep)) for g, keep in zip(self.groups, np.split(loud, ends), strict=True)]
         (row,) = _columns(groups, "row")
         number = np.split(np.arange(len(row)), np.cumsum([len(g.row) for g in groups])[:-1])
-        groups = [replace(g, row=mine) for g, mine in zip(groups, number, strict=True)]
+        groups = [replace(g, row=rows) for g, rows in zip(groups, number, strict=True)]
         out, leg, factor = self.out.select(row), self.leg[row], self.factor[row]
         terms, pulses = self.terms.select(loud), self.pulses.select(loud)
         carried = None if self.carried is None else self.carried.select(row)
@@ -94,52 +94,53 @@ class _EchoBlock:
     def seen(self) -> EchoLevels:
         """What decides which of them are kept."""
         row, amplitude = _columns(self.groups, "row", "amplitude")
-        most = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
+        strongest = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
         owner = self.array.facets.owner[self.out.facet[row]]
         number = np.repeat(np.arange(len(self.groups)), [len(g.row) for g in self.groups])
         return EchoLevels(
-            most * in_band(self.pulses, self.array.context.receiver.band), self.pulses.coherent, owner, number
+            strongest * in_band(self.pulses, self.array.context.receiver.band), self.pulses.coherent, owner, number
         )
 
 
-def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ...], kind: Kind) -> Arrivals:
-    """Emission `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each owner.
+def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...], ...], kind: Kind) -> Arrivals:
+    """Emission `index` to facet to array, over every facet of the legs that is lit; components: of the law of each
+    owner.
 
     Facets are taken in blocks, so that little is held at a time; the echoes are those of one block, in its order.
     """
-    if not any(parts):
+    if not any(components):
         return no_arrivals(array.legs)
     snap, receiver, profile = array.context.snaps[index], array.context.receiver, array.context.medium.profile
-    found = _loudest(array, snap, parts)
-    terms, error = variations(found)
-    most = max(float(np.abs(some.strength).max(initial=0.0)) for some in found)
-    group, made = [some.seen().group for some in found], []
-    found.reverse()
+    blocks = _loudest(array, snap, components)
+    terms, error = variations(blocks)
+    strongest = max(float(np.abs(block.strength).max(initial=0.0)) for block in blocks)
+    group, arrivals = [block.seen().group for block in blocks], []
+    blocks.reverse()
     for variation in terms:
-        some = found.pop()
-        over = _turned(some, most)
-        spot = np.concatenate([g.spot for g in some.groups])
-        if spot.any() and not some.array.bending.profile.uniform:
-            over = delay_to_scattering_points(over, some.array, some.leg, spot)
-        array, out, legs, meeting = some.array, some.out, some.array.settled(some.leg), some.array.meeting
-        if meeting is not None and some.carried is not None:
-            legs = received(legs, some.carried, meeting, profile)
-        what, target, facet = array.met(out.facet, kind)
-        amplitude, sign = _columns(some.groups, "amplitude", "sign")
+        block = blocks.pop()
+        over = _turned(block, strongest)
+        spot = np.concatenate([g.spot for g in block.groups])
+        if spot.any() and not block.array.bending.profile.uniform:
+            over = delay_to_scattering_points(over, block.array, block.leg, spot)
+        array, out, legs, meeting = block.array, block.out, block.array.settled(block.leg), block.array.meeting
+        if meeting is not None and block.carried is not None:
+            legs = received(legs, block.carried, meeting, profile)
+        kinds, target, facet = array.met(out.facet, kind)
+        amplitude, sign = _columns(block.groups, "amplitude", "sign")
         scattered, vary, loss = sign * amplitude, (variation, error), path_loss(array, snap, legs, out)
-        one = assemble(
+        echo = assemble(
             legs, over, out, index, snap.time, loss,
-            kind=what, target=target, facet=facet, scattering=scattered, variation=vary, pulses=some.pulses,
+            kind=kinds, target=target, facet=facet, scattering=scattered, variation=vary, pulses=block.pulses,
         )  # fmt: skip
-        if meeting is not None and some.carried is not None:
-            one = apply_doppler(one, legs, out, some.carried, meeting, profile, receiver.elements.aperture)
+        if meeting is not None and block.carried is not None:
+            echo = apply_doppler(echo, legs, out, block.carried, meeting, profile, receiver.elements.aperture)
         if spot.any() and array.bending.profile.uniform:
-            one = shift_to_scattering_points(one, legs, spot, receiver.pose)
-        made.append(replace(one, delay=one.delay + some.pulses.late))
-    return ordered(made, group)
+            echo = shift_to_scattering_points(echo, legs, spot, receiver.pose)
+        arrivals.append(replace(echo, delay=echo.delay + block.pulses.late))
+    return ordered(arrivals, group)
 
 
-def _loudest(array: FacetPaths, snap: Emission, parts: tuple[tuple[Component, ...], ...]) -> list[_EchoBlock]:
+def _loudest(array: FacetPaths, snap: Emission, components: tuple[tuple[Component, ...], ...]) -> list[_EchoBlock]:
     """Echoes from each block of facets that are not too faint.
 
     What is much fainter than will do, by the blocks so far, is not held; should it be wanted after all, its block is
@@ -147,33 +148,33 @@ def _loudest(array: FacetPaths, snap: Emission, parts: tuple[tuple[Component, ..
     """
     blocks = in_blocks(len(array.facets.facet))
     if len(blocks) == 1:
-        found = _found(array, snap, parts)
-        return [found.select(loud_ones(found.seen(), array.context.tolerances.negligible))]
-    held: list[_EchoBlock] = []
-    seen: list[EchoLevels] = []
-    kept: list[Bools] = []
-    for some in blocks:
-        found = _found(array.part(some), snap, parts)
-        seen.append(found.seen())
-        kept.append(loud_of_all(seen, PRUNE_MARGIN * array.context.tolerances.negligible)[-1])
-        held.append(found.select(kept[-1]))
-    for n, wanted in enumerate(loud_of_all(seen, array.context.tolerances.negligible)):
-        if (wanted & ~kept[n]).any():
-            held[n] = _found(array.part(blocks[n]), snap, parts).select(wanted)
+        block = _found(array, snap, components)
+        return [block.select(loud_ones(block.seen(), array.context.tolerances.negligible))]
+    loud: list[_EchoBlock] = []
+    levels: list[EchoLevels] = []
+    masks: list[Bools] = []
+    for rows in blocks:
+        block = _found(array.part(rows), snap, components)
+        levels.append(block.seen())
+        masks.append(loud_of_all(levels, PRUNE_MARGIN * array.context.tolerances.negligible)[-1])
+        loud.append(block.select(masks[-1]))
+    for n, wanted in enumerate(loud_of_all(levels, array.context.tolerances.negligible)):
+        if (wanted & ~masks[n]).any():
+            loud[n] = _found(array.part(blocks[n]), snap, components).select(wanted)
         else:
-            held[n] = held[n].select(wanted[kept[n]])
-    return held
+            loud[n] = loud[n].select(wanted[masks[n]])
+    return loud
 
 
-def _found(array: FacetPaths, snap: Emission, parts: tuple[tuple[Component, ...], ...]) -> _EchoBlock:
+def _found(array: FacetPaths, snap: Emission, components: tuple[tuple[Component, ...], ...]) -> _EchoBlock:
     """All echoes of a snap from the facets of the legs."""
     out, fronts = _ways(array, snap), array.fronts
     way, leg = path_pairs(out.facet, array.legs.row, len(array.facets.facet))
-    kept = picked(out.bounces[way] + array.legs.bounces[leg] <= array.propagation.bounces)
-    out, leg, carried = out.select(way[kept]), leg[kept], None
+    within = picked(out.bounces[way] + array.legs.bounces[leg] <= array.propagation.bounces)
+    out, leg, carried = out.select(way[within]), leg[within], None
     if array.meeting is not None:
         out, carried = _carried(array, snap, out, leg)
-    groups = echo_batches(array, out, leg, parts, carried)
+    groups = echo_batches(array, out, leg, components, carried)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
     away = [_departure(array, leg[g.row], carried and carried.select(g.row), QUADRATIC_PROBES) for g in groups]
     few = np.concatenate([g.over(of) for g, of in zip(groups, away, strict=True)])
@@ -190,8 +191,8 @@ def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -
     owner, point = facets.owner[out.facet], facets.point[out.facet]
     velocity, spin = velocities(array.context.scattering, owner, point)
     met = meeting.met[owner]
-    there, late = meets(out, met, velocity, snap.time, array.context.medium.profile.at(depth(point)))
-    return there, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
+    met_out, late = meets(out, met, velocity, snap.time, array.context.medium.profile.at(depth(point)))
+    return met_out, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
 
 
 def _departure(array: FacetPaths, leg: Ints, carried: MotionTerms | None, few: int | None) -> Floats:
@@ -222,10 +223,10 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     out = out.select(picked(lit & (out.spreading != 0.0)))
     out = out.select(picked(~_hides(array, bodies, snap, out, facets.clear[out.facet])))
     for number, before in overlapping(bodies):
-        mine = np.flatnonzero(facets.owner[out.facet] == number)
-        of = out.facet[mine]
-        again = _hides(array, before, snap, out.select(mine), 2.0 * facets.point[of] - facets.clear[of])  # from under
-        out = out.select(np.delete(np.arange(len(out.facet)), mine[again]))
+        owned = np.flatnonzero(facets.owner[out.facet] == number)
+        of = out.facet[owned]
+        again = _hides(array, before, snap, out.select(owned), 2.0 * facets.point[of] - facets.clear[of])  # from under
+        out = out.select(np.delete(np.arange(len(out.facet)), owned[again]))
     return out.merged()
 
 
@@ -238,24 +239,23 @@ def _hides(
     return stand_in(bodies, array.bending, start, end, -out.arrival, out.length)
 
 
-def _turned(found: _EchoBlock, most: float) -> ExpansionTerms:
-    """Wavefronts (path,) of echoes, with the phases of reflections from facets to each probe; most: the strongest of
-    all.
+def _turned(block: _EchoBlock, strongest: float) -> ExpansionTerms:
+    """Wavefronts (path,) of echoes, with the phases of reflections from facets to each probe; strongest: of all.
 
     They vary over the aperture where part of the sound enters the body; what polynomials miss counts as far as the echo
     is as strong as the strongest. Where the coefficient passes near 0 its phase leaps: there all sensors have that of
     the centre.
     """
-    over, array = found.terms, found.array
-    if not any(g.turns for g in found.groups):
+    over, array = block.terms, block.array
+    if not any(g.turns for g in block.groups):
         return over
-    shift = np.concatenate([g.turned(found.departure(g.row)) for g in found.groups])
+    shift = np.concatenate([g.turned(block.departure(g.row)) for g in block.groups])
     leaps = np.abs(shift).max(axis=1, initial=0.0) > MAX_PHASE_CHANGE
     if not shift.any():
         return over
     probe = probes(array.context.receiver.elements)
     terms = probe.fit(np.where(leaps[:, None], 0.0, shift))
-    share = np.abs(found.strength) / max(most, 1e-300)
+    share = np.abs(block.strength) / max(strongest, 1e-300)
     error = over.error + share * np.where(leaps, 0.0, probe.misfit(shift, terms)) / (
         2.0 * np.pi * array.context.receiver.band[1]
     )

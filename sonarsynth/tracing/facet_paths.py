@@ -57,13 +57,13 @@ class FacetPaths:
     def _made(self) -> ArrayExpansion:
         return self.wavefronts.of(slice(self.first, self.first + len(self.legs.row)))
 
-    def part(self, some: slice) -> FacetPaths:
+    def part(self, rows: slice) -> FacetPaths:
         """Some of the facets, and the legs from them."""
-        if some == slice(0, len(self.facets.facet)):
+        if rows == slice(0, len(self.facets.facet)):
             return self
-        first, last = (int(n) for n in np.searchsorted(self.legs.row, (some.start, some.stop)))
+        first, last = (int(n) for n in np.searchsorted(self.legs.row, (rows.start, rows.stop)))
         legs = self.legs.select(slice(first, last))
-        legs, facets = legs.numbered(legs.row - some.start), self.facets.select(some)
+        legs, facets = legs.numbered(legs.row - rows.start), self.facets.select(rows)
         return replace(self, legs=legs, facets=facets, first=self.first + first)
 
     def view(self, bodies: tuple[PlacedTarget, ...]) -> Occlusion:
@@ -87,10 +87,10 @@ class FacetPaths:
         legs = self.legs.select(leg)
         if not len(number):
             return legs
-        some = self.legs.select(number)
-        some = self.view(self.context.bodies).settled(some, *self.facets.side(some.row, some.departure))
+        pending = self.legs.select(number)
+        pending = self.view(self.context.bodies).settled(pending, *self.facets.side(pending.row, pending.departure))
         occluded = legs.occluded.copy()
-        occluded[legs.open] = some.occluded[row]
+        occluded[legs.open] = pending.occluded[row]
         return legs.seen(occluded, np.zeros(len(leg), bool))
 
 
@@ -110,10 +110,10 @@ def facet_paths(
     bent = bending(medium, propagation, receiver)
     slack = receiver.elements.aperture if tolerances.occlusion == "sensors" else 0.0
     view = Occlusion(bodies, bent, receiver, propagation, tolerances)
-    found: tuple[list[ReceivePaths], list[Facets]] = [], []
-    seen = 0
-    for some in in_blocks(sum(map(len, context.scattering))):
-        every = facets_of(context.scattering, some)
+    columns: tuple[list[ReceivePaths], list[Facets]] = [], []
+    count = 0
+    for block in in_blocks(sum(map(len, context.scattering))):
+        every = facets_of(context.scattering, block)
         if tolerances.every > 1:
             every = every.select(np.flatnonzero(every.facet % tolerances.every == 0))
         if owners is not None and len(owners) < len(context.scattering):
@@ -123,13 +123,13 @@ def facet_paths(
             if snaps is not None and not propagation.bounces and medium.profile.uniform:
                 facing &= may_be_lit(every, snaps)
             every = every.select(picked(facing))
-        part = receive_paths(every, medium, receiver, propagation, slack)
-        part = view.visible(part, *every.side(part.row, part.departure))
-        kept, row = np.unique(part.row, return_inverse=True)
-        found[0].append(part.numbered(seen + row))
-        found[1].append(every.select(kept))
-        seen += len(kept)
-    legs, facets = concatenate(found[0]), concatenate(found[1])
+        leaving = receive_paths(every, medium, receiver, propagation, slack)
+        leaving = view.visible(leaving, *every.side(leaving.row, leaving.departure))
+        reached, row = np.unique(leaving.row, return_inverse=True)
+        columns[0].append(leaving.numbered(count + row))
+        columns[1].append(every.select(reached))
+        count += len(reached)
+    legs, facets = concatenate(columns[0]), concatenate(columns[1])
     over = expansion_source(legs, facets.owner[legs.row], bent, receiver, propagation)
     return FacetPaths(legs, over, facets, context, propagation, owners=owners)
 

@@ -41,14 +41,14 @@ class _MeetingTimes:
 
     def classes(self, snap: int) -> list[tuple[int, ...]]:
         """Owners, ascending, whose echoes of a snap the array hears at about one place."""
-        left, found = np.argsort(self.arrival_time[snap], kind="stable").tolist(), []
-        while left:
-            first = float(self.arrival_time[snap, left[0]])
-            there = self.sonar.later(first)
-            near = [n for n in left if self._array_near(there, float(self.arrival_time[snap, n]) - first)]
-            found.append(tuple(sorted(near)))
-            left = [n for n in left if n not in near]
-        return found or [()]
+        waiting, groups = np.argsort(self.arrival_time[snap], kind="stable").tolist(), []
+        while waiting:
+            first = float(self.arrival_time[snap, waiting[0]])
+            track = self.sonar.later(first)
+            near = [n for n in waiting if self._array_near(track, float(self.arrival_time[snap, n]) - first)]
+            groups.append(tuple(sorted(near)))
+            waiting = [n for n in waiting if n not in near]
+        return groups or [()]
 
     def serves(self, occasion: TracingGroup, snap: int) -> bool:
         """Whether what is traced on an occasion serves another snap as well."""
@@ -67,11 +67,11 @@ class _MeetingTimes:
         """Whether what is `size` m large moves by little in some seconds, and that as its velocity and spin say."""
         if track.still or seconds == 0.0:
             return True
-        way = track.velocity * seconds
-        if np.linalg.norm(way) > self.shared * reach:
+        shift = track.velocity * seconds
+        if np.linalg.norm(shift) > self.shared * reach:
             return False
         then, turn = track.later(seconds).pose, track.pose.rotation.T
-        off = np.linalg.norm(then.position - track.pose.position - way)
+        off = np.linalg.norm(then.position - track.pose.position - shift)
         turned = turn + np.cross(track.spin * seconds, turn)  # rows: the axes
         return bool((off + size * np.linalg.norm(then.rotation.T - turned)) * self.wavenumber <= self.shared)
 
@@ -88,23 +88,23 @@ def occasions(context: FrameContext, sonar: Track) -> list[TracingGroup]:
     times = _MeetingTimes(
         bodies, sonar, met, arrival_time, context.tolerances.shared, wavenumber, receiver.elements.aperture
     )
-    found: list[TracingGroup] = []
+    groups: list[TracingGroup] = []
     for snap in range(len(snaps)):
         for owners in times.classes(snap):
-            for number, other in enumerate(found):
-                if other.owners == owners and times.serves(other, snap):
-                    found[number] = replace(other, snaps=(*other.snaps, snap))
+            for number, group in enumerate(groups):
+                if group.owners == owners and times.serves(group, snap):
+                    groups[number] = replace(group, snaps=(*group.snaps, snap))
                     break
             else:
-                there = tuple(body.later(late) for body, late in zip(bodies, met[snap].tolist(), strict=False))
+                placed = tuple(body.later(late) for body, late in zip(bodies, met[snap].tolist(), strict=False))
                 late = float(arrival_time[snap, list(owners)].mean()) if owners else 0.0
-                found.append(TracingGroup((snap,), owners, there, Meeting(met[snap], late, sonar.later(late))))
-    return found
+                groups.append(TracingGroup((snap,), owners, placed, Meeting(met[snap], late, sonar.later(late))))
+    return groups
 
 
-def hearing_times(place: Floats, sent: Floats, sonar: Track, speed: float) -> Floats:
+def hearing_times(position: Floats, sent: Floats, sonar: Track, speed: float) -> Floats:
     """When an array on a track hears what was sent from places (..., xyz) m at times (...) s, by straight lines."""
     arrival_time = sent
     for _ in range(1 if sonar.still else 6):
-        arrival_time = sent + np.linalg.norm(sonar.positions(arrival_time) - place, axis=-1) / speed
+        arrival_time = sent + np.linalg.norm(sonar.positions(arrival_time) - position, axis=-1) / speed
     return np.asarray(arrival_time)

@@ -19,25 +19,25 @@ class EchoLevels(NamedTuple):
     group: Ints  # (echo,)
 
 
-def loud_of_all(seen: list[EchoLevels], negligible: float) -> list[Bools]:
+def loud_of_all(levels: list[EchoLevels], negligible: float) -> list[Bools]:
     """Which echoes of each block are kept, by all of them in the order of one block."""
-    columns = [np.concatenate(column) for column in zip(*seen, strict=True)]
+    columns = [np.concatenate(column) for column in zip(*levels, strict=True)]
     order = np.argsort(columns[-1], kind="stable")
     keep = np.empty(len(order), bool)
     in_order: Any = [column[order] for column in columns]
     keep[order] = loud_ones(EchoLevels(*in_order), negligible)
-    return np.split(keep, np.cumsum([len(some.strength) for some in seen])[:-1])
+    return np.split(keep, np.cumsum([len(block.strength) for block in levels])[:-1])
 
 
-def loud_ones(seen: EchoLevels, negligible: float) -> Bools:
+def loud_ones(levels: EchoLevels, negligible: float) -> Bools:
     """Which (path,) are kept: all but the faintest of each target, by `arrivals.NEGLIGIBLE`."""
-    strength, coherent, owner, _ = seen
+    strength, coherent, owner, _ = levels
     keep = np.ones(len(strength), bool)
     for number, exponent in product(np.unique(owner), (1, 2)):
-        some = np.flatnonzero((owner == number) & (coherent == (exponent == 1)))
-        loudest = strength[some].max(initial=0.0)
-        size = (strength[some] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared
+        rows = np.flatnonzero((owner == number) & (coherent == (exponent == 1)))
+        loudest = strength[rows].max(initial=0.0)
+        size = (strength[rows] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared
         order = np.argsort(size, kind="stable")
         least = negligible * size.sum() if exponent == 2 else np.sqrt(negligible)
-        keep[some[order[np.cumsum(size[order]) <= least]]] = False
+        keep[rows[order[np.cumsum(size[order]) <= least]]] = False
     return keep

@@ -157,15 +157,15 @@ def _send_on(
     going, time = paths.departure[first], paths.travel_time[first]
     strength = np.zeros(len(row))
     for number, (body, law) in enumerate(zip(bodies, laws, strict=True)):
-        mine = np.flatnonzero(landed.target[row] == number)
-        on = row[mine]
+        owned = np.flatnonzero(landed.target[row] == number)
+        on = row[owned]
         patch = patches(body.mesh).select(landed.facet[on])
         c = medium.profile.at(depth(rays.position[on]))
         incident, mirrored, away = (
-            body.pose.turn_to_body(v) for v in (landed.incident[on], rays.direction[on], going[mine])
+            body.pose.turn_to_body(v) for v in (landed.incident[on], rays.direction[on], going[owned])
         )
         lobe, mirror = (size_at(law.parts, incident, v, patch, centre, c) for v in (away, mirrored))
-        strength[mine] = np.divide(lobe, mirror, out=np.zeros_like(lobe), where=mirror > 0)
+        strength[owned] = np.divide(lobe, mirror, out=np.zeros_like(lobe), where=mirror > 0)
     strength[hidden(bodies, medium, rays.clear[row], end[row], going, paths.length[first])] = 0.0
     coefficient[rays.ray] = 0.0
     coefficient[rays.ray[row]] = strength

@@ -117,13 +117,13 @@ class Facets:
 T = TypeVar("T", ReceivePaths, Facets)
 
 
-def concatenate(parts: list[T]) -> T:
-    """All rows of some parts, in order; the list is emptied, so that no more than a column is there twice."""
-    if len(parts) == 1:
-        return parts.pop()
-    kind, columns = type(parts[0]), [dict(vars(part)) for part in parts]
-    parts.clear()
-    return kind(**{name: np.concatenate([part.pop(name) for part in columns]) for name in list(columns[0])})
+def concatenate(blocks: list[T]) -> T:
+    """All rows of some blocks, in order; the list is emptied, so that no more than a column is there twice."""
+    if len(blocks) == 1:
+        return blocks.pop()
+    kind, columns = type(blocks[0]), [dict(vars(block)) for block in blocks]
+    blocks.clear()
+    return kind(**{name: np.concatenate([block.pop(name) for block in columns]) for name in list(columns[0])})
 
 
 def usable(paths: Paths) -> Bools:
@@ -164,32 +164,32 @@ def require_in_water(bodies: tuple[PlacedTarget, ...], bottom: float) -> None:
     """Raises ValueError for a body that reaches out of water of that depth (m)."""
     for body in bodies:
         highest, deepest = bottom, 0.0
-        for some in in_blocks(len(body.mesh.vertices)):
-            down = depth(body.pose.to_world(body.mesh.vertices[some]))
+        for rows in in_blocks(len(body.mesh.vertices)):
+            down = depth(body.pose.to_world(body.mesh.vertices[rows]))
             highest, deepest = float(down.min(initial=highest)), float(down.max(initial=deepest))
         if highest < -TOLERANCE or deepest > bottom + TOLERANCE:
             where = "above the surface" if highest < -TOLERANCE else "below the bottom"
             raise ValueError(f"target '{body.name}' reaches {where} ({highest:g} to {deepest:g} m in {bottom:g} m)")
 
 
-def facets_of(scattering: tuple[Scatterers, ...], some: slice) -> Facets:
+def facets_of(scattering: tuple[Scatterers, ...], block: slice) -> Facets:
     """Some of the surface elements of all, one owner after the other."""
     last = np.cumsum([0, *map(len, scattering)])
-    of = [slice(*np.clip([some.start - n, some.stop - n], 0, m - n)) for n, m in pairwise(last.tolist())]
-    owner = np.repeat(np.arange(len(scattering)), [part.stop - part.start for part in of])
-    none, mine = np.empty((0, 3)), list(zip(scattering, of, strict=True))
-    point = np.concatenate([none, *(s.pose.to_world(s.position[part]) for s, part in mine)])
-    normal = np.concatenate([none, *(s.pose.turn_to_world(s.normal[part]) for s, part in mine)])
+    of = [slice(*np.clip([block.start - n, block.stop - n], 0, m - n)) for n, m in pairwise(last.tolist())]
+    owner = np.repeat(np.arange(len(scattering)), [rows.stop - rows.start for rows in of])
+    none, owned = np.empty((0, 3)), list(zip(scattering, of, strict=True))
+    point = np.concatenate([none, *(s.pose.to_world(s.position[rows]) for s, rows in owned)])
+    normal = np.concatenate([none, *(s.pose.turn_to_world(s.normal[rows]) for s, rows in owned)])
     x, y, z = np.abs(point.T)
     rounding = 8.0 * np.finfo(float).eps * np.maximum(np.maximum(x, y), z)  # of places in the world
     offset = np.maximum(OFFSET * np.array([s.offset for s in scattering])[owner], rounding)
     return Facets(
         owner=owner,
-        facet=np.concatenate([np.empty(0, np.int64), *(np.arange(part.start, part.stop) for part in of)]),
+        facet=np.concatenate([np.empty(0, np.int64), *(np.arange(rows.start, rows.stop) for rows in of)]),
         point=point,
         clear=point + offset[:, None] * normal,
         normal=normal,
-        area=np.concatenate([np.empty(0), *(s.area[part] for s, part in mine)]),
+        area=np.concatenate([np.empty(0), *(s.area[rows] for s, rows in owned)]),
     )
 
 

@@ -72,8 +72,8 @@ class TransmitPaths:
         value = np.zeros(number[-1] + 1, complex)
         np.add.at(value, number, self.spreading * self.boundary * np.exp(1j * self.phase))
         order = np.lexsort((self.bounces, number))
-        kept = self.select(order[np.flatnonzero(np.diff(number[order], prepend=-1))])  # by the fewest bounces
-        return replace(kept, boundary=np.abs(value) / kept.spreading, phase=np.angle(value + 0.0))
+        merged = self.select(order[np.flatnonzero(np.diff(number[order], prepend=-1))])  # by the fewest bounces
+        return replace(merged, boundary=np.abs(value) / merged.spreading, phase=np.angle(value + 0.0))
 
     @property
     def bounces(self) -> Ints:
@@ -163,38 +163,40 @@ def no_arrivals(legs: ReceivePaths) -> Arrivals:
     )
 
 
-def join(parts: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:
-    """Arrivals of all parts, sorted by snap, kind and target, at the centre of a band (Hz); terms that some of them
+def join(blocks: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:
+    """Arrivals of all blocks, sorted by snap, kind and target, at the centre of a band (Hz); terms that some of them
     lack are 0.
 
     What absorption leaves nothing of is out. The list is emptied.
     """
-    parts.sort(key=lambda part: [*part.snap[:1], *part.kind[:1]])
-    order = np.lexsort([np.concatenate([getattr(part, name) for part in parts]) for name in ("target", "kind", "snap")])
-    audible = order[np.concatenate([part.amplitude for part in parts])[order] != 0.0]
+    blocks.sort(key=lambda block: [*block.snap[:1], *block.kind[:1]])
+    order = np.lexsort(
+        [np.concatenate([getattr(block, name) for block in blocks]) for name in ("target", "kind", "snap")]
+    )
+    audible = order[np.concatenate([block.amplitude for block in blocks])[order] != 0.0]
     every = len(audible) == len(order) and bool((np.diff(audible) == 1).all())
-    return replace(_stacked(parts, None if every else audible), sound_speed=sound_speed, centre=centre)
+    return replace(_stacked(blocks, None if every else audible), sound_speed=sound_speed, centre=centre)
 
 
-def ordered(parts: list[Arrivals], group: list[Ints]) -> Arrivals:
-    """Arrivals of all parts, sorted by group (path,) of each; the list is emptied."""
-    if len(parts) == 1:
-        return parts.pop()
-    return _stacked(parts, np.argsort(np.concatenate(group), kind="stable"))
+def ordered(blocks: list[Arrivals], group: list[Ints]) -> Arrivals:
+    """Arrivals of all blocks, sorted by group (path,) of each; the list is emptied."""
+    if len(blocks) == 1:
+        return blocks.pop()
+    return _stacked(blocks, np.argsort(np.concatenate(group), kind="stable"))
 
 
-def _stacked(parts: list[Arrivals], rows: Bools | Ints | None) -> Arrivals:
-    """These rows of all parts, one after the other; the list is emptied, so that only one column is there twice."""
-    left = [dict(vars(part)) for part in parts]
-    errors = {name: max(part[name] for part in left) for name in ("wavefront_error", "amplitude_error")}
-    plain = {name: left[0][name] for name in ("centre", "sound_speed")}
-    parts.clear()
+def _stacked(blocks: list[Arrivals], rows: Bools | Ints | None) -> Arrivals:
+    """These rows of all blocks, one after the other; the list is emptied, so that only one column is there twice."""
+    tables = [dict(vars(block)) for block in blocks]
+    errors = {name: max(block[name] for block in tables) for name in ("wavefront_error", "amplitude_error")}
+    plain = {name: tables[0][name] for name in ("centre", "sound_speed")}
+    blocks.clear()
     columns: dict[str, Any] = {}
-    for name in [name for name, value in left[0].items() if isinstance(value, np.ndarray)]:
-        arrays = [part.pop(name) for part in left]
+    for name in [name for name, value in tables[0].items() if isinstance(value, np.ndarray)]:
+        arrays = [block.pop(name) for block in tables]
         if arrays[0].ndim == 2:  # columns that some lack are 0
             width = max(a.shape[1] for a in arrays)
             arrays = [a if a.shape[1] == width else np.zeros((len(a), width), a.dtype) for a in arrays]
-        whole = np.concatenate(arrays)
-        columns[name] = whole if rows is None else whole[rows]
+        column = np.concatenate(arrays)
+        columns[name] = column if rows is None else column[rows]
     return Arrivals(**columns, **plain, **errors)

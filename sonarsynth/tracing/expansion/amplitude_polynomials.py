@@ -92,10 +92,10 @@ def _fit(array: FacetPaths, gain: Floats, strength: Floats, few: int | None) -> 
     if (gain == 1.0).all():
         return np.empty((len(gain), 0)), 0.0, loudest
     probe = probes(array.context.receiver.elements)
-    left = gain - 1.0
+    residual = gain - 1.0
     if few is None or len(probe.sensor) < QUADRATIC_PROBES:
-        terms = probe.fit(left)
-        error = probe.misfit(left, terms)
+        terms = probe.fit(residual)
+        error = probe.misfit(residual, terms)
     else:
-        terms, error = probe.fit_few(left)
+        terms, error = probe.fit_few(residual)
     return terms, float((np.abs(strength) * error).max(initial=0.0)), loudest

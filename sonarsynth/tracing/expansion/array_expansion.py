@@ -71,29 +71,31 @@ class ExpansionSource:
     ]  # legs of each; None: made from images
     plain: bool  # uniform water, no reflections: all are spheres
 
-    def of(self, some: slice) -> ArrayExpansion:
+    def of(self, block: slice) -> ArrayExpansion:
         """The wavefronts of some legs."""
-        legs = self.legs.select(some)
+        legs = self.legs.select(block)
         count = len(legs.row)
         if self.plain:
             return ArrayExpansion(ExpansionTerms.none(count), legs, self.place, None, None)
-        made = ApertureSamples.room(count, *self.place.probe.basis.shape)
-        for members, kept in self.families:
-            first, last = np.searchsorted(members, (some.start, some.stop))
-            rows = members[first:last] - some.start
-            if kept is None:
-                made.put(rows, traced(legs.select(rows), self.place))
-            elif isinstance(kept, _FacetInterpolant):
-                made.put(rows, kept.at(legs.point[rows]))
+        samples = ApertureSamples.room(count, *self.place.probe.basis.shape)
+        for members, model in self.families:
+            first, last = np.searchsorted(members, (block.start, block.stop))
+            rows = members[first:last] - block.start
+            if model is None:
+                samples.put(rows, traced(legs.select(rows), self.place))
+            elif isinstance(model, _FacetInterpolant):
+                samples.put(rows, model.at(legs.point[rows]))
             else:
-                made.put(rows, ApertureSamples(**{name: value[first:last] for name, value in vars(kept).items()}))
+                samples.put(rows, ApertureSamples(**{name: value[first:last] for name, value in vars(model).items()}))
         none = np.empty((count, 0))
         terms = (
-            none if self.place.propagation.straight(self.place.medium.profile) and not made.terms.any() else made.terms
+            none
+            if self.place.propagation.straight(self.place.medium.profile) and not samples.terms.any()
+            else samples.terms
         )
-        phase, delay_std = (value if value.any() else none for value in (made.phase, made.delay_std))
+        phase, delay_std = (value if value.any() else none for value in (samples.phase, samples.delay_std))
         return ArrayExpansion(
-            ExpansionTerms(terms, phase, delay_std, made.error), legs, self.place, made.departure, made.gain
+            ExpansionTerms(terms, phase, delay_std, samples.error), legs, self.place, samples.departure, samples.gain
         )
 
 
@@ -112,30 +114,30 @@ def expansion_source(
     Reflections turn and blur the pulse by the grazing angle, which varies over the aperture. What the polynomials in
     that miss is in `error`, as delays that are as much at the upper edge of the band.
     """
-    place = ReceiverGeometry(medium, receiver, probes(receiver.elements), propagation)
+    geometry = ReceiverGeometry(medium, receiver, probes(receiver.elements), propagation)
     straight = propagation.straight(medium.profile)
     if straight and not legs.bounces.any():
-        return ExpansionSource(legs, place, (), True)
+        return ExpansionSource(legs, geometry, (), True)
     families: list[tuple[Ints, ApertureSamples | _FacetInterpolant | None]] = []
     for members in _families(legs, group):
         if straight and not legs.bounces[members[0]]:
             families.append((members, None))
             continue
         chosen = members[_spread(legs.point[members])]
-        exact = traced(legs.select(chosen), place)
-        kept: ApertureSamples | _FacetInterpolant | None = exact
+        exact = traced(legs.select(chosen), geometry)
+        model: ApertureSamples | _FacetInterpolant | None = exact
         if len(chosen) < len(members):
-            kept = _over_body(legs.point[members], legs.point[chosen], exact, 2.0 * np.pi * receiver.band[1])
-        families.append((members, kept or traced(legs.select(members), place)))
-    return ExpansionSource(legs, place, tuple(families), False)
+            model = _over_body(legs.point[members], legs.point[chosen], exact, 2.0 * np.pi * receiver.band[1])
+        families.append((members, model or traced(legs.select(members), geometry)))
+    return ExpansionSource(legs, geometry, tuple(families), False)
 
 
 def _families(legs: ReceivePaths, group: Ints) -> list[Ints]:
     """Indices of the legs of each body and family."""
     up = legs.departure[:, 2] > 0
     key = group.astype(np.int64)
-    for part in (legs.surface, legs.bottom, legs.turning, up * (legs.bounces + legs.turning > 0)):
-        key = key * (int(part.max(initial=0)) + 1) + part
+    for column in (legs.surface, legs.bottom, legs.turning, up * (legs.bounces + legs.turning > 0)):
+        key = key * (int(column.max(initial=0)) + 1) + column
     order = np.argsort(key, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(key[order])) + 1) if len(order) else []
 
@@ -161,8 +163,8 @@ class _FacetInterpolant:
 
     def at(self, point: Floats) -> ApertureSamples:
         """Legs from points (point, xyz), some of the family."""
-        found = row_products(aperture_terms((point - self.middle) / self.half, 1.0), self.coefficients)
-        terms, phase, delay_std, gain, away = np.split(found, self.parts, axis=1)
+        values = row_products(aperture_terms((point - self.middle) / self.half, 1.0), self.coefficients)
+        terms, phase, delay_std, gain, away = np.split(values, self.parts, axis=1)
         towards = away.reshape(*gain.shape, 3)
         return ApertureSamples(terms, phase, delay_std, gain, towards, np.full(len(point), self.error))
 
@@ -175,16 +177,16 @@ def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: floa
     degrees, sensors = exact.terms.shape[1], exact.gain.shape[1]
     towards = exact.departure.reshape(len(sample), -1)
     values = np.concatenate([exact.terms, exact.phase, exact.delay_std, exact.gain, towards], axis=1)
-    parts = np.cumsum([degrees, degrees, degrees, sensors])
+    splits = np.cumsum([degrees, degrees, degrees, sensors])
     if not np.isfinite(values).all():
         return None
-    held = np.arange(len(sample)) % 4 == 3
-    coefficients = np.linalg.lstsq(at[~held], values[~held], rcond=1e-10)[0]
-    misfit = np.abs(at[held] @ coefficients - values[held]).max(axis=0)
-    wrong = np.split(misfit, parts)
+    held_out = np.arange(len(sample)) % 4 == 3
+    coefficients = np.linalg.lstsq(at[~held_out], values[~held_out], rcond=1e-10)[0]
+    misfit = np.abs(at[held_out] @ coefficients - values[held_out]).max(axis=0)
+    wrong = np.split(misfit, splits)
     late, turned, softer = (float(w.sum()) for w in wrong[:3])  # monomials over the aperture are at most 1
     smooth = late <= SMOOTH_TIME and turned <= SMOOTH_PHASE and softer <= SMOOTH_BLUR
     if not (smooth and wrong[3].max() <= SMOOTH_GAIN and wrong[4].max() <= SMOOTH_DIRECTION):
         return None
     error = late + turned / rate + 0.5 * rate * softer + float(exact.error.max())
-    return _FacetInterpolant(middle, half, coefficients, parts, error)
+    return _FacetInterpolant(middle, half, coefficients, splits, error)

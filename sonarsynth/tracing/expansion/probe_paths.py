@@ -53,27 +53,33 @@ class ApertureSamples:
             terms, phase, delay_std, np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count)
         )
 
-    def put(self, rows: Ints, made: ApertureSamples) -> None:
+    def put(self, rows: Ints, samples: ApertureSamples) -> None:
         """Write some of them."""
-        for name, value in vars(made).items():
+        for name, value in vars(samples).items():
             getattr(self, name)[rows] = value
 
 
-def traced(legs: ReceivePaths, place: ReceiverGeometry) -> ApertureSamples:
+def traced(legs: ReceivePaths, geometry: ReceiverGeometry) -> ApertureSamples:
     """Legs at the probes, each of them traced."""
-    made = ApertureSamples.room(len(legs.row), *place.probe.basis.shape)
-    if place.propagation.straight(place.medium.profile):
-        departure, left, gain = image(legs, place.probe, place.receiver.pose), np.zeros(made.gain.shape), made.gain
+    samples = ApertureSamples.room(len(legs.row), *geometry.probe.basis.shape)
+    if geometry.propagation.straight(geometry.medium.profile):
+        departure, residual, gain = (
+            image(legs, geometry.probe, geometry.receiver.pose),
+            np.zeros(samples.gain.shape),
+            samples.gain,
+        )
         if not legs.bounces.any():
-            return replace(made, departure=departure)
+            return replace(samples, departure=departure)
     else:
-        left, gain, departure = rays_to_probes(legs, place)
-    probe, rate = place.probe, 2.0 * np.pi * place.receiver.band[1]
-    turned, loss, softer = _boundaries(legs, departure, place.medium, place.receiver.centre)
-    turned, softer = (np.where(np.isnan(left), np.nan, value) for value in (turned, softer))
-    terms, phase, delay_std = probe.fit(left), probe.fit(turned), probe.fit(softer)
+        residual, gain, departure = rays_to_probes(legs, geometry)
+    probe, rate = geometry.probe, 2.0 * np.pi * geometry.receiver.band[1]
+    turned, loss, softer = _boundaries(legs, departure, geometry.medium, geometry.receiver.centre)
+    turned, softer = (np.where(np.isnan(residual), np.nan, value) for value in (turned, softer))
+    terms, phase, delay_std = probe.fit(residual), probe.fit(turned), probe.fit(softer)
     error = (
-        probe.misfit(left, terms) + probe.misfit(turned, phase) / rate + probe.misfit(softer, delay_std) * 0.5 * rate
+        probe.misfit(residual, terms)
+        + probe.misfit(turned, phase) / rate
+        + probe.misfit(softer, delay_std) * 0.5 * rate
     )
     return ApertureSamples(terms, phase, delay_std, gain * loss, departure, error)
 
@@ -83,10 +89,10 @@ def image(
 ) -> Floats:
     """Unit vectors (leg, probe, xyz) from each point to the image of each probe, or the first few, as far as the ray is
     long; of all legs, or some rows of them."""
-    some = slice(None) if rows is None else rows
-    mirrored = (legs.surface[some] + legs.bottom[some]) % 2 == 1
+    chosen = slice(None) if rows is None else rows
+    mirrored = (legs.surface[chosen] + legs.bottom[chosen]) % 2 == 1
     offset = sonar_pose.turn_to_world(probe.position)[:few]
-    return np.asarray(to_images(legs.length[some], legs.departure[some], mirrored, offset))
+    return np.asarray(to_images(legs.length[chosen], legs.departure[chosen], mirrored, offset))
 
 
 def _boundaries(legs: ReceivePaths, departure: Floats, medium: Medium, centre: float) -> tuple[Floats, Floats, Floats]:
@@ -94,51 +100,51 @@ def _boundaries(legs: ReceivePaths, departure: Floats, medium: Medium, centre: f
     what their squared blurs (s2) add; centre: of the band (Hz)."""
     shape, profile = departure.shape[:2], medium.profile
     shift, ratio, softer = np.zeros(shape), np.ones(shape), np.zeros(shape)
-    some = np.flatnonzero(legs.bounces > 0)
-    if not len(some):
+    rows = np.flatnonzero(legs.bounces > 0)
+    if not len(rows):
         return shift, ratio, softer
-    p = np.hypot(departure[some, :, 0], departure[some, :, 1]) / profile.at(depth(legs.point[some]))[:, None]
-    surface, bottom = (np.repeat(n[some, None], p.shape[1], axis=1) for n in (legs.surface, legs.bottom))
+    p = np.hypot(departure[rows, :, 0], departure[rows, :, 1]) / profile.at(depth(legs.point[rows]))[:, None]
+    surface, bottom = (np.repeat(n[rows, None], p.shape[1], axis=1) for n in (legs.surface, legs.bottom))
     angles = [np.arccos(np.minimum(p * float(profile.at(z)), 1.0)) for z in (0.0, medium.depth)]
-    seen = at_boundaries(medium.environment, profile, angles[0], surface, angles[1], bottom, centre)
-    turned = seen.phase - (legs.phase - 0.5 * np.pi * legs.caustics)[some, None]
-    shift[some] = turned - 2.0 * np.pi * np.rint(turned / (2.0 * np.pi))
+    bounced = at_boundaries(medium.environment, profile, angles[0], surface, angles[1], bottom, centre)
+    turned = bounced.phase - (legs.phase - 0.5 * np.pi * legs.caustics)[rows, None]
+    shift[rows] = turned - 2.0 * np.pi * np.rint(turned / (2.0 * np.pi))
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio[some] = np.where(legs.boundary[some, None] > 0, seen.modulus / legs.boundary[some, None], 1.0)
-    softer[some] = seen.delay_std**2 - legs.delay_std[some, None] ** 2
+        ratio[rows] = np.where(legs.boundary[rows, None] > 0, bounced.modulus / legs.boundary[rows, None], 1.0)
+    softer[rows] = bounced.delay_std**2 - legs.delay_std[rows, None] ** 2
     return shift, ratio, softer
 
 
-def rays_to_probes(legs: ReceivePaths, place: ReceiverGeometry) -> tuple[Floats, Floats, Floats]:
+def rays_to_probes(legs: ReceivePaths, geometry: ReceiverGeometry) -> tuple[Floats, Floats, Floats]:
     """Delay over the sphere's (s), gain over it (leg, probe), departure (leg, probe, xyz): rays to every probe."""
-    medium, probe = place.medium, place.probe
-    position = place.receiver.pose.to_world(probe.position)
-    known = KnownRays(legs.point, legs.departure, legs.bounces + legs.turning)
+    medium, probe = geometry.medium, geometry.probe
+    position = geometry.receiver.pose.to_world(probe.position)
+    centre_rays = KnownRays(legs.point, legs.departure, legs.bounces + legs.turning)
     nothing = np.full((len(legs.row), len(position)), np.nan)
-    beside = place.propagation.beside(medium.profile, medium.depth, known, position)
+    beside = geometry.propagation.beside(medium.profile, medium.depth, centre_rays, position)
     time, spreading, departure = beside or (nothing, nothing.copy(), np.zeros((*nothing.shape, 3)))
-    c = place.receiver.speed(medium)
+    c = geometry.receiver.speed(medium)
     farther = sphere(legs.direction, legs.radius, probe.position)
     predicted = legs.travel_time[:, None] + farther / c
     lost = np.flatnonzero(np.isnan(time).any(axis=1))
     if len(lost):
-        some = legs.select(lost)
-        found = _searched(some, position, predicted[lost], BRANCH * probe.aperture / c, place)
-        time[lost], spreading[lost] = found[0], found[1]
-        departure[lost] = np.where(np.isnan(found[0])[..., None], some.departure[:, None, :], found[2])
+        searched = legs.select(lost)
+        rays = _searched(searched, position, predicted[lost], BRANCH * probe.aperture / c, geometry)
+        time[lost], spreading[lost] = rays[0], rays[1]
+        departure[lost] = np.where(np.isnan(rays[0])[..., None], searched.departure[:, None, :], rays[2])
     expected = legs.spreading[:, None] * legs.radius[:, None] / (legs.radius[:, None] + farther)
     return time - predicted, spreading / expected, departure
 
 
 def _searched(
-    legs: ReceivePaths, position: Floats, predicted: Floats, tolerance: float, place: ReceiverGeometry
+    legs: ReceivePaths, position: Floats, predicted: Floats, tolerance: float, geometry: ReceiverGeometry
 ) -> tuple[Floats, Floats, Floats]:
     """Time, spreading (leg, probe) and departure of the rays nearest in time among all; NaN where there is none."""
     count, sensors = predicted.shape
     start, end = np.repeat(legs.point, sensors, axis=0), np.tile(position, (count, 1))
-    paths = place.propagation.connect(place.medium.profile, place.medium.depth, start, end)
+    paths = geometry.propagation.connect(geometry.medium.profile, geometry.medium.depth, start, end)
     same = (paths.surface == legs.surface[paths.pair // sensors]) & (paths.bottom == legs.bottom[paths.pair // sensors])
-    found = pick_branch(paths, predicted, tolerance, same)
-    missing = found < 0
-    time = np.where(missing, np.nan, paths.travel_time[found])
-    return time, np.where(missing, np.nan, paths.spreading[found]), paths.departure[found]
+    nearest = pick_branch(paths, predicted, tolerance, same)
+    missing = nearest < 0
+    time = np.where(missing, np.nan, paths.travel_time[nearest])
+    return time, np.where(missing, np.nan, paths.spreading[nearest]), paths.departure[nearest]

@@ -22,27 +22,27 @@ if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
 
 
-def shift_to_scattering_points(made: Arrivals, legs: ReceivePaths, spot: Floats, sonar_pose: Pose) -> Arrivals:
+def shift_to_scattering_points(arrivals: Arrivals, legs: ReceivePaths, spot: Floats, sonar_pose: Pose) -> Arrivals:
     """Arrivals through uniform water that seem to come from points `spot` (path, xyz) m, world, off the start of their
     legs, or from the images of these: exact."""
-    some = np.flatnonzero(spot.any(axis=1))
-    mirrored = spot[some]
-    mirrored[legs.bounces[some] % 2 == 1, 2] *= -1.0
-    seen = made.radius[some, None] * made.direction[some] + sonar_pose.turn_to_body(mirrored)
-    direction, radius = made.direction.copy(), made.radius.copy()
-    radius[some] = np.sqrt(dot(seen, seen))
-    direction[some] = seen / radius[some, None]
-    return replace(made, direction=direction, radius=radius)
+    rows = np.flatnonzero(spot.any(axis=1))
+    mirrored = spot[rows]
+    mirrored[legs.bounces[rows] % 2 == 1, 2] *= -1.0
+    apparent = arrivals.radius[rows, None] * arrivals.direction[rows] + sonar_pose.turn_to_body(mirrored)
+    direction, radius = arrivals.direction.copy(), arrivals.radius.copy()
+    radius[rows] = np.sqrt(dot(apparent, apparent))
+    direction[rows] = apparent / radius[rows, None]
+    return replace(arrivals, direction=direction, radius=radius)
 
 
 def delay_to_scattering_points(over: ExpansionTerms, array: FacetPaths, leg: Ints, spot: Floats) -> ExpansionTerms:
     """Wavefronts of paths by legs (path,) through water that bends them, with what points `spot` (path, xyz) m, world,
     are farther from each hydrophone, beside the array centre: by the directions in which rays leave, for points much
     nearer to the middle than to the array."""
-    some = np.flatnonzero(spot.any(axis=1))
-    away = array.fronts.departure(leg[some]) - array.legs.departure[leg[some], None]
-    speed = array.context.medium.profile.at(depth(array.legs.point[leg[some]]))
-    late = -dot(spot[some, None], away) / speed[:, None]
+    rows = np.flatnonzero(spot.any(axis=1))
+    away = array.fronts.departure(leg[rows]) - array.legs.departure[leg[rows], None]
+    speed = array.context.medium.profile.at(depth(array.legs.point[leg[rows]]))
+    late = -dot(spot[rows, None], away) / speed[:, None]
     delay = over.delay.copy()
-    delay[some] += probes(array.context.receiver.elements).fit(late)
+    delay[rows] += probes(array.context.receiver.elements).fit(late)
     return over._replace(delay=delay)

@@ -44,8 +44,8 @@ class Probes:
         fitted = values[:, : self.fitted]
         terms = row_products(np.nan_to_num(fitted), self.solve.T)
         for i in np.flatnonzero(np.isnan(fitted).any(axis=1)):
-            there = np.isfinite(fitted[i])
-            terms[i, 1:] = np.linalg.lstsq(self.basis[: self.fitted][there, 1:], fitted[i, there], rcond=1e-10)[0]
+            finite = np.isfinite(fitted[i])
+            terms[i, 1:] = np.linalg.lstsq(self.basis[: self.fitted][finite, 1:], fitted[i, finite], rcond=1e-10)[0]
         return terms
 
     def fit_few(self, values: Floats) -> tuple[Floats, Floats]:

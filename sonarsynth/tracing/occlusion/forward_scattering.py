@@ -51,14 +51,14 @@ def forward_paths(array: FacetPaths) -> FacetPaths | None:
         return None
     of_bodies = context.scattering[: len(laws)]
     every = facets_of(of_bodies, slice(0, sum(map(len, of_bodies))))
-    mine = range(len(laws)) if array.owners is None else array.owners
-    scatters = np.array([bool(shadow_parts(law)) and number in mine for number, law in enumerate(laws)])
+    owners = range(len(laws)) if array.owners is None else array.owners
+    scatters = np.array([bool(shadow_parts(law)) and number in owners for number, law in enumerate(laws)])
     every = every.select(scatters[every.owner])
     legs = rays_to_centre(context.medium, every.point, receiver, propagation)
     view = array.view(solid)
     legs = view.visible(legs, every.clear[legs.row], None)
     legs = view.settled(legs, every.clear[legs.row], None)
-    kept, row = np.unique(legs.row, return_inverse=True)
-    legs, facets = legs.numbered(row), every.select(kept)
+    reached, row = np.unique(legs.row, return_inverse=True)
+    legs, facets = legs.numbered(row), every.select(reached)
     over = expansion_source(legs, facets.owner[legs.row], array.bending, receiver, propagation)
     return replace(array, legs=legs, wavefronts=over, facets=facets)

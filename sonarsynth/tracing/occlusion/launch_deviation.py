@@ -34,14 +34,14 @@ def launch_deviation(
     Cubics through rays to the probes of the aperture: arcs where these do not leave a layer of
     constant gradient, others traced. Where a probe has no ray, it is taken to be where straight ones are.
     """
-    place = ReceiverGeometry(medium, receiver, probes(receiver.elements), propagation)
-    probe, offset = place.probe, receiver.pose.turn_to_world(place.probe.position)
+    geometry = ReceiverGeometry(medium, receiver, probes(receiver.elements), propagation)
+    probe, offset = geometry.probe, receiver.pose.turn_to_world(geometry.probe.position)
     away, arc = _arcs(legs, receiver.pose.position, offset, medium)
     image = towards(legs, offset)
-    rest = np.flatnonzero(~arc)
-    if len(rest):
-        left, _, bent = rays_to_probes(legs.select(rest), place)
-        away[rest] = np.where(np.isnan(left)[..., None], image[rest], bent)
+    traced = np.flatnonzero(~arc)
+    if len(traced):
+        residual, _, bent = rays_to_probes(legs.select(traced), geometry)
+        away[traced] = np.where(np.isnan(residual)[..., None], image[traced], bent)
     away -= image
     basis = aperture_terms(points, probe.aperture)
     coefficients = np.einsum("tp,lpx->ltx", probe.solve, away[:, : probe.fitted], optimize=True)
@@ -64,28 +64,28 @@ def _arcs(legs: ReceivePaths, centre: Floats, offset: Floats, medium: Medium) ->
     In a layer of constant gradient g the centre of the circle is at the depth where c would be 0 and equally far from
     both ends, so the tangent of the grazing angle at the start, down positive, is (dz (c + c') / X + g X) / 2 c.
     """
-    made = np.zeros((len(legs.row), len(offset), 3))
+    directions = np.zeros((len(legs.row), len(offset), 3))
     nodes, speed = medium.profile.depth, medium.profile.speed
     ends = np.append(depth(centre + offset), depth(centre))
     layer = np.searchsorted(nodes, ends.min(), "right") - 1
     if layer < 0 or layer + 1 >= len(nodes):
-        return made, np.zeros(len(legs.row), bool)
+        return directions, np.zeros(len(legs.row), bool)
     top, low = float(nodes[layer]), min(float(nodes[layer + 1]), medium.depth)
     gradient = float((speed[layer + 1] - speed[layer]) / (nodes[layer + 1] - top))
     z = depth(legs.point)
     bow = abs(gradient) / float(speed[layer : layer + 2].min()) * (legs.length + np.abs(offset).sum(axis=1).max()) ** 2
     within = (np.minimum(z, ends.min()) - bow >= top) & (np.maximum(z, ends.max()) + bow <= low)
-    some = np.flatnonzero(within & (legs.bounces == 0))
-    to = np.concatenate([np.zeros((1, 3)), offset])[None] + (centre - legs.point[some])[:, None]
+    rows = np.flatnonzero(within & (legs.bounces == 0))
+    to = np.concatenate([np.zeros((1, 3)), offset])[None] + (centre - legs.point[rows])[:, None]
     level = np.hypot(to[..., 0], to[..., 1])
-    c = (float(speed[layer]) + gradient * (z[some] - top))[:, None]
+    c = (float(speed[layer]) + gradient * (z[rows] - top))[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):
         down = 0.5 * (-to[..., 2] * (2.0 - gradient * to[..., 2] / c) / level + gradient * level / c)
         cosine = 1.0 / np.hypot(1.0, down)
         ahead = np.concatenate([to[..., :2] * (cosine / level)[..., None], (-down * cosine)[..., None]], axis=2)
-        known = np.abs(ahead[:, 0] - legs.departure[some]).max(axis=1) <= SAME
-    known &= np.isfinite(ahead).all(axis=(1, 2))
-    made[some[known]] = ahead[known, 1:]
-    found = np.zeros(len(legs.row), bool)
-    found[some[known]] = True
-    return made, found
+        same = np.abs(ahead[:, 0] - legs.departure[rows]).max(axis=1) <= SAME
+    same &= np.isfinite(ahead).all(axis=(1, 2))
+    directions[rows[same]] = ahead[same, 1:]
+    is_arc = np.zeros(len(legs.row), bool)
+    is_arc[rows[same]] = True
+    return directions, is_arc

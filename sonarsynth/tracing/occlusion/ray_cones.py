@@ -44,15 +44,15 @@ def hidden(
     bow = _curvature(medium.profile) * length**2 / 8.0
     broken = (bow > SAGITTA_TOLERANCE) | (times > 0)
     blocked[~broken] = occluded(bodies, start[~broken], end[~broken])
-    rest = np.flatnonzero(broken)
-    whole, first = _near(bodies, medium.depth, start[rest], end[rest], departure[rest], times[rest], bow[rest])
+    bent = np.flatnonzero(broken)
+    full, first = _near(bodies, medium.depth, start[bent], end[bent], departure[bent], times[bent], bow[bent])
     if turning is not None:
-        whole |= (times[rest] > 0) & (turning[rest] > 0)  # which boundary comes first, a turn may have changed
-    for some, part in ((rest[whole], length[rest[whole]]), (rest[~whole], np.minimum(first, length[rest])[~whole])):
-        leaves = np.flatnonzero(part > 0.0)
-        rows = some[leaves]
+        full |= (times[bent] > 0) & (turning[bent] > 0)  # which boundary comes first, a turn may have changed
+    for rays, followed in ((bent[full], length[bent[full]]), (bent[~full], np.minimum(first, length[bent])[~full])):
+        leaves = np.flatnonzero(followed > 0.0)
+        rows = rays[leaves]
         blocked[rows] = _along_chords(
-            bodies, medium, start[rows], end[rows], departure[rows], part[leaves], length[rows]
+            bodies, medium, start[rows], end[rows], departure[rows], followed[leaves], length[rows]
         )
     return blocked
 
@@ -81,20 +81,20 @@ def ray_cones(
     bow = _curvature(medium.profile) * longest**2 / 8.0
     straight = (bounces == 0) & (_curvature(medium.profile) * shortest**2 <= 8.0 * SAGITTA_TOLERANCE)  # some of them
     again, first = _near(bodies, medium.depth, start, end, departure, bounces, bow + spread)
-    whole = straight | again | ((bounces > 0) & (turning > 0))
-    reach = np.where(whole, longest, np.minimum(first, longest))
+    full = straight | again | ((bounces > 0) & (turning > 0))
+    reach = np.where(full, longest, np.minimum(first, longest))
     with np.errstate(invalid="ignore", over="ignore"):  # where the speed jumps, rays bend by any angle
-        far = 0.98 * np.where(whole, shortest, np.minimum(first - 2.0 * (bow + spread), shortest))
+        far = 0.98 * np.where(full, shortest, np.minimum(first - 2.0 * (bow + spread), shortest))
         angle = (
             _subtended(spread, length) + 0.5 * _curvature_about(medium.profile, depth(start), reach) * reach + swerve
         )
     ahead = end - start
     distance = np.linalg.norm(ahead, axis=1)
     off = np.linalg.norm(np.cross(departure, ahead), axis=1) / np.maximum(distance, 1e-300)
-    angle = np.where(whole, np.maximum(angle, np.arcsin(np.minimum(off, 1.0)) + _subtended(spread, distance)), angle)
+    angle = np.where(full, np.maximum(angle, np.arcsin(np.minimum(off, 1.0)) + _subtended(spread, distance)), angle)
     slope = 1.02 * np.tan(np.minimum(angle, 0.5)) + 2e-5  # more than what casting may err by
     room = np.where(departure[:, 2] > 0.0, -start[:, 2], medium.depth + start[:, 2])
-    bounced = (bounces > 0) & (whole | (reach * (np.abs(departure[:, 2]) + slope) >= room))
+    bounced = (bounces > 0) & (full | (reach * (np.abs(departure[:, 2]) + slope) >= room))
     return (
         np.where(bounced | (angle > 0.4) | (bounces > 0) & (np.abs(departure[:, 2]) <= slope), np.nan, slope),
         reach,
@@ -155,12 +155,12 @@ def _curvature_about(profile: Profile, middle: Floats, reach: Floats) -> Floats:
     bend /= float(profile.speed.min())
     first = np.clip(np.searchsorted(profile.depth, middle - reach, "right") - 1, 0, len(bend) - 1)
     last = np.clip(np.searchsorted(profile.depth, middle + reach, "left"), first + 1, len(bend))
-    most, step, level = [bend], 1, np.frexp(last - first)[1] - 1  # largest of 1, 2, 4, ... layers from each on
+    maxima, step, level = [bend], 1, np.frexp(last - first)[1] - 1  # largest of 1, 2, 4, ... layers from each on
     while 2 * step <= len(bend):
-        most.append(np.maximum(most[-1], np.append(most[-1][step:], np.zeros(min(step, len(bend))))))
+        maxima.append(np.maximum(maxima[-1], np.append(maxima[-1][step:], np.zeros(min(step, len(bend))))))
         step *= 2
-    level = np.minimum(level, len(most) - 1)
-    table = np.stack(most)
+    level = np.minimum(level, len(maxima) - 1)
+    table = np.stack(maxima)
     return np.asarray(np.maximum(table[level, first], table[level, last - (1 << level)]))
 
 
@@ -219,20 +219,20 @@ def _along_chords(
     start: Floats,
     end: Floats,
     departure: Floats,
-    part: Floats,
+    followed: Floats,
     length: Floats,
 ) -> Bools:
-    """Whether a body stands in a chord of the first `part` (ray,) m of each ray."""
+    """Whether a body stands in a chord of the first `followed` (ray,) m of each ray."""
     blocked = np.zeros(len(start), bool)
     if not len(start):
         return blocked
-    ray, points = chords(medium, start, departure, part)
+    ray, points = chords(medium, start, departure, followed)
     last = np.flatnonzero(np.diff(ray, append=-1))
-    points[last] = np.where((part < length)[:, None], points[last], end)
+    points[last] = np.where((followed < length)[:, None], points[last], end)
     points[np.flatnonzero(np.diff(ray, prepend=-1))] = start
     pieces = np.flatnonzero(ray[1:] == ray[:-1])
-    found = occluded(bodies, points[pieces], points[pieces + 1])
-    blocked[ray[pieces[found]]] = True
+    hits = occluded(bodies, points[pieces], points[pieces + 1])
+    blocked[ray[pieces[hits]]] = True
     return blocked
 
 

@@ -65,19 +65,19 @@ class Occlusion:
             hides = self._hides(start, end, legs.departure, legs.length, bounces=legs.bounces, turning=legs.turning)
             return legs.select(picked(~hides))
         certain = self._certain(legs, start, normal)
-        kept, mixed = certain != CLOSED, certain == UNKNOWN
+        in_sight, mixed = certain != CLOSED, certain == UNKNOWN
         first = np.append(0, 1 + rim(self.elements))
         for kind in (UNKNOWN, NO_CONE):
-            for some in _parts(np.flatnonzero(certain == kind), len(first)):
-                leg, point = np.repeat(some, len(first)), np.tile(first, len(some))
-                swerve = self._swerve(legs.select(some), first) if kind == NO_CONE else None  # others stay open
-                unseen = self._unseen(legs, start, normal, leg, point, swerve).reshape(len(some), len(first))
-                kept[some] = ~unseen.all(axis=1)
-                mixed[some] |= unseen.any(axis=1)
-        for some in _parts(np.flatnonzero(mixed & ~kept & (certain == UNKNOWN)), len(self._points)):
-            kept[some] = ~self._dark(legs, start, normal, some).all(axis=1)
-        none = np.zeros((np.count_nonzero(kept), 1 + self.elements.count // 8), np.uint8)
-        return legs.select(np.flatnonzero(kept)).seen(none, mixed[kept])
+            for rows in _parts(np.flatnonzero(certain == kind), len(first)):
+                leg, point = np.repeat(rows, len(first)), np.tile(first, len(rows))
+                swerve = self._swerve(legs.select(rows), first) if kind == NO_CONE else None  # others stay open
+                unseen = self._unseen(legs, start, normal, leg, point, swerve).reshape(len(rows), len(first))
+                in_sight[rows] = ~unseen.all(axis=1)
+                mixed[rows] |= unseen.any(axis=1)
+        for rows in _parts(np.flatnonzero(mixed & ~in_sight & (certain == UNKNOWN)), len(self._points)):
+            in_sight[rows] = ~self._dark(legs, start, normal, rows).all(axis=1)
+        none = np.zeros((np.count_nonzero(in_sight), 1 + self.elements.count // 8), np.uint8)
+        return legs.select(np.flatnonzero(in_sight)).seen(none, mixed[in_sight])
 
     def settled(self, legs: ReceivePaths, start: Floats, normal: Floats | None) -> ReceivePaths:
         """The same legs, none of them open: those that are, looked at from each hydrophone; arguments as above.
@@ -88,8 +88,8 @@ class Occlusion:
         if not len(rows):
             return legs
         occluded = legs.occluded.copy()
-        for some in _parts(rows, len(self._points)):
-            occluded[some] = np.packbits(self._dark(legs, start, normal, some), axis=1)
+        for block in _parts(rows, len(self._points)):
+            occluded[block] = np.packbits(self._dark(legs, start, normal, block), axis=1)
         return legs.seen(occluded, np.zeros(len(legs.row), bool))
 
     @property
@@ -123,9 +123,9 @@ class Occlusion:
         (leg,): how far (m) they are on the outer side of the facet, at least and at most; swerve (leg,) rad: by how
         much rays to them leave beside their images, at most."""
         away, length = _towards(legs, offset)
-        found, rows = np.full(len(start), UNKNOWN), np.arange(len(start))
+        verdict, rows = np.full(len(start), UNKNOWN), np.arange(len(start))
         if ahead is not None:
-            found[ahead[1] < 0.0] = CLOSED
+            verdict[ahead[1] < 0.0] = CLOSED
             rows = np.flatnonzero(ahead[0] > 0.0)
         end = (self.receiver.pose.position + offset)[rows]
         ray = start[rows], end, away[rows], length[rows]
@@ -139,33 +139,33 @@ class Occlusion:
             swerve=swerve[rows],
         )
         sure = np.flatnonzero(np.isfinite(slope))
-        found[rows], rows = NO_CONE, rows[sure]
-        found[rows] = classify_cones(self.bodies, start[rows], away[rows], slope[sure], reach[sure], far[sure])
-        return found
+        verdict[rows], rows = NO_CONE, rows[sure]
+        verdict[rows] = classify_cones(self.bodies, start[rows], away[rows], slope[sure], reach[sure], far[sure])
+        return verdict
 
     def _dark(self, legs: ReceivePaths, start: Floats, normal: Floats | None, rows: Ints) -> Bools:
         """(row, 1 + sensor) from where some legs are hidden: the array centre, each hydrophone. Parts of the array that
         see alike are looked at together."""
-        parts = cells(self.elements)
-        row, cell = np.repeat(rows, len(parts.radius)), np.tile(np.arange(len(parts.radius)), len(rows))
-        some, offset, spread = (
+        array_cells = cells(self.elements)
+        row, cell = np.repeat(rows, len(array_cells.radius)), np.tile(np.arange(len(array_cells.radius)), len(rows))
+        repeated, offset, spread = (
             legs.select(row),
-            self.receiver.pose.turn_to_world(parts.centre)[cell],
-            parts.radius[cell],
+            self.receiver.pose.turn_to_world(array_cells.centre)[cell],
+            array_cells.radius[cell],
         )
         swerve = self._swerve(legs.select(rows), np.arange(len(self._points)))
         beside = np.zeros(len(row))
         if swerve is not None:
-            order = np.argsort(parts.cell, kind="stable")
-            first = np.searchsorted(parts.cell[order], np.arange(len(parts.radius)))
+            order = np.argsort(array_cells.cell, kind="stable")
+            first = np.searchsorted(array_cells.cell[order], np.arange(len(array_cells.radius)))
             beside = np.maximum.reduceat(np.sqrt(dot(swerve, swerve))[:, order], first, axis=1).ravel()
-        ahead = None if normal is None else _within(some, normal[row], spread, beside, offset)
-        found = self._cones(some, start[row], offset, spread, ahead, beside)
-        found = found.reshape(len(rows), len(parts.radius))[:, parts.cell]
-        dark = np.asarray(found == CLOSED)
-        one, point = np.nonzero(found >= UNKNOWN)
-        some_of = None if swerve is None else swerve[one, point]
-        dark[one, point] = self._unseen(legs, start, normal, rows[one], point, some_of)
+        ahead = None if normal is None else _within(repeated, normal[row], spread, beside, offset)
+        verdict = self._cones(repeated, start[row], offset, spread, ahead, beside)
+        verdict = verdict.reshape(len(rows), len(array_cells.radius))[:, array_cells.cell]
+        dark = np.asarray(verdict == CLOSED)
+        index, point = np.nonzero(verdict >= UNKNOWN)
+        deviation = None if swerve is None else swerve[index, point]
+        dark[index, point] = self._unseen(legs, start, normal, rows[index], point, deviation)
         return dark
 
     def _swerve(self, legs: ReceivePaths, point: Ints) -> Floats | None:
@@ -193,11 +193,11 @@ class Occlusion:
         if normal is not None:
             unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
         ray = np.flatnonzero(~unseen)
-        end, how = (
+        end, turns = (
             self.receiver.pose.position + offset[ray],
             {"bounces": legs.bounces[ray], "turning": legs.turning[ray]},
         )
-        unseen[ray] = self._hides(start[leg[ray]], end, ahead[ray], length[ray], **how)
+        unseen[ray] = self._hides(start[leg[ray]], end, ahead[ray], length[ray], **turns)
         return unseen
 
     def _hides(self, *ray: Floats, bounces: Ints, turning: Ints) -> Bools:
@@ -237,19 +237,19 @@ class Cells(NamedTuple):
 def cells(elements: Elements) -> Cells:
     """An array cut into parts by halves along their longer sides."""
     points = np.concatenate([np.zeros((1, 3)), elements.position])
-    parts = [np.arange(len(points))]
-    while len(parts) < min(PARTS, len(points) // 2):
+    groups = [np.arange(len(points))]
+    while len(groups) < min(PARTS, len(points) // 2):
         halves = []
-        for part in parts:
-            along = points[part, np.ptp(points[part], axis=0).argmax()]
-            halves += np.array_split(part[np.argsort(along, kind="stable")], 2)
-        parts = halves
-    centre = np.array([0.5 * (points[part].min(axis=0) + points[part].max(axis=0)) for part in parts])
-    away = zip(parts, centre, strict=True)
-    radius = np.array([1e-6 + 1.001 * np.linalg.norm(points[part] - c, axis=1).max() for part, c in away])
+        for group in groups:
+            along = points[group, np.ptp(points[group], axis=0).argmax()]
+            halves += np.array_split(group[np.argsort(along, kind="stable")], 2)
+        groups = halves
+    centre = np.array([0.5 * (points[group].min(axis=0) + points[group].max(axis=0)) for group in groups])
+    away = zip(groups, centre, strict=True)
+    radius = np.array([1e-6 + 1.001 * np.linalg.norm(points[group] - c, axis=1).max() for group, c in away])
     cell = np.empty(len(points), int)
-    for number, part in enumerate(parts):
-        cell[part] = number
+    for number, group in enumerate(groups):
+        cell[group] = number
     return Cells(cell, centre, radius)
 
 

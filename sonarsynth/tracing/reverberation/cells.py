@@ -64,7 +64,7 @@ def side_for(reach: float) -> float:
 
 def cells_about(middle: Floats, reach: float, side: float, owner: str, bottom_depth: float) -> Cells:
     """Those within `reach` (m) of a point (xy) m, in order."""
-    first, last = (np.floor((middle + way * reach) / side).astype(np.int64) for way in (-1, 1))
+    first, last = (np.floor((middle + sign * reach) / side).astype(np.int64) for sign in (-1, 1))
     x, y = np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(first, last, strict=True)), indexing="ij")
     layers = max(int(np.ceil(bottom_depth / side)), 1) if owner == "volume" else 1
     height = bottom_depth / layers if owner == "volume" else 0.0
@@ -87,16 +87,16 @@ def scatterers(seed: int, cells: Cells, count: Ints) -> tuple[Floats, Ints, Floa
     cell = np.repeat(np.arange(len(count)), count)
     number = np.arange(len(cell)) - np.repeat(np.cumsum(count) - count, count)
     key = (*cells.key[cell].T, number)
-    inside = np.column_stack([uniforms(seed, what, *key) for what in (Draw.X, Draw.Y, Draw.Z)])
+    inside = np.column_stack([uniforms(seed, axis, *key) for axis in (Draw.X, Draw.Y, Draw.Z)])
     return cells.low[cell] + inside * cells.size, cell, uniforms(seed, Draw.SIGN, *key)
 
 
-def texture(seed: int, place: Floats, patch: float, patchiness: float | None) -> Floats:
-    """How much brighter than its mean (point,) the patch of each place (point, xyz) m is, by the gamma law."""
-    if patchiness is None or not len(place):
-        return np.ones(len(place))
+def texture(seed: int, position: Floats, patch: float, patchiness: float | None) -> Floats:
+    """How much brighter than its mean (point,) the patch of each position (point, xyz) m is, by the gamma law."""
+    if patchiness is None or not len(position):
+        return np.ones(len(position))
     from scipy.special import gammaincinv
 
-    patches, which = np.unique(np.floor(place / patch).astype(np.int64), axis=0, return_inverse=True)
+    patches, which = np.unique(np.floor(position / patch).astype(np.int64), axis=0, return_inverse=True)
     bright = gammaincinv(patchiness, uniforms(seed, Draw.TEXTURE, *patches.T)) / patchiness
     return np.asarray(bright[which.ravel()])

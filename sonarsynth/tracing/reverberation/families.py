@@ -104,19 +104,19 @@ def spare_time(cells: Cells, medium: Medium) -> float:
     return float(np.linalg.norm(cells.size)) / float(medium.profile.speed.min())
 
 
-def end_depths(place: Floats, owner: str) -> Floats:
+def end_depths(position: Floats, owner: str) -> Floats:
     """Depths of scatterers: one for all of a boundary."""
-    return np.asarray(depth(place if owner == "volume" else place[:1]), float)
+    return np.asarray(depth(position if owner == "volume" else position[:1]), float)
 
 
 def _name(owner: str, out: UnfoldedPaths, back: UnfoldedPaths) -> str:
     """A family in words."""
 
-    def by(way: UnfoldedPaths) -> str:
-        many = {"surface": way.surface, "bottom": way.bottom}
+    def by(path: UnfoldedPaths) -> str:
+        many = {"surface": path.surface, "bottom": path.bottom}
         return " and ".join(f"{name} {count}" if count > 1 else name for name, count in many.items() if count)
 
-    ends = [f"{what} by {by(way)}" for what, way in (("lit", out), ("heard", back)) if way.bounces]
+    ends = [f"{verb} by {by(path)}" for verb, path in (("lit", out), ("heard", back)) if path.bounces]
     return owner + (f" {' and '.join(ends)}" if ends else "")
 
 
@@ -135,14 +135,14 @@ def site_of(owner: str, medium: Medium, frequency: float) -> BoundarySite:
     environment = medium.environment
     boundary: SeaSurface | SeaBottom = environment.bottom if owner == "bottom" else environment.surface
     wind = boundary.wind_speed if isinstance(boundary, SeaSurface) else None
-    made = boundary.reflection
+    reflection = boundary.reflection
     return BoundarySite(
         frequency,
         2.0 * np.pi * frequency / float(medium.profile.at(medium.depth if owner == "bottom" else 0.0)),
         lambda grazing: np.abs(coefficient(boundary, grazing, frequency)),
         wind,
         rms_height(boundary),
-        made.name if isinstance(made, Sediment) else None,
+        reflection.name if isinstance(reflection, Sediment) else None,
     )
 
 
@@ -154,12 +154,12 @@ def expected_counts(families: list[Family], listening: ReverberationWindow, bins
     """
     many = scatterers_per_pulse(listening.speckle) * listening.bandwidth * STEP
     which = [time_bins(f.paths.delay, listening, bins) for f in families]
-    whole, steep = np.zeros(bins), np.zeros(bins)
+    total, steep = np.zeros(bins), np.zeros(bins)
     for f, b in zip(families, which, strict=True):
-        np.add.at(whole, b, f.energy)
+        np.add.at(total, b, f.energy)
         np.add.at(steep, b, f.energy**1.5)
-    each = many * np.divide(steep, whole**2, out=np.zeros(bins), where=whole > 0.0)
-    return [each[b] * np.sqrt(f.energy) for f, b in zip(families, which, strict=True)]
+    scale = many * np.divide(steep, total**2, out=np.zeros(bins), where=total > 0.0)
+    return [scale[b] * np.sqrt(f.energy) for f, b in zip(families, which, strict=True)]
 
 
 def time_bins(delay: Floats, listening: ReverberationWindow, bins: int) -> Ints:

@@ -54,15 +54,15 @@ def back_ways(medium: Medium, receiver: Receiver, end: Floats, bounces: int, own
 
 
 def scattered_paths(
-    place: Floats, emission: Emission, medium: Medium, receiver: Receiver, out: UnfoldedPaths, back: UnfoldedPaths
+    position: Floats, emission: Emission, medium: Medium, receiver: Receiver, out: UnfoldedPaths, back: UnfoldedPaths
 ) -> ScatteredPaths:
     """Paths by places (point, xyz) m. The array is where it is when they arrive."""
     velocity = np.zeros(3) if receiver.track is None else receiver.track.velocity
-    begin, away = emission.position, place - emission.position
+    begin, away = emission.position, position - emission.position
     over = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
     r1 = np.hypot(over, out.climb)
     delay = emission.time + r1 * out.slowness
-    level = place[:, :2] - receiver.pose.position[:2]
+    level = position[:, :2] - receiver.pose.position[:2]
     late = delay + np.hypot(np.hypot(*level.T), back.climb) * back.slowness
     if velocity.any():
         level = level - late[:, None] * velocity[:2]
@@ -71,14 +71,14 @@ def scattered_paths(
     towards = np.column_stack([level, np.broadcast_to(back.climb, r2.shape)]) / r2[:, None]
     sine_in, sine_out = np.abs(out.climb) / r1, np.abs(back.climb) / r2
     forward = -(away[:, 0] * level[:, 0] + away[:, 1] * level[:, 1]) / (over * beside)
-    left = np.ones(len(place))
+    factor = np.ones(len(position))
     if emission.directivity is not None:
-        leaving = np.column_stack([place[:, :2] - begin[:2], np.broadcast_to(out.climb, r1.shape)]) / r1[:, None]
-        left = left * emission.directivity(leaving)
+        leaving = np.column_stack([position[:, :2] - begin[:2], np.broadcast_to(out.climb, r1.shape)]) / r1[:, None]
+        factor = factor * emission.directivity(leaving)
     if receiver.sonar.baffle:
-        left = left * np.where((towards @ receiver.pose.rotation)[:, 0] < 0.0, receiver.sonar.behind, 1.0)
-    left = (
-        left * _reflected(medium, out, sine_in, receiver.centre) * _reflected(medium, back, sine_out, receiver.centre)
+        factor = factor * np.where((towards @ receiver.pose.rotation)[:, 0] < 0.0, receiver.sonar.behind, 1.0)
+    factor = (
+        factor * _reflected(medium, out, sine_in, receiver.centre) * _reflected(medium, back, sine_out, receiver.centre)
     )
     loss = medium.absorption
     mean = loss if isinstance(loss, float) else float(np.trapezoid(loss.value, loss.depth) / medium.depth)
@@ -87,17 +87,17 @@ def scattered_paths(
         towards=towards,
         out=r1,
         back=r2,
-        amplitude=left / (np.maximum(r1, NEAREST) * np.maximum(r2, NEAREST)),
+        amplitude=factor / (np.maximum(r1, NEAREST) * np.maximum(r2, NEAREST)),
         absorbed=10.0 ** (-0.1 * mean * (r1 + r2)),
         angles=Angles(sine_in, sine_out, np.clip(forward, -1.0, 1.0)),
     )
 
 
-def _reflected(medium: Medium, way: UnfoldedPaths, sine: Floats, frequency: float) -> Floats | float:
-    """Modulus (point,) of the mirror reflections on a way: what roughness takes from them still comes, from about the
+def _reflected(medium: Medium, path: UnfoldedPaths, sine: Floats, frequency: float) -> Floats | float:
+    """Modulus (point,) of the mirror reflections on a path: what roughness takes from them still comes, from about the
     mirror point."""
-    if not way.bounces:
+    if not path.bounces:
         return 1.0
     grazing, environment = np.arcsin(np.minimum(sine, 1.0)), medium.environment
-    top = np.abs(coefficient(environment.surface, grazing, frequency)) ** way.surface if way.surface else 1.0
-    return top * (np.abs(coefficient(environment.bottom, grazing, frequency)) ** way.bottom if way.bottom else 1.0)
+    top = np.abs(coefficient(environment.surface, grazing, frequency)) ** path.surface if path.surface else 1.0
+    return top * (np.abs(coefficient(environment.bottom, grazing, frequency)) ** path.bottom if path.bottom else 1.0)

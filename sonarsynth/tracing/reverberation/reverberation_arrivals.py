@@ -79,31 +79,33 @@ def reverberation_arrivals(
     counted = listening._replace(start=listening.start - spare, stop=listening.stop + spare)
     bins = max(int(np.ceil((counted.stop - counted.start) / STEP)), 1)
 
-    def rate(some: list[Family]) -> Floats:
+    def rate(group: list[Family]) -> Floats:
         rates = np.zeros(bins)
-        for f in some:
+        for f in group:
             np.add.at(rates, time_bins(f.paths.delay, counted, bins), f.energy / STEP)
         return rates
 
-    whole = rate(families)
+    total_rate = rate(families)
     audible, left_out = list[Family](), list[tuple[str, float]]()
     names = tuple(dict.fromkeys(f.name for f in families))
     for name in names:
-        some = [f for f in families if f.name == name]
-        own = rate(some)
-        if (own > np.maximum(10.0 ** (-FAINT / 10.0) * whole, 10.0 ** (-UNDER_NOISE / 10.0) * listening.noise)).any():
-            audible += some
+        group = [f for f in families if f.name == name]
+        own = rate(group)
+        if (
+            own > np.maximum(10.0 ** (-FAINT / 10.0) * total_rate, 10.0 ** (-UNDER_NOISE / 10.0) * listening.noise)
+        ).any():
+            audible += group
         elif own.any():
-            left_out.append((name, float(10.0 * np.log10(own.sum() / whole.sum()))))
+            left_out.append((name, float(10.0 * np.log10(own.sum() / total_rate.sum()))))
     expected = expected_counts(audible, counted, bins)
     total = sum(float(x.sum()) for x in expected)
     if total > MOST:
         raise ValueError(
             f"reverberation needs {total:.2g} scatterers a frame, more than {MOST}: raise accuracy.speckle"
         )
-    parts = [_drawn(described, f, x, snaps, medium, receiver, listening, number(seed, f.owner, key))
+    drawn = [_drawn(described, f, x, snaps, medium, receiver, listening, number(seed, f.owner, key))
              for f, x in zip(audible, expected, strict=True)]  # fmt: skip
-    return _joined(parts, audible, names, tuple(left_out), receiver.pose.rotation, receiver.speed(medium))
+    return _joined(drawn, audible, names, tuple(left_out), receiver.pose.rotation, receiver.speed(medium))
 
 
 class _DrawnScatterers(NamedTuple):
@@ -125,16 +127,16 @@ def _drawn(
     listening: ReverberationWindow,
     seed: int,
 ) -> _DrawnScatterers:
-    some = np.flatnonzero(expected > 0.0)
-    cells = Cells(family.cells.key[some], family.cells.low[some], family.cells.size)
-    count = counts(seed, cells, expected[some])
-    place, cell, sign = scatterers(seed, cells, count)
-    snap, end = snaps[family.emission], end_depths(place, family.owner)
+    occupied = np.flatnonzero(expected > 0.0)
+    cells = Cells(family.cells.key[occupied], family.cells.low[occupied], family.cells.size)
+    count = counts(seed, cells, expected[occupied])
+    position, cell, sign = scatterers(seed, cells, count)
+    snap, end = snaps[family.emission], end_depths(position, family.owner)
     out = out_ways(medium, snap, end, described.bounces, family.owner)[family.out]
     back = back_ways(medium, receiver, end, described.bounces, family.owner)[family.back]
-    paths = scattered_paths(place, snap, medium, receiver, out, back)
-    cross = strength(described, family.owner, paths, medium, receiver.centre) * cells.measure / expected[some][cell]
-    cross *= texture(seed, place, described.patch, described.patchiness)
+    paths = scattered_paths(position, snap, medium, receiver, out, back)
+    cross = strength(described, family.owner, paths, medium, receiver.centre) * cells.measure / expected[occupied][cell]
+    cross *= texture(seed, position, described.patch, described.patchiness)
     turn = np.where(np.floor(sign * 2.0 ** (4 + 5 * family.out + family.back)) % 2.0, -1.0, 1.0)
     energy = cross * paths.flux * listening.sent[family.emission]
     keep = np.flatnonzero((energy > 0.0) & (paths.delay > listening.start) & (paths.delay < listening.stop))
@@ -142,7 +144,7 @@ def _drawn(
 
 
 def _joined(
-    parts: list[_DrawnScatterers],
+    drawn: list[_DrawnScatterers],
     families: list[Family],
     names: tuple[str, ...],
     left_out: tuple[tuple[str, float], ...],
@@ -150,23 +152,23 @@ def _joined(
     sound_speed: float,
 ) -> ReverberationArrivals:
     def joined(values: list[Floats], shape: tuple[int, ...] = ()) -> Floats:
-        return np.concatenate([np.zeros((0, *shape)), *(v[p.keep] for v, p in zip(values, parts, strict=True))])
+        return np.concatenate([np.zeros((0, *shape)), *(v[p.keep] for v, p in zip(values, drawn, strict=True))])
 
-    count = [len(p.keep) for p in parts]
-    paths, delay = [p.paths for p in parts], joined([p.paths.delay for p in parts])
+    count = [len(p.keep) for p in drawn]
+    paths, delay = [p.paths for p in drawn], joined([p.paths.delay for p in drawn])
     none = np.zeros(len(delay))
     return ReverberationArrivals(
         delay=delay,
         direction=joined([p.towards for p in paths], (3,)) @ rotation,
         length=joined([p.back for p in paths]),
-        gain=joined([p.gain for p in parts]),
+        gain=joined([p.gain for p in drawn]),
         phase=none,
         delay_std=none,
         sound_speed=sound_speed,
         lit_from=joined([p.out for p in paths]),
         emission=np.repeat([f.emission for f in families], count).astype(np.int64),
         family=np.repeat([names.index(f.name) for f in families], count).astype(np.int64),
-        energy=joined([p.energy for p in parts]),
+        energy=joined([p.energy for p in drawn]),
         families=names,
         left_out=left_out,
     )

@@ -40,17 +40,17 @@ def ways(
 
     To the bottom those that arrive from above, to the surface from below: a reflection there is none before it.
     """
-    layers, begin, found = _water(profile, bottom_depth), np.full(end.shape, start), []
-    top, low, whole = np.minimum(begin, end), np.maximum(begin, end), np.full(end.shape, bottom_depth)
+    layers, begin, paths = _water(profile, bottom_depth), np.full(end.shape, start), []
+    top, low, bottom = np.minimum(begin, end), np.maximum(begin, end), np.full(end.shape, bottom_depth)
 
     def mean(a: Floats, b: Floats) -> Floats:
         own = 1.0 / profile.at(a)
         if profile.uniform:
             return own
         thin = b - a < 1e-9
-        return np.where(thin, own, mean_slowness(layers, np.where(thin, 0.0, a), np.where(thin, whole, b)))
+        return np.where(thin, own, mean_slowness(layers, np.where(thin, 0.0, a), np.where(thin, bottom, b)))
 
-    above, between, below = mean(np.zeros(end.shape), top), mean(top, low), mean(low, whole)
+    above, between, below = mean(np.zeros(end.shape), top), mean(top, low), mean(low, bottom)
     for image in images(begin, end, bottom_depth, bounces):
         falls = image.climb * image.turns < 0.0
         if (owner == "bottom" and not falls.all()) or (owner == "surface" and (falls | (image.climb == 0.0)).any()):
@@ -58,5 +58,5 @@ def ways(
         crossed = image.above * above + image.between * between + image.below * below
         all_of_it = image.above + image.between + image.below
         slowness = np.where(all_of_it > 1e-9, crossed / np.maximum(all_of_it, 1e-9), between)
-        found.append(UnfoldedPaths(image.surface, image.bottom, image.climb, slowness))
-    return found
+        paths.append(UnfoldedPaths(image.surface, image.bottom, image.climb, slowness))
+    return paths
