@@ -150,7 +150,7 @@ def _centred(arrivals: Arrivals) -> tuple[Floats, Floats]:
 
 def _check_shapes(arrivals: Arrivals) -> None:
     """Raise ValueError for a path whose pulse has no shape."""
-    for wrong, what in (
+    for wrong, fault in (
         (arrivals.delay_std < 0.0, "a negative delay_std"),
         (np.abs(arrivals.doppler) >= MAX_DOPPLER, f"a Doppler factor that is not within +-{MAX_DOPPLER:g}"),
         (np.abs(arrivals.corner_delays.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
@@ -161,7 +161,7 @@ def _check_shapes(arrivals: Arrivals) -> None:
         (arrivals.height_delay_std < 0.0, "a negative height_delay_std"),
     ):
         if wrong.any():
-            raise ValueError(f"arrival {np.flatnonzero(wrong)[0] % wrong.shape[-1]} has {what}")
+            raise ValueError(f"arrival {np.flatnonzero(wrong)[0] % wrong.shape[-1]} has {fault}")
     if arrivals.coherent.any() and not 0.0 < arrivals.centre < np.inf:
         raise ValueError("coherent arrivals need the centre of their band, above 0 Hz")
 
@@ -173,8 +173,8 @@ def folded(phase: Floats) -> tuple[Floats, Floats]:
         return np.ones(phase.size), phase
     cosine, sine = np.cos(phase), np.sin(phase)
     sign = np.where(cosine < 0.0, -1.0, 1.0)
-    rest = np.arctan2(sign * sine, sign * cosine)
-    return sign, np.where(np.abs(rest) > 2e-16 * (1.0 + np.abs(phase)), rest, 0.0)
+    remainder = np.arctan2(sign * sine, sign * cosine)
+    return sign, np.where(np.abs(remainder) > 2e-16 * (1.0 + np.abs(phase)), remainder, 0.0)
 
 
 def towards(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
@@ -210,7 +210,7 @@ def arrival_directions(front: ArrayPaths, points: Floats) -> Floats:
 def terms_gradient(points: Floats, aperture: float, terms: int) -> Floats:
     """Gradient (xyz, point, term) in 1/m of so many aperture terms at points (point, xyz)."""
     steps = 1e-4 * aperture * np.eye(3)
-    sides = [[kept_aperture_terms(points + way * step, aperture, terms) for way in (1, -1)] for step in steps]
+    sides = [[kept_aperture_terms(points + sign * step, aperture, terms) for sign in (1, -1)] for step in steps]
     return np.array([(ahead - behind) / (2e-4 * aperture) for ahead, behind in sides])
 
 

@@ -29,9 +29,9 @@ def deposit_for(error: float) -> GriddedSynthesis:
     for width in range(6, 17, 2):
         kernel = kernel_error(width, GriddedSynthesis().oversampling)
         for precision in PRECISIONS:
-            left = (error - kernel - ROUNDING[precision]) / SPENT
-            if left >= LEFT * error / SPENT:
-                tolerance = min(left, MOST_TOLERANCE)
+            allowed = (error - kernel - ROUNDING[precision]) / SPENT
+            if allowed >= LEFT * error / SPENT:
+                tolerance = min(allowed, MOST_TOLERANCE)
                 digit = 10.0 ** np.floor(np.log10(tolerance))
                 down = float(f"{np.floor(tolerance / digit) * digit:.1g}")
                 return GriddedSynthesis(width=width, precision=precision, tolerance=down)

@@ -50,8 +50,8 @@ def _spectrum(signals: Signals) -> tuple[np.ndarray, int]:
     p = signals.pressure
     length = next_fast_len(p.shape[1] + BLEND, real=True)
     down = np.linspace(1.0, 0.0, length - p.shape[1] + 2, dtype=np.float32)[1:-1]
-    whole = np.concatenate([p, p[:, -1:] * down + p[:, :1] * (1.0 - down)], axis=1)
-    return rfft(whole, axis=1), length
+    periodic = np.concatenate([p, p[:, -1:] * down + p[:, :1] * (1.0 - down)], axis=1)
+    return rfft(periodic, axis=1), length
 
 
 def _filtered(signals: Signals, spectrum: np.ndarray, length: int) -> Signals:
@@ -67,11 +67,11 @@ def talk(signals: Signals, elements: Elements, level: float) -> Signals:
 def neighbours(elements: Elements, level: float) -> csr_array:
     """K (sensor, sensor): the amplitude at neighbours, else 0."""
     count = elements.count
-    place = np.stack([elements.column, elements.row], axis=1) if elements.on_lattice else np.arange(count)[:, None]
-    number = {tuple(one): n for n, one in enumerate(place.tolist())}
-    steps = np.concatenate([np.eye(place.shape[1], dtype=int), -np.eye(place.shape[1], dtype=int)])
+    position = np.stack([elements.column, elements.row], axis=1) if elements.on_lattice else np.arange(count)[:, None]
+    number = {tuple(at): n for n, at in enumerate(position.tolist())}
+    steps = np.concatenate([np.eye(position.shape[1], dtype=int), -np.eye(position.shape[1], dtype=int)])
     pairs = [
-        (n, number[near]) for one, n in number.items() for near in map(tuple, (one + steps).tolist()) if near in number
+        (n, number[near]) for at, n in number.items() for near in map(tuple, (at + steps).tolist()) if near in number
     ]
     to, of = np.array(pairs, dtype=int).reshape(-1, 2).T
     return csr_array((np.full(len(pairs), 10.0 ** (level / 20.0), np.float32), (to, of)), shape=(count, count))
@@ -81,13 +81,13 @@ def sampled(signals: Signals, jitter: float, clock_rate: float, random: np.rando
     """Signals at the times of a real clock: sample n, n/fs after the start, is taken at n/fs (1 + clock_rate) and
     `jitter` (s, standard deviation) off; the same for all channels. Beyond the window is silence."""
     samples, fs = signals.pressure.shape[1], signals.sampling_frequency
-    place = np.arange(samples) * (1.0 + clock_rate) + fs * jitter * random.standard_normal(samples)
-    tap = np.floor(place).astype(int)[:, None] + np.arange(1 - TAPS // 2, TAPS // 2 + 1)
-    away = place[:, None] - tap
+    position = np.arange(samples) * (1.0 + clock_rate) + fs * jitter * random.standard_normal(samples)
+    tap = np.floor(position).astype(int)[:, None] + np.arange(1 - TAPS // 2, TAPS // 2 + 1)
+    away = position[:, None] - tap
     weight = np.sinc(away) * kaiser_bessel(away, TAPS, SHAPE)
-    there = (tap >= 0) & (tap < samples)
+    inside = (tap >= 0) & (tap < samples)
     at = np.broadcast_to(np.arange(samples)[:, None], tap.shape)
-    matrix = csr_array((weight[there].astype(np.float32), (at[there], tap[there])), shape=(samples, samples))
+    matrix = csr_array((weight[inside].astype(np.float32), (at[inside], tap[inside])), shape=(samples, samples))
     return replace(signals, pressure=np.ascontiguousarray((matrix @ signals.pressure.T).T))
 
 

@@ -44,22 +44,22 @@ def exact_spectra(
     facets = bool(front.coherent.any() or front.corner_delays.any() or front.coherent_fraction.any())
     total = np.zeros((elements.count, frequency.size), complex)
     for e in range(front.count):
-        one = front.select(np.array([e]))
-        delay, gain = delay_and_gain(one, elements.position)
-        u = arrival_directions(one, elements.position)
-        late = one.delay[0] - origin + delay[0]
-        face = element_directivity(frequency, u[0][:, None, :], elements.face, one.sound_speed)
-        farther = one.attenuation * one.sound_speed * delay[0]  # dB
-        loss = lost(np.multiply.outer(one.loss[0] + farther, relative))
-        shape = np.exp(1j * one.phase[0] - 0.5 * one.variance[0] * (2.0 * np.pi * frequency) ** 2)
+        path = front.select(np.array([e]))
+        delay, gain = delay_and_gain(path, elements.position)
+        u = arrival_directions(path, elements.position)
+        late = path.delay[0] - origin + delay[0]
+        face = element_directivity(frequency, u[0][:, None, :], elements.face, path.sound_speed)
+        farther = path.attenuation * path.sound_speed * delay[0]  # dB
+        loss = lost(np.multiply.outer(path.loss[0] + farther, relative))
+        shape = np.exp(1j * path.phase[0] - 0.5 * path.variance[0] * (2.0 * np.pi * frequency) ** 2)
         if facets:
             shape = shape * facet_response(
-                frequency, one.coherent, one.corner_delays, one.coherent_fraction, one.height_delay_std, one.centre
+                frequency, path.coherent, path.corner_delays, path.coherent_fraction, path.height_delay_std, path.centre
             )
-        if one.phase_terms.any() or one.delay_variance_terms.any():
-            shape = shape * changed(one, elements.position, frequency)
-        gain_of_sensors = elements.gain * ~one.occluded[0] if one.occluded.shape[1] else elements.gain
-        total += (one.amplitude[0] * gain[0] * gain_of_sensors)[:, None] * (
+        if path.phase_terms.any() or path.delay_variance_terms.any():
+            shape = shape * changed(path, elements.position, frequency)
+        gain_of_sensors = elements.gain * ~path.occluded[0] if path.occluded.shape[1] else elements.gain
+        total += (path.amplitude[0] * gain[0] * gain_of_sensors)[:, None] * (
             face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
         )
     return total
@@ -104,8 +104,8 @@ class DirectSum(Method):
         samples: int,
     ) -> tuple[np.ndarray, int]:
         """Pressure (sensor, sample) in float64, and the number of arrivals that the window cuts."""
-        pressure, made = exact_signals(arrivals, snaps, elements, sonar, absorption, start, samples)
-        return pressure, made.outside
+        pressure, signals = exact_signals(arrivals, snaps, elements, sonar, absorption, start, samples)
+        return pressure, signals.outside
 
 
 def exact_signals(
@@ -134,7 +134,7 @@ def exact_signals(
         for doppler in np.unique(front.doppler[rows]):
             frequency, spectrum = pulse_spectrum(waveform, sonar.antialias, fs, length, float(doppler))
             relative = relative_absorption(absorption, frequency, sonar.band.centre)
-            some = front.select(rows[front.doppler[rows] == doppler])
-            transfer = exact_spectra(some, elements, frequency, relative, start - spread / fs)
+            group = front.select(rows[front.doppler[rows] == doppler])
+            transfer = exact_spectra(group, elements, frequency, relative, start - spread / fs)
             pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
     return pressure, Signals(pressure.astype(np.float32), start, fs, 0.0, 0, plan.outside)

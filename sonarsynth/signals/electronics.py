@@ -76,8 +76,8 @@ def add_noise(
     if noise.directions is not None:
         from sonarsynth.signals.noise.drawing import draw  # compiled, and seldom needed
 
-        here = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])) if pose is None else pose
-        spectrum[:, low:high] = size * draw(noise.directions, elements, here, sonar, frequency, sound_speed, fast)
+        array_pose = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])) if pose is None else pose
+        spectrum[:, low:high] = size * draw(noise.directions, elements, array_pose, sonar, frequency, sound_speed, fast)
     elif noise.correlated:
         position = elements.position if pose is None else pose.to_world(elements.position)
         _draw_correlated(spectrum[:, low:high], noise, frequency, gain, position, fast)
@@ -103,14 +103,14 @@ def _draw_correlated(
     """
     block = max(MATRIX_ELEMENTS // len(position) ** 2, 1)
     for first in range(0, len(frequency), block):
-        some = slice(first, first + block)
-        factors = noise.factors(frequency[some], position)
+        bins = slice(first, first + block)
+        factors = noise.factors(frequency[bins], position)
         assert factors is not None, "noise that is correlated has factors"
         if not np.isfinite(factors).all():
             raise ValueError(f"{noise.kind} noise: its cross spectral density is not finite")
         drawn = rng.standard_normal((len(factors), factors.shape[2], 2), dtype=np.float32).astype(float)
         sound = np.einsum("fsk,fk->sf", factors, drawn[..., 0] + 1j * drawn[..., 1], optimize=True)
-        out[:, some] = gain[some] * sound
+        out[:, bins] = gain[bins] * sound
 
 
 class ElectronicNoise(NoiseField):

@@ -194,8 +194,8 @@ def _made(model: PulseModel, stamp: Stamp | None, highest: float) -> Pulse:
 
 def _pulse(waveform: Waveform, highest: float) -> Pulse:
     """The pulse for waves up to `highest` (Hz), or somewhat more: few pulses serve all frequencies and widths."""
-    made = _made(waveform.model, waveform.stamp, rounded_up(waveform.width * highest, 2.0))
-    return made if waveform.width == 1.0 else pulses.scaled(made, 1.0, waveform.width)
+    pulse = _made(waveform.model, waveform.stamp, rounded_up(waveform.width * highest, 2.0))
+    return pulse if waveform.width == 1.0 else pulses.scaled(pulse, 1.0, waveform.width)
 
 
 def _snap_spectrum(waveform: Waveform, longer: float, frequency: Floats) -> ComplexArray:
@@ -245,8 +245,8 @@ def stretch_sizes(waveform: Waveform, chosen: Filter, widest: float, sloped: boo
     f = np.linspace(0.0, stop_frequency(chosen), 97)
     filtered = filters.response(f, fir(chosen)) * (f if sloped else 1.0)
     at = 1.0 + widest * chebyshev(16)
-    made = _pulse(waveform, 1.2 * float(f[-1]))
-    value = analysis(16) @ (pulses.stretched_spectra(f, made, at) * at[:, None] * filtered)
+    pulse = _pulse(waveform, 1.2 * float(f[-1]))
+    value = analysis(16) @ (pulses.stretched_spectra(f, pulse, at) * at[:, None] * filtered)
     sizes = np.abs(value).sum(axis=1)
     return tuple((sizes / sizes[0]).tolist()) if sizes[0] > 0.0 else (1.0, inf)
 
@@ -256,10 +256,10 @@ def heard_part(waveform: Waveform, chosen: Filter) -> float:
     """Largest modulus of the filtered snap's spectrum over that of the snap, up to the stop band; 0 for one that has
     nothing there."""
     f = np.linspace(0.0, stop_frequency(chosen), 513)
-    made = _pulse(waveform, 1.2 * float(f[-1]))
-    whole = np.abs(made.strength).sum()  # bounds its spectrum
-    passed = np.abs(pulses.spectrum(f, made) * filters.response(f, fir(chosen))).max()
-    return float(passed / whole) if whole > 0.0 else 0.0
+    pulse = _pulse(waveform, 1.2 * float(f[-1]))
+    bound = np.abs(pulse.strength).sum()  # bounds its spectrum
+    passed = np.abs(pulses.spectrum(f, pulse) * filters.response(f, fir(chosen))).max()
+    return float(passed / bound) if bound > 0.0 else 0.0
 
 
 def _peak(waveform: Waveform) -> float:
@@ -287,8 +287,8 @@ def envelope_delay(waveform: Waveform, sonar: Sonar, loss: Callable[[Floats], Fl
     band, rate = sonar.band, sonar.sampling_frequency
     samples = 1 << int(np.ceil(np.log2(max(2048.0, 32 * rate / (band.high - band.low)))))
     f, wave = pulse_spectrum(waveform, sonar.antialias, rate, min(samples, LONGEST_ENVELOPE))
-    kept = (f >= band.low) & (f <= band.high)
-    f, wave = f[kept], wave[kept]
+    in_band = (f >= band.low) & (f <= band.high)
+    f, wave = f[in_band], wave[in_band]
     if loss is not None:
         wave = wave * 10.0 ** (-loss(f) / 20)
     return _loudest(f.tobytes(), wave.astype(complex).tobytes(), band.low, band.high)

@@ -98,8 +98,8 @@ class GriddedSynthesis(Method):
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`: the wider a target, the more nodes over the array, and tiles."""
-        each = 1.0e-9 + 3.6e-6 * size.solid_angle
-        return size.paths * size.sensors * each + 4.5e-9 * size.sensors * size.samples
+        per_path = 1.0e-9 + 3.6e-6 * size.solid_angle
+        return size.paths * size.sensors * per_path + 4.5e-9 * size.sensors * size.samples
 
     def row(self) -> str:
         """Its kind and what it is set to."""
@@ -136,19 +136,19 @@ class GriddedSynthesis(Method):
         out = np.zeros((elements.count, samples), self.precision)
         method = (self.width, self.oversampling, self.precision, self.tolerance)
         done: list[Segment] = []
-        for part in plan.stretches:
-            paths, bins = bins_of(part, front.select(part.paths), sonar, absorption, self.tolerance)
+        for span in plan.stretches:
+            paths, bins = bins_of(span, front.select(span.paths), sonar, absorption, self.tolerance)
             add_segment(
                 out,
-                part.first,
-                part.samples,
+                span.first,
+                span.samples,
                 paths,
                 elements,
                 bins,
-                origin=start + part.first / fs,
+                origin=start + span.first / fs,
                 highest=stop_frequency(sonar.antialias),
                 method=method,
-                fresh=not any(p.first < part.first + part.samples and part.first < p.first + p.samples for p in done),
+                fresh=not any(p.first < span.first + span.samples and span.first < p.first + p.samples for p in done),
             )
-            done.append(part)
+            done.append(span)
         return out, plan.outside

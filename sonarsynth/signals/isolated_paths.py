@@ -79,9 +79,9 @@ def measured_levels(
     before, after = layout(paths, front, snaps, hydrophone, sonar, 0.0, 1).support + reach(front)
     lead = int(np.ceil(before.max() * fs)) + GUARD
     slot = fast_length(lead + int(np.ceil(after.max() * fs)) + GUARD)
-    place = lead + slot * np.arange(count)
+    position = lead + slot * np.arange(count)
     mantissa, exponent = np.frexp(paths.amplitude)
-    moved = replace(paths, delay=(paths.delay * fs % 1.0 + place) / fs, amplitude=mantissa)
+    moved = replace(paths, delay=(paths.delay * fs % 1.0 + position) / fs, amplitude=mantissa)
     signals = method.signals(moved, snaps, hydrophone, sonar, absorption, 0.0, slot * count)
     spectrum = rfft(np.asarray(signals.pressure[0], float).reshape(count, slot), axis=1) / fs
     at = np.arange(spectrum.shape[1]) - 0.5

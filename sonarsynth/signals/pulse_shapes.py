@@ -61,8 +61,8 @@ def stretched(series: ComplexArray, doppler: Floats) -> Floats:
 def reduction(weight: Floats, spectrum: ComplexArray, loudness: Floats, tolerance: float) -> Reduction:
     """The fewest modes of weight (path, given) @ spectrum (given, bin) times loudness (path,), to `tolerance` of the
     loudest path and of their root mean square."""
-    some = spectrum[:, :: max(1, spectrum.shape[1] // 128)]
-    u, s, _ = np.linalg.svd(np.concatenate([some.real, some.imag], axis=1), full_matrices=False)
+    sampled = spectrum[:, :: max(1, spectrum.shape[1] // 128)]
+    u, s, _ = np.linalg.svd(np.concatenate([sampled.real, sampled.imag], axis=1), full_matrices=False)
     loud = np.multiply(weight.T, loudness, order="C")
     weighted = np.linalg.qr(loud.T, mode="r")
     left, size, v = np.linalg.svd(weighted @ (u * s), full_matrices=False)
@@ -76,8 +76,8 @@ def reduction(weight: Floats, spectrum: ComplexArray, loudness: Floats, toleranc
 
 def _sizes(weighted: Floats) -> Floats:
     """Sizes (mode,) over the first, of moduli (mode, path): of root mean squares, and of the largest."""
-    mean, most = np.sqrt(np.einsum("mp,mp->m", weighted, weighted)), weighted.max(axis=1)
-    return np.asarray(np.maximum(mean / mean[0], most / most[0]))
+    mean, largest = np.sqrt(np.einsum("mp,mp->m", weighted, weighted)), weighted.max(axis=1)
+    return np.asarray(np.maximum(mean / mean[0], largest / largest[0]))
 
 
 def main_modes(weight: Floats, loudness: Floats) -> tuple[Floats, tuple[float, ...]]:
@@ -138,10 +138,10 @@ def _powers(
     phase, mass = -2j * np.pi * scale * frequency, np.abs(spectrum) / np.abs(spectrum).sum()
     ratio = phase / np.arange(1, MOST_POWERS)[:, None]
     waves = np.cumprod(np.concatenate([np.ones((1, frequency.size)), ratio]), axis=0)  # (-i w scale)^j/j!
-    left = np.cumsum((np.abs(waves) @ mass)[::-1])[::-1]
-    count = max(3, int(np.argmax(np.append(left, 0.0) <= tolerance)))
-    some = np.append(0, np.arange(2, count))  # the mean of the first power is 0
-    return mean_powers(corners, scale, count).T[:, some], waves[some]
+    remainder = np.cumsum((np.abs(waves) @ mass)[::-1])[::-1]
+    count = max(3, int(np.argmax(np.append(remainder, 0.0) <= tolerance)))
+    powers = np.append(0, np.arange(2, count))  # the mean of the first power is 0
+    return mean_powers(corners, scale, count).T[:, powers], waves[powers]
 
 
 def _softened(front: ArrayPaths, frequency: Floats, decay: Floats, tolerance: float) -> tuple[Floats, Floats]:
@@ -151,7 +151,7 @@ def _softened(front: ArrayPaths, frequency: Floats, decay: Floats, tolerance: fl
     low = low if low > 0.0 else 0.1 * float(frequency[min(1, frequency.size - 1)]) or 1.0  # 0 Hz has no logarithm
     high = max(high, low)
     span = max(float(np.log(high / low)), 1e-3)
-    place = 2.0 * np.log(np.maximum(frequency, low) / high) / span + 1.0
+    position = 2.0 * np.log(np.maximum(frequency, low) / high) / span + 1.0
     steepest = float(front.variance.max() * blur_exponent(frequency)[-1])
     rate = _spline(frequency.tobytes(), decay.tobytes())
 
@@ -161,10 +161,10 @@ def _softened(front: ArrayPaths, frequency: Floats, decay: Floats, tolerance: fl
     def lost(loss: Floats, frequency: Floats) -> Floats:
         return np.asarray(np.exp(-np.multiply.outer(rate(frequency), loss)))
 
-    some = slice(None, None, max(1, frequency.size // 64))
+    sampled = slice(None, None, max(1, frequency.size // 64))
     ends = np.array([front.loss.min(), front.loss.max()])
-    exact = lost(ends, frequency[some])
-    onto = ((n, interpolation(place[some], Axis(n))) for n in SAMPLES)
+    exact = lost(ends, frequency[sampled])
+    onto = ((n, interpolation(position[sampled], Axis(n))) for n in SAMPLES)
     count = next((n for n, i in onto if np.abs(i @ lost(ends, at(n)) - exact).max() <= tolerance), SAMPLES[-1])
     if front.coherent_fraction.any():
         roughest = 2.0 * np.pi * high * float(front.height_delay_std.max())
@@ -174,10 +174,10 @@ def _softened(front: ArrayPaths, frequency: Floats, decay: Floats, tolerance: fl
     exponent = np.multiply.outer(front.variance, blur_exponent(at(count))) + np.multiply.outer(
         front.loss, rate(at(count))
     )
-    left = np.exp(-exponent)
+    factor = np.exp(-exponent)
     if front.coherent_fraction.any():
-        left *= rough_factor(at(count), front.coherent_fraction, front.height_delay_std)
-    return left, np.asarray(interpolation(place, Axis(count)).T)
+        factor *= rough_factor(at(count), front.coherent_fraction, front.height_delay_std)
+    return factor, np.asarray(interpolation(position, Axis(count)).T)
 
 
 @lru_cache(maxsize=64)

@@ -92,17 +92,17 @@ def with_changes(front: ArrayPaths) -> ArrayPaths:
     blurred, and as loud as what turns, a quarter of a period ahead."""
     turn, spread = widest_turn(front), widest_spread(front)
     loud = np.abs(front.amplitude)
-    parts = [np.arange(front.count)]
-    parts += [_loudest(loud * (spread > 0.0))] * 2 + [_loudest(loud * turn)]
-    count = [part.size for part in parts]
-    every = front.select(np.concatenate(parts))
-    way = np.repeat([0.0, 1.0, -1.0, 0.0], count)
+    copies = [np.arange(front.count)]
+    copies += [_loudest(loud * (spread > 0.0))] * 2 + [_loudest(loud * turn)]
+    count = [rows.size for rows in copies]
+    every = front.select(np.concatenate(copies))
+    blur = np.repeat([0.0, 1.0, -1.0, 0.0], count)
     ahead = np.repeat([0.0, 0.0, 0.0, 1.0], count)
     size = np.where(ahead > 0.0, np.minimum(widest_turn(every), 1.0), 1.0)
     return replace(
         every,
         amplitude=every.amplitude * size,
-        variance=every.variance + way * widest_spread(every),
+        variance=every.variance + blur * widest_spread(every),
         phase=every.phase + 0.5 * np.pi * ahead,
     )
 
@@ -123,11 +123,11 @@ def changes(front: ArrayPaths, frequency: Floats, spectrum: ComplexArray) -> Pul
     kinds = [(power, ahead) for power in range(1 + MOST_POWERS * spreads) for ahead in range(1 + turns)][1:]
     both = np.concatenate([spectrum.real, spectrum.imag], axis=1)
     solve = np.linalg.inv(both @ both.T)
-    found = []
+    onto = []
     for power, ahead in kinds:
         value = spectrum * (1j**ahead * (-exponent / rate) ** power / factorial(power))
-        found.append(np.concatenate([value.real, value.imag], axis=1) @ both.T @ solve)
-    return PulseVariation(tuple(kinds), np.array(found), rate)
+        onto.append(np.concatenate([value.real, value.imag], axis=1) @ both.T @ solve)
+    return PulseVariation(tuple(kinds), np.array(onto), rate)
 
 
 class ResidualVariation(NamedTuple):
@@ -140,51 +140,54 @@ class ResidualVariation(NamedTuple):
     paths: Ints  # (path,) those
 
 
-def rest(front: ArrayPaths, paths: Ints, found: PulseVariation, tolerance: float) -> ResidualVariation:
+def rest(front: ArrayPaths, paths: Ints, variation: PulseVariation, tolerance: float) -> ResidualVariation:
     """Of the tile of these paths; changes that add less than `tolerance` are left out, to all together or to the
     loudest."""
     none = np.zeros(0)
-    some = paths[:: max(1, paths.size // LOUDEST)]
-    loud, weight = np.abs(front.amplitude[some]), front.modes[some]
-    if not found.kinds:
-        return ResidualVariation(none, none, np.zeros(0, int), np.zeros((0, some.size)), some)
-    turn, turned = _middle(front.phase_terms, some)
-    spread, softer = _middle(front.delay_variance_terms, some)
-    share = np.array([np.minimum(turned, 1.0) ** a * (softer * found.rate) ** p for p, a in found.kinds])
-    size = np.sqrt((np.tensordot(weight, found.onto, (1, 1)) ** 2).sum(axis=2)).T * share * loud
+    sampled = paths[:: max(1, paths.size // LOUDEST)]
+    loud, weight = np.abs(front.amplitude[sampled]), front.modes[sampled]
+    if not variation.kinds:
+        return ResidualVariation(none, none, np.zeros(0, int), np.zeros((0, sampled.size)), sampled)
+    turn, turned = _middle(front.phase_terms, sampled)
+    spread, softer = _middle(front.delay_variance_terms, sampled)
+    share = np.array([np.minimum(turned, 1.0) ** a * (softer * variation.rate) ** p for p, a in variation.kinds])
+    size = np.sqrt((np.tensordot(weight, variation.onto, (1, 1)) ** 2).sum(axis=2)).T * share * loud
     mean = np.sqrt((size**2).sum(axis=1) / (loud**2).sum())
     which = np.flatnonzero(np.maximum(mean, size.max(axis=1) / loud.max()) > tolerance)
-    return ResidualVariation(turn, spread, which, share[which], some)
+    return ResidualVariation(turn, spread, which, share[which], sampled)
 
 
-def pulses(front: ArrayPaths, paths: Ints, over: ResidualVariation, found: PulseVariation) -> tuple[Floats, Floats]:
+def pulses(front: ArrayPaths, paths: Ints, over: ResidualVariation, variation: PulseVariation) -> tuple[Floats, Floats]:
     """Weights (pulse, mode) of the pulses of paths, with what some of them change by, and how loud (pulse,) each is."""
     weight, loud = [front.modes[paths]], [np.abs(front.amplitude[paths])]
     for change, size in zip(over.which, over.size, strict=True):
-        weight.append(front.modes[over.paths] @ found.onto[change])
+        weight.append(front.modes[over.paths] @ variation.onto[change])
         loud.append(np.abs(front.amplitude[over.paths]) * size)
     return np.concatenate(weight), np.concatenate(loud)
 
 
-def _middle(terms: Floats, some: Ints) -> tuple[Floats, Floats]:
+def _middle(terms: Floats, rows: Ints) -> tuple[Floats, Floats]:
     """Mean (term,) of the terms of some paths, and bounds (path,) on what each has beside it."""
     if not terms.shape[1]:
-        return np.zeros(0), np.zeros(some.size)
-    value = terms[some]
+        return np.zeros(0), np.zeros(rows.size)
+    value = terms[rows]
     mean = value.mean(axis=0)
     return mean, np.asarray(np.abs(value - mean).sum(axis=1))
 
 
 def shares(
-    front: ArrayPaths, reference: ArrayPaths, which: Ints, found: PulseVariation, points: Floats, dtype: str
+    front: ArrayPaths, reference: ArrayPaths, which: Ints, variation: PulseVariation, points: Floats, dtype: str
 ) -> Floats:
     """How much there is of pulses and of each change that counts, (1 + some, point, path), beside the reference."""
     if not which.size:
         return np.zeros((0, 0, 0), dtype)
     turn, spread = (value.T for value in turn_and_spread(front, points))
     own, softer = turn_and_spread(reference, points)
-    turn, spread = (turn - own[0][:, None]).astype(dtype), ((spread - softer[0][:, None]) * found.rate).astype(dtype)
-    kinds = [(0, 0), *(found.kinds[k] for k in which)]
+    turn, spread = (
+        (turn - own[0][:, None]).astype(dtype),
+        ((spread - softer[0][:, None]) * variation.rate).astype(dtype),
+    )
+    kinds = [(0, 0), *(variation.kinds[k] for k in which)]
     if any(ahead for _, ahead in kinds):
         quarter = np.cos(turn), np.sin(turn)
     else:

@@ -113,8 +113,8 @@ def _supports(
         silent = least >= np.array([silencing_blur(w, chosen) for w in longest])[arrivals.snap]
     if rough.any():
         highest = np.array([stop_frequency(chosen)])
-        left = rough_factor(highest, front.coherent_fraction, front.height_delay_std)[:, 0]
-        silent |= left <= SUPPORT_TOLERANCE
+        factor = rough_factor(highest, front.coherent_fraction, front.height_delay_std)[:, 0]
+        silent |= factor <= SUPPORT_TOLERANCE
     a, b, c = front.corner_delays.T
     wide = np.stack([-np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)])
     return plain, support * (1.0 + np.abs(front.doppler)) + np.where(silent, 0.0, PULSE_FEET * delay_std) + wide, silent

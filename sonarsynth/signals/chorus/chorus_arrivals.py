@@ -45,10 +45,10 @@ class ImageHeights(NamedTuple):
     bottom: Ints  # (image,)
     turns: Floats  # (image,) -1 where it arrives from above
 
-    def select(self, some: Ints) -> ImageHeights:
+    def select(self, rows: Ints) -> ImageHeights:
         """Those of these indices."""
         return ImageHeights(
-            self.climb[some], self.slowness[some], self.surface[some], self.bottom[some], self.turns[some]
+            self.climb[rows], self.slowness[rows], self.surface[rows], self.bottom[rows], self.turns[rows]
         )
 
 
@@ -84,7 +84,7 @@ class ChorusArrivals(PulseArrivals):
 
 def no_chorus() -> ChorusArrivals:
     """A chorus without a snap."""
-    none, whole = np.zeros(0), np.zeros(0, np.int64)
+    none, integers = np.zeros(0), np.zeros(0, np.int64)
     return ChorusArrivals(
         delay=none,
         direction=np.zeros((0, 3)),
@@ -93,9 +93,9 @@ def no_chorus() -> ChorusArrivals:
         phase=none,
         delay_std=none,
         level=none,
-        width=whole,
-        snap=whole,
-        boundaries=whole,
+        width=integers,
+        snap=integers,
+        boundaries=integers,
         absorption=none,
         key=np.zeros((0, 5), np.int64),
         sound_speed=1500.0,
@@ -136,8 +136,8 @@ def reflected(
     """What the reflections of images do at grazing angles (..., image) in rad; f (Hz): of the middle of the band."""
     every = np.broadcast_to(np.arange(len(heights.climb)), grazing.shape).ravel()
     surface, bottom, angle = heights.surface[every], heights.bottom[every], grazing.ravel()
-    found = at_boundaries(environment, profile, angle, surface, angle, bottom, f)
-    return Reflections(*(x.reshape(grazing.shape) for x in (found.modulus, found.phase, found.delay_std)))
+    bounced = at_boundaries(environment, profile, angle, surface, angle, bottom, f)
+    return Reflections(*(x.reshape(grazing.shape) for x in (bounced.modulus, bounced.phase, bounced.delay_std)))
 
 
 def chorus_arrivals(
@@ -156,12 +156,12 @@ def chorus_arrivals(
     """
     ring = np.clip(np.searchsorted(reach.edges, np.hypot(*(snaps.place - receiver.pose.position[:2]).T)), 1, None) - 1
     stands_for = reach.stands_for[np.minimum(ring, len(reach.stands_for) - 1)]
-    some = np.flatnonzero(snaps.thinning * stands_for < 1.0)
-    snaps, louder = snaps.select(some), np.sqrt(stands_for[some])
+    chosen = np.flatnonzero(snaps.thinning * stands_for < 1.0)
+    snaps, louder = snaps.select(chosen), np.sqrt(stands_for[chosen])
     levels = np.where(louder > 1.0, reach.mean_level, snaps.level)
     heights = image_heights(medium.profile, medium.depth, float(depth(receiver.pose.position)), reach.images)
     emitted, at = (snaps.time - time)[:, None], receiver.pose.position[:2]
-    level = np.broadcast_to((snaps.place - at)[:, None], (len(some), len(heights.climb), 2))
+    level = np.broadcast_to((snaps.place - at)[:, None], (len(chosen), len(heights.climb), 2))
     velocity = np.zeros(2) if receiver.track is None else receiver.track.velocity[:2]
     delay = emitted + np.hypot(np.hypot(level[..., 0], level[..., 1]), heights.climb) * heights.slowness
     if velocity.any():
@@ -181,7 +181,7 @@ def chorus_arrivals(
     loss = medium.absorption
     mean = loss if isinstance(loss, float) else float(np.trapezoid(loss.value, loss.depth) / medium.depth)
     used, number = np.unique(snap, return_inverse=True)
-    found = ChorusArrivals(
+    chorus = ChorusArrivals(
         delay=delay,
         direction=towards @ receiver.pose.rotation,
         length=length,
@@ -196,5 +196,5 @@ def chorus_arrivals(
         key=snaps.key[used],
         sound_speed=receiver.speed(medium),
     )
-    found = replace(found, gain=found.gain * np.where(found.direction[:, 0] < 0.0, receiver.sonar.behind, 1.0))
-    return found.select(found.received >= reach.level - FAINT)
+    chorus = replace(chorus, gain=chorus.gain * np.where(chorus.direction[:, 0] < 0.0, receiver.sonar.behind, 1.0))
+    return chorus.select(chorus.received >= reach.level - FAINT)

@@ -44,10 +44,8 @@ def pulse_modes(
     lasts = width * (pulse.end - pulse.start) + filters.duration(passing)
     samples = int(next_fast_len(int(2.0 * lasts * fine), real=True))
     frequency = np.arange(samples // 2 + 1) * (fine / samples)
-    some = frequency <= nodes[0]
-    bare = pulses.spectrum(frequency[some], pulses.scaled(pulse, 1.0, width)) * filters.response(
-        frequency[some], passing
-    )
+    low = frequency <= nodes[0]
+    bare = pulses.spectrum(frequency[low], pulses.scaled(pulse, 1.0, width)) * filters.response(frequency[low], passing)
     return tabulated(bare, samples, fine, nodes, (shapes, weight))
 
 
@@ -76,16 +74,16 @@ def chorus_pressure(
     order, _ = sensor_blocks(elements)
     lost = tuple(absorption(node_frequencies(sonar)).tolist())
     for number, width in enumerate(widths.tolist()):
-        some = arrivals.select(arrivals.width == number)
-        if not len(some.delay):
+        group = arrivals.select(arrivals.width == number)
+        if not len(group.delay):
             continue
         modes = pulse_modes(model, width, sonar, elements.face, sound_speed, lost)
         _check_length(modes, spare - elements.aperture / sound_speed, rate * times)
-        louder = REFERENCE_PRESSURE / model.pulse(0.0, 0.0).peak * 10.0 ** (some.level / 20.0)
+        louder = REFERENCE_PRESSURE / model.pulse(0.0, 0.0).peak * 10.0 ** (group.level / 20.0)
         add_arrivals(
             flat,
             length,
-            some,
+            group,
             modes,
             louder=louder,
             elements=elements,

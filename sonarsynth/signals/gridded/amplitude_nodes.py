@@ -50,15 +50,15 @@ def variation(front: ArrayPaths, elements: Elements) -> Floats:
     return rows
 
 
-def degrees(some: Floats) -> tuple[tuple[float, ...], ...]:
+def degrees(rows: Floats) -> tuple[tuple[float, ...], ...]:
     """Sizes of the degrees of each axis (xyz, degree) in the sum of paths, over that sum, from rows of `variation`.
 
     Paths in phase add up by amplitude, others by power: the larger of both is taken. Infinite where nothing is heard.
     """
-    if not some.shape[0]:
+    if not rows.shape[0]:
         return ((1.0,),) * 3
-    total, power = some.sum(axis=1), np.einsum("rp,rp->r", some, some)
+    total, power = rows.sum(axis=1), np.einsum("rp,rp->r", rows, rows)
     if not power[0] > 0.0:
         return ((np.inf,),) * 3
-    found = np.maximum(total[1:] / total[0], np.sqrt(power[1:] / power[0]))
-    return tuple(map(tuple, found.reshape(3, DEGREES).tolist()))
+    sizes = np.maximum(total[1:] / total[0], np.sqrt(power[1:] / power[0]))
+    return tuple(map(tuple, sizes.reshape(3, DEGREES).tolist()))

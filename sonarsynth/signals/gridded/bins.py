@@ -48,9 +48,9 @@ class Bins(NamedTuple):
 
     def cut(self, count: int) -> Bins:
         """The first of them."""
-        some = slice(0, count)
-        frequency, spectrum, relative = self.frequency[some], self.spectrum[some], self.relative[some]
-        return self._replace(frequency=frequency, spectrum=spectrum, relative=relative, modes=self.modes[:, some])
+        first = slice(0, count)
+        frequency, spectrum, relative = self.frequency[first], self.spectrum[first], self.relative[first]
+        return self._replace(frequency=frequency, spectrum=spectrum, relative=relative, modes=self.modes[:, first])
 
 
 def audible(spectrum: ComplexArray, tolerance: float) -> slice:
@@ -61,7 +61,7 @@ def audible(spectrum: ComplexArray, tolerance: float) -> slice:
 
 
 def bins_of(
-    part: Segment, front: ArrayPaths, sonar: Sonar, absorption: Callable[[Floats], Floats] | None, tolerance: float
+    segment: Segment, front: ArrayPaths, sonar: Sonar, absorption: Callable[[Floats], Floats] | None, tolerance: float
 ) -> tuple[ArrayPaths, Bins]:
     """The paths of a stretch, with the modes of their pulses, and its bins.
 
@@ -69,21 +69,21 @@ def bins_of(
     facets with corners more than `MOST_PHASE` from their middle.
     """
     fs = sonar.sampling_frequency
-    frequency, spectrum = pulse_spectrum(part.waveform, sonar.antialias, fs, part.samples)
-    slope = np.asarray(1j * frequency / front.centre if part.coherent else 1.0)
+    frequency, spectrum = pulse_spectrum(segment.waveform, sonar.antialias, fs, segment.samples)
+    slope = np.asarray(1j * frequency / front.centre if segment.coherent else 1.0)
     spectrum = spectrum * slope
     widest = rounded_up(float(np.abs(front.doppler).max()), 2.0)
     series = np.zeros((0, spectrum.size), complex)
     if widest > 0.0:
-        sizes = np.array(stretch_sizes(at_longest(part.waveform), sonar.antialias, widest, part.coherent))
-        left = np.append(np.cumsum(sizes[::-1])[::-1], 0.0)
-        count = int(np.flatnonzero(left <= SHAPES * tolerance)[0])
-        series = slope * stretched_spectra(part.waveform, sonar.antialias, fs, part.samples, widest, count)
+        sizes = np.array(stretch_sizes(at_longest(segment.waveform), sonar.antialias, widest, segment.coherent))
+        beyond = np.append(np.cumsum(sizes[::-1])[::-1], 0.0)
+        count = int(np.flatnonzero(beyond <= SHAPES * tolerance)[0])
+        series = slope * stretched_spectra(segment.waveform, sonar.antialias, fs, segment.samples, widest, count)
     if len(series) or _shaped(front):
         front, spectrum, series = _shared(front, frequency, spectrum, series, widest, tolerance)
-    some = audible(spectrum, tolerance)
-    frequency, spectrum, series = frequency[some], spectrum[some], series[:, some]
-    modes, found = np.zeros((0, spectrum.size), complex), UNCHANGING
+    loud = audible(spectrum, tolerance)
+    frequency, spectrum, series = frequency[loud], spectrum[loud], series[:, loud]
+    modes, variation = np.zeros((0, spectrum.size), complex), UNCHANGING
     if front.variance.any():
         front = _loud(front, frequency, spectrum, tolerance)
     relative = relative_absorption(absorption, frequency, sonar.band.centre)
@@ -93,16 +93,16 @@ def bins_of(
         front = _changing(front, frequency[-1:], tolerance)
     if len(series) or _shaped(front):
         front, spectrum, modes = _with_modes(front, frequency, spectrum, relative, series, widest, tolerance)
-        found = changes(front, frequency, modes) if front.count > 1 else UNCHANGING
-    return front, Bins(some.start, frequency, spectrum, relative, fs / part.samples, modes, found)
+        variation = changes(front, frequency, modes) if front.count > 1 else UNCHANGING
+    return front, Bins(loud.start, frequency, spectrum, relative, fs / segment.samples, modes, variation)
 
 
 def _shaped(front: ArrayPaths) -> bool:
     """Whether pulses have shapes, beside Doppler."""
-    found = bool(
+    shaped = bool(
         front.variance.any() or front.phase.any() or front.corner_delays.any() or front.coherent_fraction.any()
     )
-    return found or (front.count > 1 and bool(front.phase_terms.any() or front.delay_variance_terms.any()))
+    return shaped or (front.count > 1 and bool(front.phase_terms.any() or front.delay_variance_terms.any()))
 
 
 def _changing(front: ArrayPaths, highest: Floats, tolerance: float) -> ArrayPaths:
@@ -188,20 +188,20 @@ def _shared(
 
 def _shared_facet(front: ArrayPaths, frequency: Floats) -> tuple[ArrayPaths, ComplexArray]:
     """Paths without what all facets do alike to the pulse, and that (bin,)."""
-    one, facet = front.select(np.arange(1)), np.ones(frequency.size, complex)
-    if (front.corner_delays == one.corner_delays).all():
-        facet = facet * facet_mean(frequency, one.corner_delays)[0]
+    first, facet = front.select(np.arange(1)), np.ones(frequency.size, complex)
+    if (front.corner_delays == first.corner_delays).all():
+        facet = facet * facet_mean(frequency, first.corner_delays)[0]
         front = replace(front, corner_delays=np.zeros((front.count, 3)))
     if not (np.ptp(front.coherent_fraction) or np.ptp(front.height_delay_std)):
-        facet = facet * rough_factor(frequency, one.coherent_fraction, one.height_delay_std)[0]
+        facet = facet * rough_factor(frequency, first.coherent_fraction, first.height_delay_std)[0]
         front = replace(front, coherent_fraction=np.zeros(front.count))
     return front, facet
 
 
 def _loud(front: ArrayPaths, frequency: Floats, spectrum: ComplexArray, tolerance: float) -> ArrayPaths:
     """The paths without those that their blur leaves, all together, less than 0.01 `tolerance` of the loudest."""
-    some = slice(None, None, max(1, frequency.size // 128))
-    mass, exponent = np.abs(spectrum[some]), blur_exponent(frequency[some])
+    sampled = slice(None, None, max(1, frequency.size // 128))
+    mass, exponent = np.abs(spectrum[sampled]), blur_exponent(frequency[sampled])
     blurred = exponent[exponent > 0.0]  # 0 Hz is not
     if not blurred.size:
         return front

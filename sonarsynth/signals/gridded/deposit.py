@@ -118,21 +118,21 @@ def add_segment(
         out[:, begin:end] += piece
 
 
-def _add_tile(sensor_spectra: npt.NDArray[Any], tile: Tile, part: ArrayPaths, stage: Stage) -> None:
+def _add_tile(sensor_spectra: npt.NDArray[Any], tile: Tile, paths: ArrayPaths, stage: Stage) -> None:
     """Add the spectra of a tile at the hydrophones to sensor_spectra (sensor, re and im of bins)."""
     from sonarsynth.signals.gridded.deposit_kernels import steer_back
 
     elements, bins, dtype = stage.aim.elements, stage.bins, sensor_spectra.dtype
     points = tile.nodes(elements)
-    alone = part.count == 1
-    field = _alone(tile, part, points, stage) if alone else _deposited(tile, part, points, stage)
+    alone = paths.count == 1
+    field = _alone(tile, paths, points, stage) if alone else _deposited(tile, paths, points, stage)
     if tile.reference.phase_terms.any() or tile.reference.delay_variance_terms.any():
         field = _changed(field, tile, points, stage)
     delay, gain = delay_and_gain(tile.reference, elements.position)
-    late = delay[0] + (part.delay[0] - stage.origin if alone else 0.0)
-    gain = gain[0] * elements.gain * (part.amplitude[0] if alone else 1.0)
-    if alone and part.occluded.shape[1]:
-        gain = gain * ~part.occluded[0]
+    late = delay[0] + (paths.delay[0] - stage.origin if alone else 0.0)
+    gain = gain[0] * elements.gain * (paths.amplitude[0] if alone else 1.0)
+    if alone and paths.occluded.shape[1]:
+        gain = gain * ~paths.occluded[0]
     onto, column, weight = to_sensors(elements, tile.axes, dtype.name)
     field = field.reshape(len(points) // weight.shape[1], -1)
     if onto is not None:
@@ -141,10 +141,10 @@ def _add_tile(sensor_spectra: npt.NDArray[Any], tile: Tile, part: ArrayPaths, st
     steer_back(field, column, weight, late * bins.step, gain, bins.first, sensor_spectra)
 
 
-def _alone(tile: Tile, part: ArrayPaths, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+def _alone(tile: Tile, path: ArrayPaths, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """The field (node, 2, bin) of one path that everything is steered to: that of the snap, through its face."""
     faces = _faces(tile, points, stage)
-    response = _responses(part.modes, stage)
+    response = _responses(path.modes, stage)
     return np.asarray(faces * _power(tile, stage, np.ones(1)) * response)
 
 
@@ -154,7 +154,7 @@ def _changed(field: npt.NDArray[Any], tile: Tile, points: Floats, stage: Stage) 
     return np.stack([value.real, value.imag], axis=1).astype(stage.dtype)
 
 
-def _deposited(tile: Tile, part: ArrayPaths, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+def _deposited(tile: Tile, paths: ArrayPaths, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """The field (node, 2, bin) of a tile at its nodes, steered to its reference: real and imaginary part."""
     from sonarsynth.signals.gridded.deposit_kernels import combine
 
@@ -164,46 +164,46 @@ def _deposited(tile: Tile, part: ArrayPaths, points: Floats, stage: Stage) -> np
     power = _power(tile, stage, delay_std)
     mode = np.array(tile.terms)[:, 3]
     response = _responses(tile.modes.T[: mode.max() + 1], stage)
-    _, place = face_pairs(tile.terms)
-    table = _packed(part, tile, bins.changes, (part.delay - stage.origin) * (grid.circle * bins.step))
+    _, pair = face_pairs(tile.terms)
+    table = _packed(paths, tile, bins.changes, (paths.delay - stage.origin) * (grid.circle * bins.step))
     field = np.empty((len(points), 2, bins.frequency.size), stage.dtype)
     group = max(1, LARGEST // (len(tile.terms) * grid.circle))
     for first in range(0, len(points), group):
-        some = slice(first, first + group)
-        deposits = _deposits(table, part, tile, points, some, stage)
-        spectra, faces = rfft(deposits[:, :, : grid.circle], axis=2), _faces(tile, points[some], stage)
-        combine(spectra, bins.first, faces, place, power, response, mode, field[some])
+        rows = slice(first, first + group)
+        deposits = _deposits(table, paths, tile, points, rows, stage)
+        spectra, faces = rfft(deposits[:, :, : grid.circle], axis=2), _faces(tile, points[rows], stage)
+        combine(spectra, bins.first, faces, pair, power, response, mode, field[rows])
     return field
 
 
 def _deposits(
-    table: Floats, part: ArrayPaths, tile: Tile, nodes: Floats, some: slice, stage: Stage
+    table: Floats, paths: ArrayPaths, tile: Tile, nodes: Floats, rows: slice, stage: Stage
 ) -> npt.NDArray[Any]:
     """The grid (node, term, sample) of a tile at some of its nodes (node, xyz)."""
     from sonarsynth.signals.gridded.deposit_kernels import deposit
 
-    points, grid, reference = nodes[some], stage.grid, tile.reference
+    points, grid, reference = nodes[rows], stage.grid, tile.reference
     rate = grid.circle * stage.bins.step
     steer, _ = delay_and_gain(reference, points)
     middle, level = arrival_directions(reference, points), towards(reference, points)[1]
     late, louder, lean = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0))
-    share = shares(part, reference, tile.changes, stage.bins.changes, points, stage.dtype)
-    if part.delay_terms.shape[1]:
-        late = over(part.delay_terms, points, part.aperture).T * rate
+    share = shares(paths, reference, tile.changes, stage.bins.changes, points, stage.dtype)
+    if paths.delay_terms.shape[1]:
+        late = over(paths.delay_terms, points, paths.aperture).T * rate
         if stage.aim.elements.face > 0.0:
             lean = np.ascontiguousarray(
-                tilt(part, terms_gradient(points, part.aperture, part.delay_terms.shape[1])[1:])
+                tilt(paths, terms_gradient(points, paths.aperture, paths.delay_terms.shape[1])[1:])
             )
-    if part.amplitude_terms.shape[1]:
-        louder = np.ascontiguousarray(over(part.amplitude_terms, points, part.aperture).T)
-    if part.occluded.any():
-        louder = np.where(part.occluded.T[some], -1.0, louder if louder.size else 0.0)
-    farther = part.attenuation * part.sound_speed / rate  # dB a sample
+    if paths.amplitude_terms.shape[1]:
+        louder = np.ascontiguousarray(over(paths.amplitude_terms, points, paths.aperture).T)
+    if paths.occluded.any():
+        louder = np.where(paths.occluded.T[rows], -1.0, louder if louder.size else 0.0)
+    farther = paths.attenuation * paths.sound_speed / rate  # dB a sample
     out = np.zeros((len(points), len(tile.terms), grid.circle + grid.lanes), stage.dtype)
     deposit(
         table.ravel(),
         table.shape[1],
-        part.count,
+        paths.count,
         points,
         steer[0] * rate,
         1.0 / level[0],
@@ -218,26 +218,26 @@ def _deposits(
         grid.taps,
         0.5 * grid.width,
         grid.lanes,
-        rate / part.sound_speed,
+        rate / paths.sound_speed,
         grid.circle,
         out.ravel(),
     )
     return out
 
 
-def _packed(part: ArrayPaths, tile: Tile, found: PulseVariation, position: Floats) -> Floats:
+def _packed(paths: ArrayPaths, tile: Tile, variation: PulseVariation, position: Floats) -> Floats:
     """Paths in blocks of rows (block, row, path), padded with silent ones: what `deposit` reads."""
     from sonarsynth.signals.gridded.deposit_kernels import BLOCK
 
-    loss = (part.loss - tile.reference.loss) / (tile.deviation[2] or 1.0)
+    loss = (paths.loss - tile.reference.loss) / (tile.deviation[2] or 1.0)
     onto = tile.modes[:, : max(term[3] for term in tile.terms) + 1]
-    modes = np.concatenate([onto, *(found.onto[change] @ onto for change in tile.changes)], axis=1)
-    values = (*part.direction.T, part.curvature, position, part.amplitude, loss, *(part.modes @ modes).T)
-    blocks = -(-part.count // BLOCK)
+    modes = np.concatenate([onto, *(variation.onto[change] @ onto for change in tile.changes)], axis=1)
+    values = (*paths.direction.T, paths.curvature, position, paths.amplitude, loss, *(paths.modes @ modes).T)
+    blocks = -(-paths.count // BLOCK)
     rows = np.zeros((len(values), blocks * BLOCK))
     rows[0] = 1.0
     for row, value in zip(rows, values, strict=True):
-        row[: part.count] = value
+        row[: paths.count] = value
     return np.ascontiguousarray(rows.reshape(len(values), blocks, BLOCK).swapaxes(0, 1))
 
 
@@ -273,21 +273,21 @@ def _faces(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     # smooth in frequency: a few Chebyshev frequencies do
     widest = float((np.abs(u) + deviation).max(axis=1).sum())
     farther = reference.attenuation * reference.sound_speed * delay_and_gain(reference, points)[0][0]  # dB
-    most = NEPER * float(np.abs(farther).max()) * stage.aim.steepest
+    decay = NEPER * float(np.abs(farther).max()) * stage.aim.steepest
     allowed = 0.1 * stage.aim.tolerance
     axis = nodes_for(np.pi * scale * half * widest, (1.0,), allowed)
-    if most:
-        axis = polynomials_for(np.pi * scale * half * widest, (1.0,), allowed, (1.0, most, most, most))
-        axis = Axis(axis.nodes + max(int(np.ceil(np.log(most / allowed) / RELAXING)) - DEGREES, 0))
+    if decay:
+        axis = polynomials_for(np.pi * scale * half * widest, (1.0,), allowed, (1.0, decay, decay, decay))
+        axis = Axis(axis.nodes + max(int(np.ceil(np.log(decay / allowed) / RELAXING)) - DEGREES, 0))
     frequency = middle + half * chebyshev(axis.nodes)
     at = frequency * scale
     degree = int(degrees.max())
     y, z = sinc_polynomials(u[:, :, None] * at, (deviation * at)[:, None], degree).swapaxes(0, 1)
-    some = (y[degrees[:, 0]] * z[degrees[:, 1]]).swapaxes(0, 1)
-    if most:
-        some = some * lost(np.multiply.outer(farther, np.interp(frequency, f, stage.bins.relative)))[:, None]
-    some = some.reshape(-1, axis.nodes).astype(dtype)
-    return np.asarray(some @ _to_bins(f.size, axis, dtype)).reshape(len(points), len(degrees), f.size)
+    factors = (y[degrees[:, 0]] * z[degrees[:, 1]]).swapaxes(0, 1)
+    if decay:
+        factors = factors * lost(np.multiply.outer(farther, np.interp(frequency, f, stage.bins.relative)))[:, None]
+    factors = factors.reshape(-1, axis.nodes).astype(dtype)
+    return np.asarray(factors @ _to_bins(f.size, axis, dtype)).reshape(len(points), len(degrees), f.size)
 
 
 @lru_cache(maxsize=64)

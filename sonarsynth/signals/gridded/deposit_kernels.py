@@ -28,7 +28,7 @@ deviation). Weights of the modes may follow, then those of what they change by."
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _wavefront(
     block: Any, node: Any, middle: Any, scale: Any, absorbed: Any, rate: float, steer: float, level: float, late: Any,
-    place: Any, value: Any,
+    position: Any, value: Any,
 ) -> None:  # fmt: skip
     """Positions (samples) of a block of paths at a node, and rows of value: deviations in y, z and absorption, -,
     amplitude."""
@@ -43,12 +43,12 @@ def _wavefront(
         near = 1.0 / n
         away = (k * qq - 2.0 * (qx * dx + qy * dy + qz * dz)) / (n + 1.0) * rate + (late[i] - steer)
         lost = nepers * away
-        place[i] = block[4 * BLOCK + i] + away
+        position[i] = block[4 * BLOCK + i] + away
         value[i] = (vy * near - uy) * sy
         value[BLOCK + i] = (vz * near - uz) * sz
         value[2 * BLOCK + i] = block[6 * BLOCK + i] + scaled * away
-        left = louder - louder * lost * (1.0 - lost * (0.5 - lost * (1.0 / 6.0)))
-        value[4 * BLOCK + i] = block[5 * BLOCK + i] * near * left
+        gain = louder - louder * lost * (1.0 - lost * (0.5 - lost * (1.0 / 6.0)))
+        value[4 * BLOCK + i] = block[5 * BLOCK + i] * near * gain
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
@@ -86,16 +86,16 @@ def _mix(weight: Any, share: Any, node: int, first: int, size: int, modes: int, 
     """Weights of modes (mode * BLOCK,) at a node: of the pulses, and of what they change by, (change * mode * BLOCK,),
     in shares (change, node, path)."""
     for s in range(share.shape[0]):
-        part = share[s, node, first : first + size]
+        factor = share[s, node, first : first + size]
         for k in range(modes):
             row = weight[(s * modes + k) * BLOCK : (s * modes + k) * BLOCK + size]
             mixed = out[k * BLOCK : k * BLOCK + size]
             if s == 0:
                 for i in range(size):
-                    mixed[i] = part[i] * row[i]
+                    mixed[i] = factor[i] * row[i]
             else:
                 for i in range(size):
-                    mixed[i] += part[i] * row[i]
+                    mixed[i] += factor[i] * row[i]
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
@@ -115,13 +115,13 @@ def _expand(value: Any, weight: Any, term_products: Any, modes: bool) -> None:
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
-def _split(place: Any, half: float, rows: int, length: int, begin: Any, row: Any, fraction: Any) -> None:
+def _split(position: Any, half: float, rows: int, length: int, begin: Any, row: Any, fraction: Any) -> None:
     """First sample of the kernel on the circle, row of its table, and place in the row, from -1/2 to 1/2."""
     for i in range(BLOCK):
-        left = np.floor(place[i] - half)
-        x = (left + 1.0 - (place[i] - half)) * rows
+        before = np.floor(position[i] - half)
+        x = (before + 1.0 - (position[i] - half)) * rows
         r = min(np.floor(x), rows - 1.0)
-        first = left + 1.0
+        first = before + 1.0
         begin[i] = int(first - np.floor(first / length) * length)
         row[i] = int(r)
         fraction[i] = x - r - 0.5
@@ -162,7 +162,7 @@ def deposit(
     """
     terms, stride = term_products.shape[0], length + lanes
     cubes = taps.size // (4 * lanes)
-    place, more, fraction = np.empty(BLOCK), np.zeros(BLOCK), np.empty(BLOCK, grid.dtype)
+    position, more, fraction = np.empty(BLOCK), np.zeros(BLOCK), np.empty(BLOCK, grid.dtype)
     begin, row = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
     value = np.empty((4 + terms) * BLOCK, grid.dtype)
     modes = (rows - ROWS) // max(share.shape[0], 1)
@@ -173,7 +173,7 @@ def deposit(
             block = table[first * rows : (first + BLOCK) * rows]
             if late.size:
                 _copy(late[m, first : first + size], more)
-            _wavefront(block, nodes[m], middle[m], scale, absorbed, rate, steer[m], level[m], more, place, value)
+            _wavefront(block, nodes[m], middle[m], scale, absorbed, rate, steer[m], level[m], more, position, value)
             if lean.size:
                 _lean(value, lean[m, 0, first : first + size], scale[0])
                 _lean(value[BLOCK:], lean[m, 1, first : first + size], scale[1])
@@ -184,7 +184,7 @@ def deposit(
                 _expand(value, mixed, term_products, True)
             else:
                 _expand(value, block[ROWS * BLOCK :], term_products, rows > ROWS)
-            _split(place, half, cubes, length, begin, row, fraction)
+            _split(position, half, cubes, length, begin, row, fraction)
             for i in range(size):
                 for lane in range(0, lanes, 8):
                     w: Any = cubics(taps, row[i] * 4 * lanes + lane, lanes, fraction[i])  # type: ignore[call-arg]
@@ -196,8 +196,8 @@ def deposit(
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
-def combine(spectra: Any, first: int, factors: Any, place: Any, power: Any, response: Any, mode: Any, out: Any) -> None:
-    """Sum over terms of spectra (node, term, bin) times real factors (node, place of term, bin) and power (term, bin).
+def combine(spectra: Any, first: int, factors: Any, pair: Any, power: Any, response: Any, mode: Any, out: Any) -> None:
+    """Sum over terms of spectra (node, term, bin) times real factors (node, pair of term, bin) and power (term, bin).
 
     Times response (mode, 2, bin) of the mode of each term (term,), real and imaginary part as in out (node, 2, bin).
     Bins of spectra count from `first`.
@@ -210,7 +210,7 @@ def combine(spectra: Any, first: int, factors: Any, place: Any, power: Any, resp
             for t in range(power.shape[0]):
                 if mode[t] == k:
                     for b in range(bins):
-                        factor = factors[m, place[t], b] * power[t, b]
+                        factor = factors[m, pair[t], b] * power[t, b]
                         re[b] += spectra[m, t, first + b].real * factor
                         im[b] += spectra[m, t, first + b].imag * factor
             if k == 0:
@@ -262,17 +262,17 @@ def steer_back(field: Any, column: Any, weight: Any, delay: Any, gain: Any, firs
     """
     c, s = np.empty(RUN, field.dtype), np.empty(RUN, field.dtype)
     bins = field.shape[2] // 2
-    here = np.empty(2 * bins, field.dtype)
+    summed = np.empty(2 * bins, field.dtype)
     for q in range(out.shape[0]):
         if gain[q] == 0.0:
             continue
-        here[:] = 0.0
+        summed[:] = 0.0
         for n in range(weight.shape[1]):
-            _accumulate(field[column[q], n], weight[q, n], here)
+            _accumulate(field[column[q], n], weight[q, n], summed)
         w = _phasors(np.exp(-2j * np.pi * delay[q]), c, s)
         start = gain[q] * np.exp(-2j * np.pi * (delay[q] * first))
         for low in range(0, bins, RUN):
             re, im = field.dtype.type(start.real), field.dtype.type(start.imag)
             high = min(low + RUN, bins)
-            _turn(here[low:high], here[bins + low : bins + high], c, s, re, im, out[q, 2 * low : 2 * high])
+            _turn(summed[low:high], summed[bins + low : bins + high], c, s, re, im, out[q, 2 * low : 2 * high])
             start *= w

@@ -20,8 +20,8 @@ from sonarsynth.signals.gridded.nodes import SpectralQuantiles, analysis, chebys
 def spectral_quantiles(frequency: Floats, spectrum: np.ndarray, highest: float) -> SpectralQuantiles:
     """Quantiles of the modulus of a spectrum over frequency, over `highest` (Hz), rounded up to a twentieth."""
     mass = np.cumsum(np.abs(spectrum))
-    found = np.interp((np.arange(8) + 0.5) / 8.0, mass / mass[-1], frequency / highest)
-    return tuple(float(np.ceil(20.0 * v - 1e-6)) / 20.0 for v in found)
+    quantiles = np.interp((np.arange(8) + 0.5) / 8.0, mass / mass[-1], frequency / highest)
+    return tuple(float(np.ceil(20.0 * v - 1e-6)) / 20.0 for v in quantiles)
 
 
 DEGREES = np.arange(13)
@@ -77,8 +77,8 @@ def _terms(
     keep.flat[0] = True
     for axis in range(4):  # the factors of each term too
         keep = np.flip(np.logical_or.accumulate(np.flip(keep, axis), axis), axis)
-    found = [(int(a), int(b), int(c), int(d)) for a, b, c, d in np.argwhere(keep)]
-    return tuple(sorted(found, key=lambda t: (sum(t), t)))
+    terms = [(int(a), int(b), int(c), int(d)) for a, b, c, d in np.argwhere(keep)]
+    return tuple(sorted(terms, key=lambda t: (sum(t), t)))
 
 
 @lru_cache(maxsize=256)
@@ -95,17 +95,17 @@ def term_products(terms: tuple[Term, ...]) -> np.ndarray:
     Columns: which term; times which factor (0 y, 1 z, 2 absorption, 3 and on the modes); and, where it is twice that
     less another (Chebyshev's recurrence, in y and z), which other, or else -1.
     """
-    place: dict[tuple[int, ...], int] = {t: n for n, t in enumerate(terms)}
+    index: dict[tuple[int, ...], int] = {t: n for n, t in enumerate(terms)}
     out = np.full((len(terms), 3), -1, np.int64)
     for n, term in enumerate(terms):
         axis = next((a for a in range(3) if term[a]), 3)
         if axis == 3:
             out[n, 1] = 3 + term[3]
             continue
-        one, two = (tuple(d - less * (a == axis) for a, d in enumerate(term)) for less in (1, 2))
-        out[n, :2] = place[one], axis
+        previous, before = (tuple(d - less * (a == axis) for a, d in enumerate(term)) for less in (1, 2))
+        out[n, :2] = index[previous], axis
         if axis < 2 and term[axis] > 1:
-            out[n, 2] = place[two]
+            out[n, 2] = index[before]
     return out
 
 

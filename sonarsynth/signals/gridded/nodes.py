@@ -79,9 +79,9 @@ def _waves(x: Floats, axis: Axis) -> Floats:
     point, weight = _gauss(ceil(WIDER * axis.phase) + 16)
     k = 0.5 * WIDER * (1.0 + point)
     weight = weight * np.mean([(k < WIDER * w) / w for w in axis.weights], axis=0)
-    some = weight > 0.0
-    angle = np.outer(x, axis.phase * k[some])
-    return np.asarray(np.concatenate([np.cos(angle), np.sin(angle)], axis=1) * np.sqrt(np.tile(weight[some], 2)))
+    positive = weight > 0.0
+    angle = np.outer(x, axis.phase * k[positive])
+    return np.asarray(np.concatenate([np.cos(angle), np.sin(angle)], axis=1) * np.sqrt(np.tile(weight[positive], 2)))
 
 
 @lru_cache(maxsize=256)
@@ -102,12 +102,12 @@ def _errors(axis: Axis, phase: float, weights: SpectralQuantiles) -> tuple[float
     k = np.linspace(0.0, 1.0, 17 + 2 * int(phase))
     at, onto = chebyshev(axis.nodes), interpolation(x, axis)
     waves, angles = [np.exp(1j * phase * np.outer(y, k)) for y in (x, at)], [np.arccos(y) for y in (x, at)]
-    found = []
+    errors = []
     for d in range(DEGREES):
-        here, there = (np.cos(d * angle)[:, None] * wave for angle, wave in zip(angles, waves, strict=True))
-        most = np.maximum.accumulate(np.abs(here - onto @ there).max(axis=0))
-        found.append(float(np.interp(weights, k, most).mean()))
-    return tuple(found)
+        exact, at_nodes = (np.cos(d * angle)[:, None] * wave for angle, wave in zip(angles, waves, strict=True))
+        worst = np.maximum.accumulate(np.abs(exact - onto @ at_nodes).max(axis=0))
+        errors.append(float(np.interp(weights, k, worst).mean()))
+    return tuple(errors)
 
 
 @lru_cache(maxsize=1)

@@ -142,8 +142,8 @@ class _Trial:
 def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     if paths.size == 1:
         return _Trial(_alone(paths, views.front, aim), None)
-    whole = paths.size == views.front.count
-    columns = views.columns if whole else np.take(views.columns, paths, axis=1)
+    all_paths = paths.size == views.front.count
+    columns = views.columns if all_paths else np.take(views.columns, paths, axis=1)
     low, high = columns.min(axis=1), columns.max(axis=1)
     over = rest(views.front, paths, aim.changes, 0.1 * aim.tolerance)
     reference = reference_of(views.front, 0.5 * (low + high), over.phase_terms, over.delay_variance_terms)
@@ -164,7 +164,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
         paths=paths.size,
         phase=tuple(phase.tolist()),
         drift=_drift(reference, aim),
-        degrees=degrees(views.amplitude if whole else np.take(views.amplitude, paths, axis=1)),
+        degrees=degrees(views.amplitude if all_paths else np.take(views.amplitude, paths, axis=1)),
         turn=turn,
         decay=NEPER * (loss * aim.steepest + farther * aim.fading),
         modes=sizes,
@@ -200,8 +200,8 @@ def _cheapest(extent: _Extent, aim: TileSettings) -> tuple[Axes | None, tuple[Te
     )
 
     def work(nodes: int) -> float:
-        each = extent.paths * (8.0 + 0.6 * len(terms)) + len(terms) * (1.4 * aim.circle + 2.5 * bins)
-        return nodes * each + 2.0 * sensors * bins + 4e5
+        per_node = extent.paths * (8.0 + 0.6 * len(terms)) + len(terms) * (1.4 * aim.circle + 2.5 * bins)
+        return nodes * per_node + 2.0 * sensors * bins + 4e5
 
     own, nodes = work(sensors), x.nodes * y.nodes * z.nodes
     few = max(x.nodes, y.nodes, z.nodes) <= MOST_NODES
@@ -216,10 +216,10 @@ def _halves(paths: Ints, views: _Views, aim: TileSettings) -> tuple[Ints, Ints] 
     front = views.front
     size = np.append(views.probes.size + aim.elements.face, 0.5 * front.aperture**2)
     weight = np.append(2.0 * np.pi * aim.highest / front.sound_speed * size, NEPER * aim.steepest)
-    where = np.take(views.columns[:5], paths, axis=1)
-    low, high = where.min(axis=1), where.max(axis=1)
+    values = np.take(views.columns[:5], paths, axis=1)
+    low, high = values.min(axis=1), values.max(axis=1)
     axis = int(np.argmax((high - low) * weight))
-    right = where[axis] > 0.5 * (low[axis] + high[axis])
+    right = values[axis] > 0.5 * (low[axis] + high[axis])
     if not right.any():
         return None
     return paths[~right], paths[right]
@@ -234,8 +234,8 @@ def tiles(front: ArrayPaths, aim: TileSettings) -> list[Tile]:
     if not missed.any() or missed.all():
         return _tiles(front, aim, bool(missed.any()))
     rows = [np.flatnonzero(~missed), np.flatnonzero(missed)]
-    found = [(some, _tiles(front.select(some), aim, n == 1)) for n, some in enumerate(rows)]
-    return [replace(tile, paths=some[tile.paths]) for some, made in found for tile in made]
+    groups = [(group, _tiles(front.select(group), aim, n == 1)) for n, group in enumerate(rows)]
+    return [replace(tile, paths=group[tile.paths]) for group, of_group in groups for tile in of_group]
 
 
 def _tiles(front: ArrayPaths, aim: TileSettings, missed: bool) -> list[Tile]:
@@ -248,13 +248,13 @@ def _tiles(front: ArrayPaths, aim: TileSettings, missed: bool) -> list[Tile]:
         return _best(trial, views, aim, patient=True)
     best = [trial.tile] if _alone_pays(trial.tile, front, aim) else _best(trial, views, aim, patient=True)
     gradient = aperture_gradient(front, _probes(aim.elements, True).points)
-    found: list[Tile] = []
+    chosen: list[Tile] = []
     for tile in best:  # halving seldom leads to single paths
         alone = (
             [_alone(path[None], front, aim, gradient) for path in tile.paths] if _alone_pays(tile, front, aim) else []
         )
-        found += alone or [tile]
-    return found
+        chosen += alone or [tile]
+    return chosen
 
 
 def _alone_pays(tile: Tile, front: ArrayPaths, aim: TileSettings) -> bool:

@@ -47,9 +47,9 @@ class Lattice:
 
     def used(self, lags: tuple[int, int]) -> Bools:
         """Which lags (2 ly, 2 lz), in the order of an FFT, there are between its sensors."""
-        there = np.zeros((2 * lags[0], 2 * lags[1]))
-        there[tuple(np.transpose(self.places))] = 1.0
-        return np.asarray(ifft2(np.abs(fft2(there)) ** 2).real > 0.5)
+        occupied = np.zeros((2 * lags[0], 2 * lags[1]))
+        occupied[tuple(np.transpose(self.places))] = 1.0
+        return np.asarray(ifft2(np.abs(fft2(occupied)) ** 2).real > 0.5)
 
     @cached_property
     def extent(self) -> float:
@@ -81,10 +81,10 @@ def periodic_field(directions: NoiseDirections, lattice: Lattice, low: float, hi
     """The field over a band (Hz); None where no periodic field is near enough, or it takes too much memory."""
     step = STEP * lattice.sound_speed / (2.0 * np.pi * max(lattice.extent, lattice.pitch))
     knots = np.linspace(low, high, 2 + int((high - low) / step))
-    some = knots[:: max(1, (knots.size - 1) // 3)]
+    sampled = knots[:: max(1, (knots.size - 1) // 3)]
     for more in TORUS:
         lags = _lags(lattice, more)
-        error = _powers(directions, lattice, some, lags)[1]
+        error = _powers(directions, lattice, sampled, lags)[1]
         if error < GOOD:
             break
     if knots.size * 4 * lags[0] * lags[1] > POWERS or error > FAIR:
@@ -115,8 +115,8 @@ def _powers(
         back = 0.5 if half else toward[:, 0] < 0.0
         weight = weight * (1.0 - back * (1.0 - lattice.behind**2))
         covariance = lag_covariance(toward, weight, (turn, turn), k * lattice.face, lags)
-        found, error = periodic_powers(np.where(away <= reach, covariance, 0.0), used, ROUNDS)
-        powers[n], worst = found, max(worst, error)
+        spectrum, error = periodic_powers(np.where(away <= reach, covariance, 0.0), used, ROUNDS)
+        powers[n], worst = spectrum, max(worst, error)
     return powers, worst
 
 
@@ -143,19 +143,19 @@ def draw(
     """Spectra (sensor, bin) at frequencies (bin,) Hz: of noise of 1 Pa2/Hz at a point, the power of the real part and
     that of the imaginary part are the sensor's own share, 1 at most."""
     knots, powers = field.frequency, field.powers
-    place = np.clip((frequency - knots[0]) / (knots[1] - knots[0]), 0.0, knots.size - 1.000001)
-    low = place.astype(int)
-    part = (place - low).astype(np.float32)[:, None, None]
+    position = np.clip((frequency - knots[0]) / (knots[1] - knots[0]), 0.0, knots.size - 1.000001)
+    low = position.astype(int)
+    fraction = (position - low).astype(np.float32)[:, None, None]
     out = np.empty((elements.count, frequency.size), np.complex64)
     y, z = elements.columns - 1 - elements.column, elements.rows - 1 - elements.row  # y and z rise with them
     scale = np.float32(np.sqrt(powers[0].size))  # of ifft
     many = max(1, BLOCK // powers[0].size)
     for first in range(0, frequency.size, many):
-        some = slice(first, first + many)
-        wave = random.standard_normal((part[some].shape[0], *powers.shape[1:], 2), np.float32).view(np.complex64)[
+        bins = slice(first, first + many)
+        wave = random.standard_normal((fraction[bins].shape[0], *powers.shape[1:], 2), np.float32).view(np.complex64)[
             ..., 0
         ]
-        wave *= np.sqrt((1.0 - part[some]) * powers[low[some]] + part[some] * powers[low[some] + 1]) * scale
+        wave *= np.sqrt((1.0 - fraction[bins]) * powers[low[bins]] + fraction[bins] * powers[low[bins] + 1]) * scale
         near = ifft(wave, axis=1)[:, : elements.columns]
-        out[:, some] = ifft(near, axis=2)[:, y, z].T
+        out[:, bins] = ifft(near, axis=2)[:, y, z].T
     return out

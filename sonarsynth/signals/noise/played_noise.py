@@ -72,8 +72,8 @@ def add_played_noise(
     for number in range(int(np.floor(first / STRETCH)), int(np.floor((last + CROSSFADE) / STRETCH)) + 1):
         begin = int(np.floor((number * STRETCH - 0.5 * CROSSFADE - first) * fs)) - spare  # of its own samples
         own = np.arange(begin, begin + size)
-        there = (own >= 0) & (own < length)
-        piece = np.where(there, played[np.clip(own, 0, length - 1)], 0.0) * _fade(first + own / fs, number)
+        inside = (own >= 0) & (own < length)
+        piece = np.where(inside, played[np.clip(own, 0, length - 1)], 0.0) * _fade(first + own / fs, number)
         toward = _direction(noise, pose, even(number))
         sent = rfft(piece)[bins] * element_directivity(f, toward, elements.face, sound_speed)
         sent *= sonar.behind if toward[0] < 0.0 else 1.0
@@ -107,6 +107,6 @@ def _direction(noise: RecordedNoise, pose: Pose, even: Floats) -> Floats:
 
 def _fade(clock: Floats, number: int) -> Floats:
     """Gain (sample,) of a stretch: those of all stretches add up to one."""
-    since, left = clock - number * STRETCH, (number + 1) * STRETCH - clock
-    rise, fall = (np.clip(t / CROSSFADE + 0.5, 0.0, 1.0) for t in (since, left))
+    since, until = clock - number * STRETCH, (number + 1) * STRETCH - clock
+    rise, fall = (np.clip(t / CROSSFADE + 0.5, 0.0, 1.0) for t in (since, until))
     return np.asarray(np.sin(0.5 * np.pi * rise) ** 2 * np.sin(0.5 * np.pi * fall) ** 2)

@@ -51,16 +51,16 @@ def draw(
     count = waves(elements.count)
     many = max(TOGETHER // (count * elements.count), 1)
     for first in range(0, frequency.size, many):
-        some = slice(first, first + many)
-        each = [(random.random((count, 2)), random.standard_normal((count, 2))) for _ in frequency[some]]
-        even, normal = (np.stack(part) for part in zip(*each, strict=True))
+        bins = slice(first, first + many)
+        draws = [(random.random((count, 2)), random.standard_normal((count, 2))) for _ in frequency[bins]]
+        even, normal = (np.stack(column) for column in zip(*draws, strict=True))
         toward = pose.turn_to_body(drawn(directions.intensity, directions.edges, even))  # (bin, wave, xyz)
         amplitude = (normal[..., 0] + 1j * normal[..., 1]) / np.sqrt(count)
-        amplitude *= element_directivity(frequency[some, None], toward, elements.face, sound_speed)
+        amplitude *= element_directivity(frequency[bins, None], toward, elements.face, sound_speed)
         amplitude *= np.where(toward[..., 0] < 0.0, behind, 1.0)
         along = np.swapaxes(toward @ elements.position.T, 1, 2)  # (bin, sensor, wave)
-        turns = (wave_number[some, None, None] * along).astype(np.float32)
+        turns = (wave_number[bins, None, None] * along).astype(np.float32)
         phasors = np.empty(turns.shape, np.complex64)
         phasors.real, phasors.imag = np.cos(turns), np.sin(turns)  # the exponential takes ten times as long
-        out[:, some] = (phasors @ amplitude.astype(np.complex64)[..., None])[..., 0].T
+        out[:, bins] = (phasors @ amplitude.astype(np.complex64)[..., None])[..., 0].T
     return out

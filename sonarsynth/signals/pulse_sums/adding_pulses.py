@@ -41,9 +41,9 @@ def _blocks(places: bytes) -> tuple[Ints, tuple[tuple[Ints, Floats, float], ...]
             return order, tuple(levels)
         finer = [0]
         for a, b in pairwise(bounds):
-            some = position[order[a:b]]
-            axis = int(np.argmax(np.ptp(some, axis=0)))
-            order[a:b] = order[a:b][np.argsort(some[:, axis], kind="stable")]
+            points = position[order[a:b]]
+            axis = int(np.argmax(np.ptp(points, axis=0)))
+            order[a:b] = order[a:b][np.argsort(points[:, axis], kind="stable")]
             finer += [(a + b) // 2, b] if b - a > 1 else [b]
         bounds = finer
 
@@ -51,7 +51,7 @@ def _blocks(places: bytes) -> tuple[Ints, tuple[tuple[Ints, Floats, float], ...]
 def add_arrivals(
     flat: npt.NDArray[np.float32],
     length: int,
-    some: PulseArrivals,
+    arrivals: PulseArrivals,
     modes: PulseModes,
     *,
     louder: Floats | float,
@@ -66,35 +66,36 @@ def add_arrivals(
     """
     from sonarsynth.signals.pulse_sums.pulse_kernels import add_pulses
 
-    speed = some.sound_speed
+    speed = arrivals.sound_speed
     order, levels = sensor_blocks(elements)
-    before = np.broadcast_to(some.before, some.delay.shape)
-    place = some.direction * some.length[:, None]
+    before = np.broadcast_to(arrivals.before, arrivals.delay.shape)
+    source = arrivals.direction * arrivals.length[:, None]
     turns = np.pi * modes.frequency[0] * elements.face / speed
-    level = np.zeros(len(some.delay), int)
+    level = np.zeros(len(arrivals.delay), int)
     for number, (_, _, radius) in enumerate(levels[:-1]):
-        level[turns * radius > turn * some.length] = number + 1
+        level[turns * radius > turn * arrivals.length] = number + 1
     position = elements.position[order].T.ravel()
     for number, (bounds, middle, _) in enumerate(levels):
         rows = np.flatnonzero(level == number)
         if not rows.size:
             continue
-        rows = rows[np.argsort(some.delay[rows], kind="stable")]  # neighbours in time are neighbours in memory
+        rows = rows[np.argsort(arrivals.delay[rows], kind="stable")]  # neighbours in time are neighbours in memory
         row, block = np.repeat(rows, len(middle)), np.tile(np.arange(len(middle)), rows.size)
-        towards = place[row] - middle[block]
+        towards = source[row] - middle[block]
         away = np.maximum(np.linalg.norm(towards, axis=1), CAVITY)
         shape = shape_of(
-            modes.frequency, towards / away[:, None], away + before[row], some.delay_std[row], absorption,
+            modes.frequency, towards / away[:, None], away + before[row], arrivals.delay_std[row], absorption,
             elements.face, speed,
         )  # fmt: skip
-        weight = (louder * some.gain)[row, None] * (shape @ modes.shapes.T)
-        phase = some.phase[row, None]
-        turned = bool(some.phase.any())
+        weight = (louder * arrivals.gain)[row, None] * (shape @ modes.shapes.T)
+        phase = arrivals.phase[row, None]
+        turned = bool(arrivals.phase.any())
         weight = np.hstack([weight * np.cos(phase), weight * np.sin(phase)]) if turned else weight
         table = modes.table if turned else modes.table[: len(modes.shapes)]
-        start = (some.delay[row] - origin) * rate - modes.before
+        start = (arrivals.delay[row] - origin) * rate - modes.before
         taps = table.shape[1] // (FRACTIONS + 1)
         add_pulses(
             table.ravel(), taps, FRACTIONS, weight.astype(np.float32), bounds[:-1][block], bounds[1:][block],
-            place[row], some.length[row], start, position, float(rate), 1.0 / speed, CAVITY, length, length + 1, flat,
+            source[row], arrivals.length[row], start, position, float(rate), 1.0 / speed, CAVITY, length, length + 1,
+            flat,
         )  # fmt: skip

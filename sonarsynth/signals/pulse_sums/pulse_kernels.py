@@ -21,24 +21,24 @@ def _mix(modes: Any, weight: Any, size: int, table: Any) -> None:
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
 def add_pulses(
-    modes: Any, taps: int, fractions: int, weight: Any, first: Any, last: Any, place: Any, length: Any, start: Any,
+    modes: Any, taps: int, fractions: int, weight: Any, first: Any, last: Any, source: Any, length: Any, start: Any,
     position: Any, rate: float, slowness: float, cavity: float, samples: int, pitch: int, out: Any,
 ) -> None:  # fmt: skip
     """Add the pulse of every row at the sensors first to last (row,) to out (sensor * pitch,), so many samples each.
 
     The pulse is the sum of modes (mode * fraction * tap,) times weight (row, mode): at the fractions of a sample before
-    each tap, linear in between, one fraction more than `fractions`. place (row, xyz) m is where its wave seems to come
-    from, length (row,) m how far that is from the middle of the array, where the first tap is at start (row,) in
+    each tap, linear in between, one fraction more than `fractions`. source (row, xyz) m is where its wave seems to
+    come from, length (row,) m how far that is from the middle of the array, where the first tap is at start (row,) in
     samples. position (xyz * sensor,) m; rate in samples/s, slowness in s/m; nearer than `cavity` (m) it is no louder.
     """
     sensors, size, number = position.size // 3, (fractions + 1) * taps, modes.dtype.type
     table = np.zeros(size, modes.dtype)
-    begin, part = np.empty(sensors, np.int32), np.empty(sensors, np.int32)
+    begin, fraction = np.empty(sensors, np.int32), np.empty(sensors, np.int32)
     v, w = np.empty(sensors, modes.dtype), np.empty(sensors, modes.dtype)
     scale = rate * slowness
     for row in range(start.size):
         _mix(modes, weight[row], size, table)
-        px, py, pz, r = place[row, 0], place[row, 1], place[row, 2], length[row]
+        px, py, pz, r = source[row, 0], source[row, 1], source[row, 2], length[row]
         for s in range(first[row], last[row]):
             qx, qy, qz = position[s], position[sensors + s], position[2 * sensors + s]
             x, y, z = px - qx, py - qy, pz - qz
@@ -48,11 +48,11 @@ def add_pulses(
             after = np.floor(at) + 1.0
             x = (after - at) * fractions
             n = min(np.floor(x), fractions - 1.0)
-            begin[s], part[s] = np.int32(after), np.int32(n)
+            begin[s], fraction[s] = np.int32(after), np.int32(n)
             w[s] = number((x - n) * gain)
             v[s] = number(gain) - w[s]
         for s in range(first[row], last[row]):
             if begin[s] >= 0 and begin[s] + taps <= samples:
-                line, value = s * pitch + begin[s], part[s] * taps
+                line, value = s * pitch + begin[s], fraction[s] * taps
                 for j in range(0, taps, WIDTH):
                     add_two(out, line + j, table, value + j, v[s], value + taps + j, w[s])  # type: ignore[call-arg]

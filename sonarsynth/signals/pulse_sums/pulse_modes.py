@@ -51,12 +51,12 @@ def shape_of(
     speed: float,
 ) -> Floats:
     """What is left (path, bin) of each frequency: absorption (bin,) in dB/m, roughness, and the face of a sensor."""
-    left = np.exp(-NEPER * np.multiply.outer(length, absorption))
+    factor = np.exp(-NEPER * np.multiply.outer(length, absorption))
     if delay_std.any():
-        left *= np.exp(-0.5 * (2.0 * np.pi * np.multiply.outer(delay_std, frequency)) ** 2)
+        factor *= np.exp(-0.5 * (2.0 * np.pi * np.multiply.outer(delay_std, frequency)) ** 2)
     if face > 0.0:
-        left *= element_directivity(frequency, direction[:, None, :], face, speed)
-    return np.asarray(left, float)
+        factor *= element_directivity(frequency, direction[:, None, :], face, speed)
+    return np.asarray(factor, float)
 
 
 def at_frequencies(frequency: Floats, nodes: Floats, values: Floats) -> Floats:
@@ -73,21 +73,21 @@ def shapes_of(nodes: Floats, band: float, face: float, speed: float, absorption:
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     length = FARTHEST ** random.random(SAMPLED)
     delay_std = np.maximum(random.random(SAMPLED) - 0.5, 0.0) / (np.pi * band)
-    some = shape_of(nodes, towards, length, delay_std, absorption, face, speed)
-    _, size, shapes = np.linalg.svd(some, full_matrices=False)
-    left = np.sqrt(np.cumsum((size**2)[::-1])[::-1] / np.sum(size**2))
-    shapes = shapes[: int(np.sum(left > TOLERANCE))]
-    return shapes, np.abs(some @ shapes.T).max(axis=0)
+    sampled = shape_of(nodes, towards, length, delay_std, absorption, face, speed)
+    _, size, shapes = np.linalg.svd(sampled, full_matrices=False)
+    remainder = np.sqrt(np.cumsum((size**2)[::-1])[::-1] / np.sum(size**2))
+    shapes = shapes[: int(np.sum(remainder > TOLERANCE))]
+    return shapes, np.abs(sampled @ shapes.T).max(axis=0)
 
 
 def tabulated(
-    bare: ComplexArray, samples: int, fine: float, nodes: Floats, made: tuple[Floats, Floats], turned: bool = True
+    bare: ComplexArray, samples: int, fine: float, nodes: Floats, basis: tuple[Floats, Floats], turned: bool = True
 ) -> PulseModes:
     """The modes of a pulse of this spectrum (bin,), up to where that ends, on `samples` of a grid of `fine` (Hz).
 
-    made: of `shapes_of`, at frequencies `nodes` (Hz); not turned: without Hilbert transforms.
+    basis: of `shapes_of`, at frequencies `nodes` (Hz); not turned: without Hilbert transforms.
     """
-    (shapes, weight), ways = made, 1 + turned
+    (shapes, weight), ways = basis, 1 + turned
     frequency = np.asarray(np.arange(len(bare)) * (fine / samples), float)
     spectrum = np.zeros((1 + ways * len(shapes), samples // 2 + 1), complex)
     spectrum[0, : len(bare)] = bare

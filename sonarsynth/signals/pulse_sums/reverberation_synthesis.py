@@ -48,11 +48,11 @@ def impulse_modes(sonar: Sonar, face: float, speed: float, absorption: tuple[flo
     """The modes of an impulse of 1 Pa s; absorption: dB/m at as many frequencies."""
     rate = sonar.sampling_frequency * grid_factor(sonar)
     passing, fine, nodes = _passing(sonar), rate * FRACTIONS, node_frequencies(sonar, FEWER)
-    made = shapes_of(nodes, sonar.band.centre, face, speed, np.array(absorption))
+    basis = shapes_of(nodes, sonar.band.centre, face, speed, np.array(absorption))
     samples = int(next_fast_len(int(4.0 * (filters.duration(passing) + GUARD) * fine), real=True))
     frequency = np.arange(int((passing.high + 0.5 * passing.transition) * samples / fine) + 1) * (fine / samples)
     bare = filters.response(frequency, passing) / rate
-    return tabulated(bare.astype(complex), samples, fine, nodes, made, turned=False)
+    return tabulated(bare.astype(complex), samples, fine, nodes, basis, turned=False)
 
 
 def spare_times(
@@ -90,10 +90,10 @@ def reverberation_pressure(
     for number in np.unique(emission):
         length = times * count
         flat = np.zeros(elements.count * (length + 1), np.float32)
-        some, louder = arrivals.select(emission == number), float(gains[number])
+        group, louder = arrivals.select(emission == number), float(gains[number])
         origin = start - early / rate
         add_arrivals(
-            flat, length, some, modes, louder=louder, elements=elements, rate=rate * times,
+            flat, length, group, modes, louder=louder, elements=elements, rate=rate * times,
             absorption=np.array(lost), origin=origin, turn=FACES_TURN,
         )  # fmt: skip
         spectrum = rfft(flat.reshape(elements.count, -1)[:, :length], axis=1)[:, : count // 2 + 1]
