@@ -99,9 +99,9 @@ class Attribution:
 
 
 def attribution(
-    arrivals: Arrivals, band: Band, listening: SonarTiming, beam: Floats, late: Floats, most: Floats
+    arrivals: Arrivals, band: Band, listening: SonarTiming, beam: Floats, late: Floats, beam_energy: Floats
 ) -> Attribution:
-    """Whose energy beams (point, xyz) hold at delays (point,) s after the clock; most: (point,) Pa2 s in each beam.
+    """Whose energy beams (point, xyz) hold at delays (point,) s after the clock; beam_energy (point,): Pa2 s.
 
     The snap itself, not by a target, is taken to bring no more than echoes leave of that: the sonar may have taken it
     out (`ranging.WavefrontCancelling`).
@@ -114,12 +114,12 @@ def attribution(
     across = gate + reach * _apart(slowness * arrivals.direction, beam)
     window = np.array([[-1.0], [1.0]]) * (across + longer)
     ends = np.searchsorted(np.sort(moment), arrivals.delay + window)
-    some = np.flatnonzero(_loud(arrivals, len(band.energy)) & (ends[1] > ends[0]))
-    paths = arrivals.select(some[np.argsort(arrivals.delay[some], kind="stable")])
+    audible = np.flatnonzero(_loud(arrivals, len(band.energy)) & (ends[1] > ends[0]))
+    paths = arrivals.select(audible[np.argsort(arrivals.delay[audible], kind="stable")])
     first, last = np.searchsorted(paths.delay, moment + window)
     _, example, group = np.unique(_code(paths, len(band.energy)), return_index=True, return_inverse=True)
     groups = paths.target[example], paths.snap[example], paths.arrives_by[example], paths.lit_by[example]
-    if not len(some):
+    if not len(audible):
         none = np.zeros((len(beam), 0))
         owner, share = np.full(len(beam), NO_TARGET), np.zeros((len(beam), 1))
         return Attribution(paths, first, *groups, none, none, owner, share)
@@ -127,10 +127,10 @@ def attribution(
     fine = band.sliced(min(2.0 * width * across, MOST_BINS))
     focus = 0.0 if listening.focus is None else 1.0 / listening.focus
     curvature, pulse = 1.0 / paths.radius, fine.energy[groups[1]]
-    found = kernels.attribute(
+    columns = kernels.attribute(
         beam,
         moment,
-        0.5 * most,  # at positive frequencies
+        0.5 * beam_energy,  # at positive frequencies
         first,
         last,
         paths.direction,
@@ -150,7 +150,7 @@ def attribution(
         reach,
         pattern_of(elements, listening.sound_speed, curvature, focus, band.high),
     )
-    return Attribution(paths, first, *groups, found[0], 2.0 * found[1], *found[2:])
+    return Attribution(paths, first, *groups, columns[0], 2.0 * columns[1], *columns[2:])
 
 
 def _code(paths: Arrivals, snaps: int) -> Ints:
@@ -173,11 +173,11 @@ def _loud(arrivals: Arrivals, snaps: int) -> Bools:
     return loud
 
 
-def _apart(one: Floats, other: Floats) -> float:
+def _apart(vectors: Floats, others: Floats) -> float:
     """Bound on how far vectors (row, xyz) are from others, two at most."""
-    if not (len(one) and len(other)):
+    if not (len(vectors) and len(others)):
         return 0.0
-    far = np.maximum(one.max(axis=0) - other.min(axis=0), other.max(axis=0) - one.min(axis=0))
+    far = np.maximum(vectors.max(axis=0) - others.min(axis=0), others.max(axis=0) - vectors.min(axis=0))
     return min(float(np.linalg.norm(far)), 2.0)
 
 
@@ -203,9 +203,9 @@ def _spectra(paths: Arrivals, elements: Elements, band: Band) -> kernels.Complex
     )
     shaped = paths.coherent | paths.corner_delays.any(axis=1) | (paths.coherent_fraction > 0.0)
     if shaped.any():
-        some = paths.select(shaped)
+        echo = paths.select(shaped)
         shape = facet_response(
-            frequency, some.coherent, some.corner_delays, some.coherent_fraction, some.height_delay_std, some.centre
+            frequency, echo.coherent, echo.corner_delays, echo.coherent_fraction, echo.height_delay_std, echo.centre
         )
         spectra[shaped] *= shape
     return spectra

@@ -28,7 +28,7 @@ def echo_levels(arrivals: Arrivals, powers: Powers, targets: int, snap_level: Fl
     audible = total > 0.0
     level[audible] = 10.0 * np.log10(total[audible])
     mean = np.stack(sums, axis=1)[audible] / total[audible, None]
-    one = np.linalg.norm(mean, axis=1) > ONE_SIDE
-    sided = np.flatnonzero(audible)[one]
-    azimuth[sided], elevation[sided] = azimuth_elevation(mean[one])
+    clear = np.linalg.norm(mean, axis=1) > ONE_SIDE
+    sided = np.flatnonzero(audible)[clear]
+    azimuth[sided], elevation[sided] = azimuth_elevation(mean[clear])
     return Echoes(azimuth.reshape(shape), elevation.reshape(shape), level.reshape(shape))

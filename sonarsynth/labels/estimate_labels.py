@@ -35,12 +35,12 @@ def direct_paths(arrivals: Arrivals, envelope: Callable[[int, float], float]) ->
     its pulse peaks in the band, s after its collapse.
     """
     chosen = arrivals.seen_from_centre
-    kept = chosen.direct & (chosen.surface == 0) & (chosen.bottom == 0)
-    some = chosen.select(kept)
-    order = np.lexsort((some.delay, some.snap))
-    snap = some.snap[order]
-    late = [envelope(int(n), float(loss)) for n, loss in zip(snap, some.absorption[order], strict=True)]
-    return Direct(snap, some.delay[order] + np.array(late), some.direction[order])
+    direct = chosen.direct & (chosen.surface == 0) & (chosen.bottom == 0)
+    paths = chosen.select(direct)
+    order = np.lexsort((paths.delay, paths.snap))
+    snap = paths.snap[order]
+    late = [envelope(int(n), float(loss)) for n, loss in zip(snap, paths.absorption[order], strict=True)]
+    return Direct(snap, paths.delay[order] + np.array(late), paths.direction[order])
 
 
 def heard_first(direct: Direct, snaps: int) -> tuple[Floats, Floats, Floats]:
@@ -59,13 +59,13 @@ def emissions(estimates: SourceEstimates, direct: Direct, bandwidth: float, beam
     (1/`bandwidth`, Hz) and direction (`beam`, rad: half-power beam width). Nearest: by both, in those units. An image
     in surface or bottom, or an echo, is no snap.
     """
-    found = np.full(len(estimates.time), NO_TARGET)
+    emission = np.full(len(estimates.time), NO_TARGET)
     if not len(direct.snap):
-        return found
+        return emission
     with np.errstate(invalid="ignore"):
-        seen = towards(estimates.azimuth, estimates.elevation)
+        pointing = towards(estimates.azimuth, estimates.elevation)
         late = np.abs(estimates.time[:, None] - direct.time)
-        aside = np.linalg.norm(seen[:, None] - direct.direction, axis=2)
+        aside = np.linalg.norm(pointing[:, None] - direct.direction, axis=2)
         turned = np.hypot(estimates.azimuth_error * np.cos(estimates.elevation), estimates.elevation_error)
         far = np.hypot(
             late / (SIGMAS * estimates.time_error + PULSES / bandwidth)[:, None],
@@ -73,6 +73,6 @@ def emissions(estimates: SourceEstimates, direct: Direct, bandwidth: float, beam
         )
     far = np.where(np.isfinite(far), far, np.inf)
     nearest = far.argmin(axis=1)
-    near: Bools = far[np.arange(len(found)), nearest] <= 1.0
-    found[near] = direct.snap[nearest[near]]
-    return found
+    near: Bools = far[np.arange(len(emission)), nearest] <= 1.0
+    emission[near] = direct.snap[nearest[near]]
+    return emission

@@ -36,12 +36,12 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     medium = context.medium
     connect = partial(propagation.direct.connect, medium.profile, medium.depth)
     bent = connect if propagation.bends else None
-    seen = [appearance(body, bodies, sonar_pose, bent) for body in bodies]
-    target, facet, distance = _label_beams(bodies, [one.corners for one in seen], beams, sonar_pose, bent is None)
+    appearances = [appearance(body, bodies, sonar_pose, bent) for body in bodies]
+    target, facet, distance = _label_beams(bodies, [a.corners for a in appearances], beams, sonar_pose, bent is None)
     tracks = [body.track if context.receiver.track else body.frozen.track for body in bodies]
     met = meeting_times(tracks, context.snaps, partial(_direct_times, connect))
     lit = [
-        [lit_fraction(body, one.visible, bodies, snap, medium, bent) for body, one in zip(bodies, seen, strict=True)]
+        [lit_fraction(b, a.visible, bodies, snap, medium, bent) for b, a in zip(bodies, appearances, strict=True)]
         for snap in context.snaps
     ]
     return Truth(
@@ -53,8 +53,8 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
         meeting_time=met,
         position_at_echo=positions(tracks, met),
         **_oriented(bodies, sonar_pose),
-        **_boxes(bodies, seen, sonar_pose, beams),
-        visible_fraction=np.array([one.fraction for one in seen]),
+        **_boxes(bodies, appearances, sonar_pose, beams),
+        visible_fraction=np.array([a.fraction for a in appearances]),
         lit_fraction=np.array(lit, float).reshape(len(context.snaps), len(bodies)),
         snap_position=_rows([s.position for s in context.snaps], 3),
         snap_time=np.array([s.time for s in context.snaps]),
@@ -63,7 +63,7 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
         beam_facet=facet,
         beam_range=distance,
         beam_coverage=coverage(
-            [(one.corners, b.mesh.faces, one.boxes, b.mesh.closed) for b, one in zip(bodies, seen, strict=True)], beams
+            [(a.corners, b.mesh.faces, a.boxes, b.mesh.closed) for b, a in zip(bodies, appearances, strict=True)], beams
         ),
     )
 
@@ -81,28 +81,28 @@ def _oriented(bodies: tuple[PlacedTarget, ...], sonar_pose: Pose) -> dict[str, A
 
 
 def _boxes(
-    bodies: tuple[PlacedTarget, ...], seen: list[Appearance], sonar_pose: Pose, beams: BeamGrid
+    bodies: tuple[PlacedTarget, ...], appearances: list[Appearance], sonar_pose: Pose, beams: BeamGrid
 ) -> dict[str, Any]:
     """Columns of `Truth` of boxes in azimuth and elevation, of what is in view of bodies as they are seen."""
-    views, straight, truncated, there = [], [], [], []
-    for body, one in zip(bodies, seen, strict=True):
-        faces = body.mesh.faces[one.visible]
-        found = box_in_view(one.corners, faces, beams, one.boxes[one.visible])
-        views.append(found)
-        truncated.append(truncation(one.corners, faces, found.view, beams))
-        true = sonar_pose.to_body(body.pose.to_world(body.mesh.vertices)) if one.bent else one.corners
-        straight.append(box_in_view(true, faces, beams).bounds if one.bent else found.bounds)
-        within = found.view <= View.PARTLY_IN_VIEW
-        if not within:  # what no ray or another body hides may be there all the same
-            within = box_in_view(one.corners, body.mesh.faces, beams, one.boxes).view <= View.PARTLY_IN_VIEW
-        there.append(within)
+    views, straight, truncated, in_view = [], [], [], []
+    for body, apparent in zip(bodies, appearances, strict=True):
+        faces = body.mesh.faces[apparent.visible]
+        box = box_in_view(apparent.corners, faces, beams, apparent.boxes[apparent.visible])
+        views.append(box)
+        truncated.append(truncation(apparent.corners, faces, box.view, beams))
+        true = sonar_pose.to_body(body.pose.to_world(body.mesh.vertices)) if apparent.bent else apparent.corners
+        straight.append(box_in_view(true, faces, beams).bounds if apparent.bent else box.bounds)
+        within = box.view <= View.PARTLY_IN_VIEW
+        if not within:  # what no ray or another body hides may be in view all the same
+            within = box_in_view(apparent.corners, body.mesh.faces, beams, apparent.boxes).view <= View.PARTLY_IN_VIEW
+        in_view.append(within)
     return {
-        "image_box": _rows([found.bounds for found in views], 4),
+        "image_box": _rows([box.bounds for box in views], 4),
         "true_image_box": _rows(straight, 4),
-        "full_box": _rows([whole_box(one.boxes) for one in seen], 4),
-        "pixel_box": _rows([pixel_box(found.bounds, beams) for found in views], 4),
-        "view": np.array([found.view for found in views], np.int8),
-        "in_view": np.array(there, np.int8),
+        "full_box": _rows([whole_box(apparent.boxes) for apparent in appearances], 4),
+        "pixel_box": _rows([pixel_box(box.bounds, beams) for box in views], 4),
+        "view": np.array([box.view for box in views], np.int8),
+        "in_view": np.array(in_view, np.int8),
         "truncation": np.array(truncated, float),
     }
 
@@ -127,7 +127,7 @@ def _rays_of(beams: BeamGrid) -> Floats:
 
 
 def _label_beams(
-    bodies: tuple[PlacedTarget, ...], seen: list[Floats], beams: BeamGrid, sonar_pose: Pose, straight: bool
+    bodies: tuple[PlacedTarget, ...], corners: list[Floats], beams: BeamGrid, sonar_pose: Pose, straight: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Target, facet and range (elevation, azimuth) of each beam."""
     rays = _rays_of(beams)
@@ -135,11 +135,11 @@ def _label_beams(
     target = np.full(shape, NO_TARGET, np.int16)
     facet = np.full(shape, NO_TARGET, np.int32)
     nearest = np.full(shape, np.inf)
-    for index, (body, vertices) in enumerate(zip(bodies, seen, strict=True)):
-        kept = np.flatnonzero(finite(vertices, body.mesh.faces))
-        if not len(kept):
+    for index, (body, vertices) in enumerate(zip(bodies, corners, strict=True)):
+        valid = np.flatnonzero(finite(vertices, body.mesh.faces))
+        if not len(valid):
             continue
-        faces = body.mesh.faces if len(kept) == len(body.mesh.faces) else body.mesh.faces[kept]
+        faces = body.mesh.faces if len(valid) == len(body.mesh.faces) else body.mesh.faces[valid]
         named = np.zeros(len(vertices), bool)
         named[faces] = True
         rows, columns = _beams_near(vertices if named.all() else vertices[named], rays)
@@ -149,7 +149,7 @@ def _label_beams(
             hit, distance = first_hit(body.mesh, origin, body.pose.turn_to_body(sonar_pose.turn_to_world(look)))
         else:
             hit, distance = first_hit(Mesh(np.nan_to_num(vertices), faces), np.zeros_like(look), look)
-            hit = np.where(hit >= 0, kept[hit], hit)
+            hit = np.where(hit >= 0, valid[hit], hit)
         closer = (hit >= 0) & (distance < nearest[rows, columns])
         rows, columns = rows[closer], columns[closer]
         target[rows, columns], facet[rows, columns] = index, hit[closer]

@@ -64,11 +64,11 @@ def _cells(arrivals: Arrivals, shape: tuple[int, int, int]) -> Ints:
 def _loudest(arrivals: Arrivals, powers: Powers, band: Band, cell: Ints, size: int) -> Ints:
     """(cell,) the path of most power in each, the first of equals; -1 where there is none, or it is silent."""
     power = powers.steps[-1]
-    most = np.zeros(size)
-    np.maximum.at(most, cell, power)
+    strongest = np.zeros(size)
+    np.maximum.at(strongest, cell, power)
     audible = (power > QUIET * arrivals.amplitude**2) & (band.energy.sum(axis=1) > 0.0)[arrivals.snap]
     best = np.full(size, -1)
-    rows = np.flatnonzero((power == most[cell]) & audible)[::-1]
+    rows = np.flatnonzero((power == strongest[cell]) & audible)[::-1]
     best[cell[rows]] = rows
     return best
 

@@ -23,11 +23,11 @@ class Odds:
         """What `plan` says; "" where no frame has a target in view."""
         if not self.frames:
             return ""
-        said = f"of {counted(self.frames, 'frame')} with a target, the brightest beam is on it in {self.found}"
+        text = f"of {counted(self.frames, 'frame')} with a target, the brightest beam is on it in {self.found}"
         if not self.snr:
-            return said
+            return text
         low, middle, high = np.quantile(self.snr, (0.0, 0.5, 1.0))
-        return f"{said}; snr of targets {low:.0f} to {high:.0f} dB, median {middle:.0f}"
+        return f"{text}; snr of targets {low:.0f} to {high:.0f} dB, median {middle:.0f}"
 
     def __add__(self, other: Odds) -> Odds:
         return Odds(self.frames + other.frames, self.found + other.found, self.snr + other.snr)
@@ -47,6 +47,6 @@ def odds(energy: Floats, beam_target: npt.NDArray[np.int16], clutter: Bools, snr
         return NO_ODDS
     rows, columns = np.mgrid[-reach : reach + 1, -reach : reach + 1]
     near = binary_dilation(of, rows**2 + columns**2 <= reach**2)
-    found = bool(near.ravel()[int(np.nanargmax(energy))])
-    some = np.zeros(0) if snr is None else snr[~clutter & np.isfinite(snr)]
-    return Odds(1, int(found), tuple(some.tolist()))
+    on_target = bool(near.ravel()[int(np.nanargmax(energy))])
+    ratios = np.zeros(0) if snr is None else snr[~clutter & np.isfinite(snr)]
+    return Odds(1, int(on_target), tuple(ratios.tolist()))

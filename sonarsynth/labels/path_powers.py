@@ -65,8 +65,8 @@ def path_powers(arrivals: Arrivals, band: Band) -> Powers:
         rows = np.flatnonzero(arrivals.coherent)
         mean, together = _coherent(arrivals, rows, band)
         with np.errstate(divide="ignore", invalid="ignore"):
-            for some in (echo, absorbed, blurred):
-                some[rows] = np.nan_to_num(some[rows] / facet[rows]) * mean
+            for power in (echo, absorbed, blurred):
+                power[rows] = np.nan_to_num(power[rows] / facet[rows]) * mean
     start = arrivals.scattering**2
     out = start * arrivals.spreading_out**2
     back = out * arrivals.spreading_in**2
@@ -89,9 +89,9 @@ def _groups(arrivals: Arrivals, rows: Ints, apart: float) -> tuple[Ints, Ints, F
     order = np.lexsort((delay + early, cell))
     new = np.ones(len(rows), bool)
     for start, stop in _runs(cell[order]):
-        some = order[start:stop]
-        ends = np.maximum.accumulate((delay + late)[some])
-        new[start + 1 : stop] = (delay + early)[some[1:]] > ends[:-1] + apart
+        members = order[start:stop]
+        ends = np.maximum.accumulate((delay + late)[members])
+        new[start + 1 : stop] = (delay + early)[members[1:]] > ends[:-1] + apart
     group = np.empty(len(rows), np.int64)
     group[order] = np.cumsum(new) - 1
     count = np.bincount(group)
@@ -117,19 +117,19 @@ def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, _Cohe
     f, slope = fine.frequency, fine.frequency / arrivals.centre
     weight = fine.weight * slope**2
     _, representative = np.unique(group, return_index=True)
-    some = arrivals.select(rows)
-    least = _least(some.delay_std, group)
-    loss = np.bincount(group, some.absorption) / np.bincount(group)
+    paths = arrivals.select(rows)
+    least = _least(paths.delay_std, group)
+    loss = np.bincount(group, paths.absorption) / np.bincount(group)
     real, imaginary, mean = coherent_sums(
         part,
-        some.snap,
-        some.amplitude,
-        some.phase,
-        some.delay - middle[group],
-        some.corner_delays,
-        some.absorption - loss[group],
-        np.maximum(some.delay_std**2 - least[group] ** 2, 0.0),
-        some.direction,
+        paths.snap,
+        paths.amplitude,
+        paths.phase,
+        paths.delay - middle[group],
+        paths.corner_delays,
+        paths.absorption - loss[group],
+        np.maximum(paths.delay_std**2 - least[group] ** 2, 0.0),
+        paths.direction,
         f,
         fine.relative,
         weight,
@@ -138,8 +138,8 @@ def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, _Cohe
     sums = real + 1j * imaginary
     _, first = np.unique(part, return_index=True)
     owner = group[first]  # (part,) its group
-    left = 10.0 ** (-np.outer(loss, fine.relative) / 10.0) * np.exp(-np.outer(least**2, (2.0 * np.pi * f) ** 2))
-    share = weight[some.snap[representative]] * left  # (group, bin) of the energy
+    absorbed = 10.0 ** (-np.outer(loss, fine.relative) / 10.0) * np.exp(-np.outer(least**2, (2.0 * np.pi * f) ** 2))
+    share = weight[paths.snap[representative]] * absorbed  # (group, bin) of the energy
     total = np.zeros((len(loss), len(f)), complex)
     np.add.at(total, owner, sums[:, 0])
     whole_power = (np.abs(total) ** 2 * share).sum(axis=1)

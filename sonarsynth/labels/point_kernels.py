@@ -103,9 +103,9 @@ def _summed(
     response[:] = 0.0
     spacing = frequency[1] - frequency[0] if len(frequency) > 1 else 0.0
     for q in range(len(pattern.weight)):
-        place = pattern.position[q]
-        square = place[0] ** 2 + place[1] ** 2 + place[2] ** 2
-        late = _delay(place, square, beam, focus * speed) - slowness * _delay(place, square, path, curvature * speed)
+        sensor = pattern.position[q]
+        square = sensor[0] ** 2 + sensor[1] ** 2 + sensor[2] ** 2
+        late = _delay(sensor, square, beam, focus * speed) - slowness * _delay(sensor, square, path, curvature * speed)
         angle, turn = 2.0 * math.pi * frequency[0] * late, 2.0 * math.pi * spacing * late
         phasor = complex(math.cos(angle), math.sin(angle)) * pattern.weight[q]
         turned = complex(math.cos(turn), math.sin(turn))
@@ -118,7 +118,7 @@ def _summed(
 def attribute(
     beam: Floats,
     moment: Floats,
-    most: Floats,
+    beam_energy: Floats,
     first: Ints,
     last: Ints,
     direction: Floats,
@@ -141,22 +141,22 @@ def attribute(
     """Power (point, group) at the delay of each point, energy (point, group) within the gate, the loudest group
     (point,), -1 without any, and what each path (point, path from `first` on) of it brings of that power.
 
-    beam (point, xyz); moment (point,) s when the point's echo reaches the array centre; most (point,): energy of the
-    beam; first, last (point,): the paths that may be heard then, ascending in delay (path,) s. A path counts within
+    beam (point, xyz); moment (point,) s when the point's echo reaches the array centre; beam_energy (point,): energy of
+    the beam; first, last (point,): the paths that may be heard then, ascending in delay (path,) s. A path counts within
     `gate` (s), longer by `longer` (path,) s and by reach (s) times how far its direction is from the beam's: a pulse is
     heard through side lobes as long as it takes to cross the array. slowness: of the water over that of the beams.
     spectrum (path, bin), of the pulse at 1 m; matched (group, bin): amplitude of the group's pulse in what ranges it;
     energy (group, bin): of the pulse; pulse (group,): of no target, which brings no more energy than echoes leave of
-    `most`, for the sonar may have taken it out; focus, curvature: 1/m.
+    `beam_energy`, for the sonar may have taken it out; focus, curvature: 1/m.
     """
     bins, groups = len(frequency), len(pulse)
     power, total = np.zeros((len(beam), groups)), np.zeros((len(beam), groups))
     owner, share = np.full(len(beam), -1), np.zeros((len(beam), max(1, (last - first).max())))
-    sums, whole = np.empty((groups, bins), np.complex128), np.empty(groups, np.complex128)
+    sums, peaks = np.empty((groups, bins), np.complex128), np.empty(groups, np.complex128)
     response, apart = np.empty(bins, np.complex128), np.empty(3)
     spacing = frequency[1] - frequency[0] if bins > 1 else 0.0
     for p in range(len(beam)):
-        sums[:], whole[:] = 0.0, 0.0
+        sums[:], peaks[:] = 0.0, 0.0
         for e in range(first[p], last[p]):
             late, away = moment[p] - delay[e], 0.0
             for x in range(3):
@@ -177,8 +177,8 @@ def attribute(
                 peak += matched[group[e], k] * value
                 phasor *= turned
             share[p, e - first[p]] = abs(peak) ** 2
-            whole[group[e]] += peak
-        _compare(power[p], total[p], sums, whole, energy, pulse, most[p])
+            peaks[group[e]] += peak
+        _compare(power[p], total[p], sums, peaks, energy, pulse, beam_energy[p])
         owner[p] = power[p].argmax() if power[p].max() > 0.0 else -1
         for e in range(first[p], last[p]):
             if group[e] != owner[p]:
@@ -188,21 +188,21 @@ def attribute(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _compare(
-    power: Floats, total: Floats, sums: Complexes, whole: Complexes, energy: Floats, pulse: Bools, most: float
+    power: Floats, total: Floats, sums: Complexes, peaks: Complexes, energy: Floats, pulse: Bools, beam_energy: float
 ) -> None:
     """Powers and energies (group,) of a point."""
     echoes = 0.0
     for g in range(len(power)):
-        power[g] = abs(whole[g]) ** 2
+        power[g] = abs(peaks[g]) ** 2
         for k in range(sums.shape[1]):
             total[g] += energy[g, k] * abs(sums[g, k]) ** 2
         if not pulse[g]:
             echoes += total[g]
-    left = max(most - echoes, 0.0)
+    remainder = max(beam_energy - echoes, 0.0)
     for g in range(len(power)):
-        if pulse[g] and total[g] > left:
-            power[g] *= left / total[g]
-            total[g] = left
+        if pulse[g] and total[g] > remainder:
+            power[g] *= remainder / total[g]
+            total[g] = remainder
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -224,10 +224,10 @@ def distances(points: Floats, vertices: Floats, faces: Int32s, nodes: Floats, or
                     a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
                     best = min(best, _to_triangle(points[p], a, b, c))
                 continue
-            one, other = _to_box(points[p], nodes[2 * node]), _to_box(points[p], nodes[2 * node + 1])
-            far = 2 * node + (1 if other > one else 0)
-            stack[depth], near[depth] = far, max(one, other)
-            stack[depth + 1], near[depth + 1] = 4 * node + 1 - far, min(one, other)
+            child, sibling = _to_box(points[p], nodes[2 * node]), _to_box(points[p], nodes[2 * node + 1])
+            far = 2 * node + (1 if sibling > child else 0)
+            stack[depth], near[depth] = far, max(child, sibling)
+            stack[depth + 1], near[depth + 1] = 4 * node + 1 - far, min(child, sibling)
             depth += 2
         distance[p] = math.sqrt(best)
 

@@ -36,9 +36,9 @@ def label_points(
     instant. Bodies and the array are where sound meets them.
     """
     beam = direction(cloud.azimuth, cloud.elevation)
-    late, most = cloud.delay.astype(float), cloud.energy.astype(float)
-    found = attribution(arrivals, band, listening, beam, late, most)
-    explained = (found.owner >= 0) & (found.energy.sum(axis=1) >= EXPLAINED * most)
+    late, energy = cloud.delay.astype(float), cloud.energy.astype(float)
+    attributed = attribution(arrivals, band, listening, beam, late, energy)
+    explained = (attributed.owner >= 0) & (attributed.energy.sum(axis=1) >= EXPLAINED * energy)
     labels: dict[str, np.ndarray] = {
         "target": np.full(len(cloud), NO_TARGET, np.int16),
         "emission": np.full(len(cloud), NO_TARGET, np.int16),
@@ -49,14 +49,14 @@ def label_points(
         "distance": np.full(len(cloud), np.nan, np.float32),
         "origin": np.full(len(cloud), ORIGINS.index("unexplained"), np.int8),
     }
-    some = np.flatnonzero(explained)
-    owner, loudest = found.owner[some], found.first[some] + found.share[some].argmax(axis=1)
+    rows = np.flatnonzero(explained)
+    owner, loudest = attributed.owner[rows], attributed.first[rows] + attributed.share[rows].argmax(axis=1)
     for name in ("target", "emission", "family", "lit_by"):
-        labels[name][some] = getattr(found, "snap" if name == "emission" else name)[owner]
-    labels["facet"][some] = found.paths.facet[loudest]
-    labels["origin"][some] = _origins(found.paths.select(loudest), beam[some], listening, band)
+        labels[name][rows] = getattr(attributed, "snap" if name == "emission" else name)[owner]
+    labels["facet"][rows] = attributed.paths.facet[loudest]
+    labels["origin"][rows] = _origins(attributed.paths.select(loudest), beam[rows], listening, band)
     echo = np.flatnonzero(labels["target"] >= 0)
-    near = _from_targets(found, echo, cloud.position[echo].astype(float), moment, listening)
+    near = _from_targets(attributed, echo, cloud.position[echo].astype(float), moment, listening)
     labels["true_range"][echo], labels["distance"][echo] = near
     return PointLabels(**labels)
 
@@ -66,21 +66,21 @@ def _origins(paths: Arrivals, beam: Floats, listening: SonarTiming, band: Band) 
     elements, centre = listening.elements, 0.5 * (band.low + band.high)
     spread = _spread(elements)
     apart = paths.direction / paths.sound_speed - beam / listening.sound_speed  # s/m
-    found = np.full(len(beam), ORIGINS.index("main lobe"))
+    origin = np.full(len(beam), ORIGINS.index("main lobe"))
     beside = np.flatnonzero(2.0 * np.pi * centre * np.linalg.norm(apart @ spread, axis=1) > FIRST_NULL)
-    found[beside] = ORIGINS.index("side lobe")
+    origin[beside] = ORIGINS.index("side lobe")
     if elements.on_lattice and len(beside):
         waves = np.linspace(band.low, band.high, MOST_BINS)[:, None, None] * apart[beside]
         order = np.rint(waves * elements.pitch) * np.array([0.0, 1.0, 1.0])
-        rest = 2.0 * np.pi * np.linalg.norm((waves - order / elements.pitch) @ spread, axis=2)
-        grating = ((rest < FIRST_NULL) & order.any(axis=2)).any(axis=0)
-        found[beside[grating]] = ORIGINS.index("grating lobe")
+        remainder = 2.0 * np.pi * np.linalg.norm((waves - order / elements.pitch) @ spread, axis=2)
+        grating = ((remainder < FIRST_NULL) & order.any(axis=2)).any(axis=0)
+        origin[beside[grating]] = ORIGINS.index("grating lobe")
     normal = _normal(elements, listening.sound_speed / centre)
     if normal is not None:
-        found[(paths.direction @ normal) * (beam @ normal) < 0.0] = ORIGINS.index("mirror image")
-    found[paths.direct] = ORIGINS.index("snap itself")
-    found[paths.kind == Kind.REVERBERATION] = ORIGINS.index("reverberation")
-    return found
+        origin[(paths.direction @ normal) * (beam @ normal) < 0.0] = ORIGINS.index("mirror image")
+    origin[paths.direct] = ORIGINS.index("snap itself")
+    origin[paths.kind == Kind.REVERBERATION] = ORIGINS.index("reverberation")
+    return origin
 
 
 _normal = lru_cache(maxsize=16)(mirror_normal)
@@ -95,31 +95,31 @@ def _spread(elements: Elements) -> Floats:
 
 
 def _from_targets(
-    found: Attribution, points: Ints, places: Floats, moment: WorldState, listening: SonarTiming
+    attributed: Attribution, points: Ints, places: Floats, moment: WorldState, listening: SonarTiming
 ) -> tuple[Floats, Floats]:
     """Range (point,) of where the echoes of points were made, and distance (point,) of the places (point, xyz) that the
     sonar gives them from the target, where sound met it and the array (m)."""
-    paths, share = found.paths, found.share[points]
-    row = np.minimum(found.first[points, None] + np.arange(share.shape[1]), len(paths.delay) - 1)
+    paths, share = attributed.paths, attributed.share[points]
+    row = np.minimum(attributed.first[points, None] + np.arange(share.shape[1]), len(paths.delay) - 1)
     weight = share / share.sum(axis=1, keepdims=True)
     mean_delay = np.einsum("pe,pe->p", weight, paths.delay[row])
     met = mean_delay - np.einsum("pe,pe->p", weight, paths.radius[row]) / paths.sound_speed
     array = listening.pose.position + mean_delay[:, None] * listening.velocity
-    place = array + listening.pose.turn_to_world(places)
-    made, distance, owner = np.empty(places.shape), np.empty(len(points)), found.owner[points]
+    position = array + listening.pose.turn_to_world(places)
+    origin, distance, owner = np.empty(places.shape), np.empty(len(points)), attributed.owner[points]
     for group in np.unique(owner):
-        some, body = owner == group, moment.bodies[found.target[group]]
-        there = body.later(float(met[some].mean()))
-        moved = (met[some, None] - met[some].mean()) * there.velocity
-        middle = body.mesh.centroid[np.where(weight[some] > 0.0, paths.facet[row[some]], 0)]
-        made[some] = there.pose.to_world(np.einsum("pe,pex->px", weight[some], middle)) + moved
-        distance[some] = surface_distances(there, place[some] - moved)
-    return np.linalg.norm(made - array, axis=1), distance
+        rows, body = owner == group, moment.bodies[attributed.target[group]]
+        placed = body.later(float(met[rows].mean()))
+        moved = (met[rows, None] - met[rows].mean()) * placed.velocity
+        middle = body.mesh.centroid[np.where(weight[rows] > 0.0, paths.facet[row[rows]], 0)]
+        origin[rows] = placed.pose.to_world(np.einsum("pe,pex->px", weight[rows], middle)) + moved
+        distance[rows] = surface_distances(placed, position[rows] - moved)
+    return np.linalg.norm(origin - array, axis=1), distance
 
 
 def surface_distances(body: PlacedTarget, points: Floats) -> Floats:
     """Distances (point,) m of points (point, xyz) of the world from the surface of a body, inside or outside: exact."""
     ready = casting_mesh(body.mesh)
-    at, found = (body.pose.to_body(points) - ready.centre) / ready.size, np.empty(len(points))
-    kernels.distances(at, ready.vertices, ready.faces, *ready.tree, found)
-    return found * ready.size
+    at, distance = (body.pose.to_body(points) - ready.centre) / ready.size, np.empty(len(points))
+    kernels.distances(at, ready.vertices, ready.faces, *ready.tree, distance)
+    return distance * ready.size

@@ -48,33 +48,33 @@ def _apparent(body: PlacedTarget, sonar_pose: Pose, connect: Connect | None) -> 
     if connect is None:
         return true
     apparent = np.full_like(true, np.nan)
-    for some in in_blocks(len(world)):
-        paths = connect(world[some], np.broadcast_to(sonar_pose.position, world[some].shape))
+    for block in in_blocks(len(world)):
+        paths = connect(world[block], np.broadcast_to(sonar_pose.position, world[block].shape))
         pairs, first = np.unique(paths.pair, return_index=True)  # the earliest: paths are sorted by time
         towards = -sonar_pose.turn_to_body(paths.arrival[first])
-        apparent[some][pairs] = towards * np.linalg.norm(true[some][pairs], axis=1)[:, None]
+        apparent[block][pairs] = towards * np.linalg.norm(true[block][pairs], axis=1)[:, None]
     return apparent
 
 
 def _visible(
-    body: PlacedTarget, seen: Floats, bodies: tuple[PlacedTarget, ...], sonar_pose: Pose
+    body: PlacedTarget, corners: Floats, bodies: tuple[PlacedTarget, ...], sonar_pose: Pose
 ) -> tuple[Ints, float]:
     """The visible facets, in the view of the beams or not, and their share of the area that faces the array."""
-    mesh, here = body.mesh, body.pose.to_body(sonar_pose.position)
-    facing = _facing(body, slice(None), here)
+    mesh, sonar = body.mesh, body.pose.to_body(sonar_pose.position)
+    facing = _facing(body, slice(None), sonar)
     visible = np.zeros(len(mesh.faces), bool)
-    for some in in_blocks(len(mesh.faces)):
-        rows = np.flatnonzero(facing[some]) + some.start
+    for block in in_blocks(len(mesh.faces)):
+        rows = np.flatnonzero(facing[block]) + block.start
         start = _clear(body, rows)
         clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
-        visible[rows] = clear & finite(seen, mesh.faces[rows])
+        visible[rows] = clear & finite(corners, mesh.faces[rows])
     fraction = float(mesh.area[visible].sum() / mesh.area[facing].sum()) if visible.any() else 0.0
     return np.flatnonzero(visible), fraction
 
 
-def _facing(body: PlacedTarget, rows: Ints | slice, place: Floats) -> Bools:
+def _facing(body: PlacedTarget, rows: Ints | slice, position: Floats) -> Bools:
     """Whether a place (xyz), in the frame of a body, is on the outer side of facets (row,)."""
-    ahead = place - body.mesh.centroid[rows]
+    ahead = position - body.mesh.centroid[rows]
     return np.asarray(np.einsum("ij,ij->i", ahead, body.mesh.normal[rows]) > 0.0)
 
 
@@ -100,30 +100,30 @@ def lit_fraction(
     if not snap.illuminates:
         return 0.0
     lit = np.zeros(len(visible), bool)
-    for some in in_blocks(len(visible)):
-        rows = visible[some]
+    for block in in_blocks(len(visible)):
+        rows = visible[block]
         if connect is None:
             faced = np.flatnonzero(_facing(body, rows, body.pose.to_body(snap.position)))
             start = _clear(body, rows[faced])
             blocked = occluded(bodies, start, np.broadcast_to(snap.position, start.shape))
         else:
-            place, normal = (
+            position, normal = (
                 body.pose.to_world(body.mesh.centroid[rows]),
                 body.pose.turn_to_world(body.mesh.normal[rows]),
             )
-            paths = connect(np.broadcast_to(snap.position, place.shape), place)
+            paths = connect(np.broadcast_to(snap.position, position.shape), position)
             towards = -paths.arrival
-            some_paths = np.flatnonzero(usable(paths) & (np.einsum("ij,ij->i", towards, normal[paths.pair]) > 0.0))
-            faced = paths.pair[some_paths]
+            lighting = np.flatnonzero(usable(paths) & (np.einsum("ij,ij->i", towards, normal[paths.pair]) > 0.0))
+            faced = paths.pair[lighting]
             start = _clear(body, rows[faced])
             end = np.broadcast_to(snap.position, start.shape)
-            blocked = hidden(bodies, medium, start, end, towards[some_paths], paths.length[some_paths])
-        lit[faced[~blocked] + some.start] = True
+            blocked = hidden(bodies, medium, start, end, towards[lighting], paths.length[lighting])
+        lit[faced[~blocked] + block.start] = True
     area = body.mesh.area[visible]
     return float(area[lit].sum() / area.sum())
 
 
 def finite(points: Floats, faces: np.ndarray) -> Bools:
     """Facets (facet,) whose corners are all finite points (point, xyz)."""
-    known = np.asarray(np.isfinite(points).all(axis=1))
-    return np.ones(len(faces), bool) if known.all() else np.asarray(known[faces].all(axis=1))
+    valid = np.asarray(np.isfinite(points).all(axis=1))
+    return np.ones(len(faces), bool) if valid.all() else np.asarray(valid[faces].all(axis=1))

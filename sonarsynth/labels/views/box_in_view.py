@@ -19,22 +19,22 @@ class BoxInView(NamedTuple):
     view: View
 
 
-def facet_boxes(seen: Floats, faces: np.ndarray) -> Floats:
+def facet_boxes(corners: Floats, faces: np.ndarray) -> Floats:
     """Bounds (facet, 4) in rad of what of each facet (facet, 3) of corners seen (vertex, xyz), sonar frame, is ahead of
     the sonar, x > 0: azimuth min, max, elevation min, max; NaN where nothing is, or a corner is NaN."""
     boxes = np.empty((len(faces), 4))
-    view_kernels.boxes_ahead(np.ascontiguousarray(seen, float), faces, boxes)
+    view_kernels.boxes_ahead(np.ascontiguousarray(corners, float), faces, boxes)
     return boxes
 
 
 def whole_box(boxes: Floats) -> Floats:
     """Bounds (4,) of facets with boxes (facet, 4); NaN without any."""
-    found = np.empty(4)
-    view_kernels.bounds_of_whole(boxes, np.inf, np.inf, np.empty(len(boxes), bool), found)
-    return found
+    bounds = np.empty(4)
+    view_kernels.bounds_of_whole(boxes, np.inf, np.inf, np.empty(len(boxes), bool), bounds)
+    return bounds
 
 
-def box_in_view(seen: Floats, faces: np.ndarray, beams: BeamGrid, boxes: Floats | None = None) -> BoxInView:
+def box_in_view(corners: Floats, faces: np.ndarray, beams: BeamGrid, boxes: Floats | None = None) -> BoxInView:
     """Bounds of the facets (facet, 3) of corners seen (vertex, xyz), sonar frame, within the spans of a beam grid.
 
     Exact for flat facets, however large: they are cut along the edges of the view. `faces` are those that the array
@@ -44,28 +44,28 @@ def box_in_view(seen: Floats, faces: np.ndarray, beams: BeamGrid, boxes: Floats 
     if not len(faces):
         return BoxInView(np.full(4, np.nan), View.HIDDEN)
     spans = 0.5 * beams.azimuth_span, 0.5 * beams.elevation_span
-    boxes = facet_boxes(seen, faces) if boxes is None else boxes
-    inner, parts = np.empty(len(boxes), bool), np.empty((2, 4))
-    view_kernels.bounds_of_whole(boxes, *spans, inner, parts[0])
+    boxes = facet_boxes(corners, faces) if boxes is None else boxes
+    inner, bounds = np.empty(len(boxes), bool), np.empty((2, 4))
+    view_kernels.bounds_of_whole(boxes, *spans, inner, bounds[0])
     if inner.all():
-        return BoxInView(parts[0], View.IN_VIEW)
-    inside, outside = view_kernels.bounds(np.ascontiguousarray(seen, float), faces[~inner], *spans, parts[1])
+        return BoxInView(bounds[0], View.IN_VIEW)
+    inside, outside = view_kernels.bounds(np.ascontiguousarray(corners, float), faces[~inner], *spans, bounds[1])
     if inside or inner.any():
         view = View.PARTLY_IN_VIEW if outside else View.IN_VIEW
-        return BoxInView(whole_box(parts if inside else parts[:1]), view)
-    named = np.zeros(len(seen), bool)
+        return BoxInView(whole_box(bounds if inside else bounds[:1]), view)
+    named = np.zeros(len(corners), bool)
     named[faces] = True
-    behind = bool((seen[named, 0] < 0.0).all())
+    behind = bool((corners[named, 0] < 0.0).all())
     return BoxInView(np.full(4, np.nan), View.BEHIND if behind else View.OUTSIDE_VIEW)
 
 
-def truncation(seen: Floats, faces: np.ndarray, view: View, beams: BeamGrid) -> float:
+def truncation(corners: Floats, faces: np.ndarray, view: View, beams: BeamGrid) -> float:
     """Share of the solid angle of facets (facet, 3) of corners seen (vertex, xyz) that is out of the spans of a beam
     grid; NaN where the body is hidden. Faces and view: as of `box_in_view`."""
     if view != View.PARTLY_IN_VIEW:
         return {View.IN_VIEW: 0.0, View.HIDDEN: float("nan")}.get(view, 1.0)
     spans = 0.5 * beams.azimuth_span, 0.5 * beams.elevation_span
-    inside, every = view_kernels.solid_angles(np.ascontiguousarray(seen, float), faces, *spans)
+    inside, every = view_kernels.solid_angles(np.ascontiguousarray(corners, float), faces, *spans)
     return float(np.clip(1.0 - inside / every, 0.0, 1.0)) if every > 0.0 else 0.0
 
 

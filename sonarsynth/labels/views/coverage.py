@@ -39,7 +39,7 @@ def cells_of(beams: BeamGrid) -> Cells:
     steps, edges = [], []
     for angle, span in ((beams.azimuth, beams.azimuth_span), (beams.elevation, beams.elevation_span)):
         step = span / max(len(angle) - 1, 1)
-        low, high = (np.clip(angle + side * step, -0.5 * np.pi, 0.5 * np.pi) for side in (-0.5, 0.5))
+        low, high = (np.clip(angle + sign * step, -0.5 * np.pi, 0.5 * np.pi) for sign in (-0.5, 0.5))
         steps.append(step)
         edges.append((low[:, None], high[:, None]))
     along = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
@@ -94,7 +94,7 @@ def _mark(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _cover(
-    seen: Floats, faces: npt.NDArray[np.int32], boxes: Floats, first: tuple[float, float], step: tuple[float, float],
+    corners: Floats, faces: npt.NDArray[np.int32], boxes: Floats, first: tuple[float, float], step: tuple[float, float],
     azimuth: Floats, level: Floats, sine: Floats, cosine: Floats, outside: bool, covered: Words,
     count: npt.NDArray[np.int16],
 ) -> None:  # fmt: skip
@@ -113,7 +113,7 @@ def _cover(
         top = min(math.floor((box[3] - first[1]) / step[1]), rows - 1)
         if left > right or bottom > top:
             continue
-        if not _planes((seen[faces[f, 0]], seen[faces[f, 1]], seen[faces[f, 2]]), planes) and outside:
+        if not _planes((corners[faces[f, 0]], corners[faces[f, 1]], corners[faces[f, 2]]), planes) and outside:
             continue
         for row in range(bottom, top + 1):
             for column in range(left, right + 1):
@@ -132,7 +132,9 @@ def coverage(bodies: list[tuple[Floats, np.ndarray, Floats, bool]], beams: BeamG
     cells = cells_of(beams)
     covered = np.zeros((beams.elevations, beams.azimuths, (DIRECTIONS + 63) // 64), np.uint64)
     count = np.zeros(covered.shape[:2], np.int16)
-    for seen, faces, boxes, closed in bodies:
-        outside = closed and bool(np.isfinite(seen).all() and not ((seen.T.min(1) < 0.0) & (seen.T.max(1) > 0.0)).all())
-        _cover(np.ascontiguousarray(seen, float), faces, boxes, *cells, outside, covered, count)
+    for corners, faces, boxes, closed in bodies:
+        outside = closed and bool(
+            np.isfinite(corners).all() and not ((corners.T.min(1) < 0.0) & (corners.T.max(1) > 0.0)).all()
+        )
+        _cover(np.ascontiguousarray(corners, float), faces, boxes, *cells, outside, covered, count)
     return (count / DIRECTIONS).astype(np.float32)

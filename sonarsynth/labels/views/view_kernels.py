@@ -43,22 +43,22 @@ def cross(a: Floats, b: Floats, side: int, half: Floats, out: Floats) -> None:
 
 
 @njit(cache=True, nogil=True)
-def cut(corner: Floats, count: int, side: int, half: Floats, other: Floats) -> int:
+def cut(corner: Floats, count: int, side: int, half: Floats, clipped: Floats) -> int:
     """The part (corner, xyz) of a polygon on the inner side of one edge of the view: how many corners."""
-    kept = 0
+    size = 0
     for i in range(count):
         a, b = corner[i], corner[(i + 1) % count]
         a_in = depth_in_view(a, side, half) >= 0.0
         if a_in:
-            other[kept] = a
-            kept += 1
+            clipped[size] = a
+            size += 1
         if a_in != (depth_in_view(b, side, half) >= 0.0):
             if a_in:
-                cross(a, b, side, half, other[kept])
+                cross(a, b, side, half, clipped[size])
             else:
-                cross(b, a, side, half, other[kept])
-            kept += 1
-    return kept
+                cross(b, a, side, half, clipped[size])
+            size += 1
+    return size
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -90,75 +90,75 @@ def whole(corner: Floats, count: int, side: int, half: Floats) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def bounds(seen: Floats, faces: Ints, azimuth: float, elevation: float, found: Floats) -> tuple[bool, bool]:
+def bounds(corners: Floats, faces: Ints, azimuth: float, elevation: float, out: Floats) -> tuple[bool, bool]:
     """Bounds (4,) in azimuth and elevation (rad) of triangles (facet, 3) of points (vertex, xyz) within +-azimuth and
-    +-elevation, in `found`; whether any part is in that view, and whether any is out of it."""
+    +-elevation, in `out`; whether any part is in that view, and whether any is out of it."""
     half = np.array([np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)])
-    one, other, extreme = np.empty((MOST, 3)), np.empty((MOST, 3)), np.empty(3)
+    polygon, clipped, extreme = np.empty((MOST, 3)), np.empty((MOST, 3)), np.empty(3)
     slopes = np.array([np.inf, -np.inf, np.inf, -np.inf])
     inside, outside = False, False
     for f in range(len(faces)):
         for i in range(3):
-            one[i] = seen[faces[f, i]]
+            polygon[i] = corners[faces[f, i]]
         count = 3
         for side in range(SIDES):
-            if whole(one, count, side, half):
+            if whole(polygon, count, side, half):
                 continue
             outside = True
-            count = cut(one, count, side, half, other)
-            one, other = other, one
+            count = cut(polygon, count, side, half, clipped)
+            polygon, clipped = clipped, polygon
         for i in range(count):
             inside = True
-            widen(one[i], slopes)
-            if steepest(one[i], one[(i + 1) % count], extreme):
+            widen(polygon[i], slopes)
+            if steepest(polygon[i], polygon[(i + 1) % count], extreme):
                 widen(extreme, slopes)
                 outside |= depth_in_view(extreme, 2, half) < 0.0 or depth_in_view(extreme, 3, half) < 0.0
     for i in range(4):
         edge = azimuth if i < 2 else elevation
-        found[i] = min(max(math.atan(slopes[i]), -edge), edge)
+        out[i] = min(max(math.atan(slopes[i]), -edge), edge)
     return inside, outside
 
 
 @njit(cache=True, nogil=True)
-def boxes_ahead(seen: Floats, faces: Ints, boxes: Floats) -> None:
+def boxes_ahead(corners: Floats, faces: Ints, boxes: Floats) -> None:
     """Write bounds (facet, 4) in azimuth and elevation (rad) of the part of each triangle (facet, 3) of points (vertex,
     xyz) that is ahead, x > 0; NaN where none is, or a corner is NaN."""
     half = np.array([1.0, 0.0])
-    one, other, extreme, slopes = np.empty((MOST, 3)), np.empty((MOST, 3)), np.empty(3), np.empty(4)
+    polygon, clipped, extreme, slopes = np.empty((MOST, 3)), np.empty((MOST, 3)), np.empty(3), np.empty(4)
     for f in range(len(faces)):
-        known = True
+        valid = True
         for i in range(3):
-            p = seen[faces[f, i]]
-            one[i, 0], one[i, 1], one[i, 2] = p[0], p[1], p[2]
-            known &= math.isfinite(p[0] + p[1] + p[2])
-        count = 3 if known else 0
-        if known and not (one[0, 0] > 0.0 and one[1, 0] > 0.0 and one[2, 0] > 0.0):
-            count = cut(one, 3, 0, half, other)
-            one, other = other, one
+            p = corners[faces[f, i]]
+            polygon[i, 0], polygon[i, 1], polygon[i, 2] = p[0], p[1], p[2]
+            valid &= math.isfinite(p[0] + p[1] + p[2])
+        count = 3 if valid else 0
+        if valid and not (polygon[0, 0] > 0.0 and polygon[1, 0] > 0.0 and polygon[2, 0] > 0.0):
+            count = cut(polygon, 3, 0, half, clipped)
+            polygon, clipped = clipped, polygon
         slopes[0], slopes[1], slopes[2], slopes[3] = np.inf, -np.inf, np.inf, -np.inf
         furthest = 0.0
         for i in range(count):
-            furthest = max(furthest, one[i, 0])
-            widen(one[i], slopes)
-            if steepest(one[i], one[(i + 1) % count], extreme):
+            furthest = max(furthest, polygon[i, 0])
+            widen(polygon[i], slopes)
+            if steepest(polygon[i], polygon[(i + 1) % count], extreme):
                 widen(extreme, slopes)
         for i in range(4):
             boxes[f, i] = math.atan(slopes[i]) if furthest > 0.0 else np.nan
 
 
 @njit(cache=True, nogil=True)
-def bounds_of_whole(boxes: Floats, azimuth: float, elevation: float, whole: Bools, found: Floats) -> None:
-    """Bounds (4,) of those of boxes (facet, 4) that are wholly within +-azimuth and +-elevation, in `found`: NaN of
+def bounds_of_whole(boxes: Floats, azimuth: float, elevation: float, inner: Bools, out: Floats) -> None:
+    """Bounds (4,) of those of boxes (facet, 4) that are wholly within +-azimuth and +-elevation, in `out`: NaN of
     none; and write which."""
     low, high, lowest, highest = np.inf, -np.inf, np.inf, -np.inf
     for f in range(len(boxes)):
         a, b, c, d = boxes[f, 0], boxes[f, 1], boxes[f, 2], boxes[f, 3]
-        whole[f] = a >= -azimuth and b <= azimuth and c >= -elevation and d <= elevation  # none is where they are NaN
-        if whole[f]:
+        inner[f] = a >= -azimuth and b <= azimuth and c >= -elevation and d <= elevation  # none is where they are NaN
+        if inner[f]:
             low, high, lowest, highest = min(low, a), max(high, b), min(lowest, c), max(highest, d)
-    found[0], found[1], found[2], found[3] = low, high, lowest, highest
+    out[0], out[1], out[2], out[3] = low, high, lowest, highest
     if not low <= high:
-        found[:] = np.nan
+        out[:] = np.nan
 
 
 @njit(cache=True, nogil=True)
@@ -184,12 +184,12 @@ def under_edge(a: Floats, b: Floats, half: Floats, ends: Floats) -> float:
     p = square_cosine * dz * dz - square_sine * (dx * dx + dy * dy)
     q = square_cosine * a[2] * dz - square_sine * (a[0] * dx + a[1] * dy)
     r = square_cosine * a[2] * a[2] - square_sine * (a[0] * a[0] + a[1] * a[1])
-    one, two, root = 1.0, 1.0, q * q - p * r
-    if root > 0.0:
-        large = -(q + math.copysign(math.sqrt(root), q))
-        one = large / p if p != 0.0 else 1.0
-        two = r / large if large != 0.0 else 1.0
-    first, second = min(max(min(one, two), 0.0), 1.0), min(max(one, two, 0.0), 1.0)
+    t1, t2, discriminant = 1.0, 1.0, q * q - p * r
+    if discriminant > 0.0:
+        large = -(q + math.copysign(math.sqrt(discriminant), q))
+        t1 = large / p if p != 0.0 else 1.0
+        t2 = r / large if large != 0.0 else 1.0
+    first, second = min(max(min(t1, t2), 0.0), 1.0), min(max(t1, t2, 0.0), 1.0)
     total, start = 0.0, 0.0
     for stop in (first, second, 1.0):
         if stop > start:
@@ -208,26 +208,26 @@ def under_edge(a: Floats, b: Floats, half: Floats, ends: Floats) -> float:
 
 
 @njit(cache=True, nogil=True)
-def solid_angles(seen: Floats, faces: Ints, azimuth: float, elevation: float) -> tuple[float, float]:
+def solid_angles(corners: Floats, faces: Ints, azimuth: float, elevation: float) -> tuple[float, float]:
     """Sums of the solid angles (sr) of triangles (facet, 3) of points (vertex, xyz) within +-azimuth and +-elevation,
     and of them whole. Source of the latter: Van Oosterom & Strackee (1983), IEEE Trans. Biomed. Eng. 30, 125, eq. 8."""
     half = np.array([np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)])
-    one, other, ends = np.empty((MOST, 3)), np.empty((MOST, 3)), np.empty((3, 3))
+    polygon, clipped, ends = np.empty((MOST, 3)), np.empty((MOST, 3)), np.empty((3, 3))
     inside, every = 0.0, 0.0
     for f in range(len(faces)):
         for i in range(3):
-            one[i] = seen[faces[f, i]] / np.linalg.norm(seen[faces[f, i]])
-        a, b, c = one[0], one[1], one[2]
+            polygon[i] = corners[faces[f, i]] / np.linalg.norm(corners[faces[f, i]])
+        a, b, c = polygon[0], polygon[1], polygon[2]
         normal = np.array([b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]])
         triple, cosines = abs(a @ normal), 1.0 + a @ b + b @ c + c @ a
         every += 2.0 * math.atan2(triple, cosines)
         count = 3
         for side in range(2):
-            if not whole(one, count, side, half):
-                count = cut(one, count, side, half, other)
-                one, other = other, one
-        part = 0.0
+            if not whole(polygon, count, side, half):
+                count = cut(polygon, count, side, half, clipped)
+                polygon, clipped = clipped, polygon
+        area = 0.0
         for i in range(count):
-            part += under_edge(one[i], one[(i + 1) % count], half, ends)
-        inside += abs(part)
+            area += under_edge(polygon[i], polygon[(i + 1) % count], half, ends)
+        inside += abs(area)
     return inside, every
