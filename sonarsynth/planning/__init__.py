@@ -105,31 +105,31 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
     windows = listening_windows(recipe, looks)
     check_windows(scene, windows)
     sizes = _sizes(recipe, windows)
-    made = Plan(recipe, products, fewer, paths, windows, sizes=sizes, thinning=thinning)
-    made = choose(made, looks) if choices is None else replace(made, choices=choices)
-    made = replace(made, stages=_mean_stages(made, looks))
-    made = replace(made, shard_frames=_shard_frames(made), validity=stored_validity(recipe, looks))
-    return replace(made, left_out=left_out(made), warnings=notes(made, looks))
+    resolved = Plan(recipe, products, fewer, paths, windows, sizes=sizes, thinning=thinning)
+    resolved = choose(resolved, looks) if choices is None else replace(resolved, choices=choices)
+    resolved = replace(resolved, stages=_mean_stages(resolved, looks))
+    resolved = replace(resolved, shard_frames=_shard_frames(resolved), validity=stored_validity(recipe, looks))
+    return replace(resolved, left_out=left_out(resolved), warnings=notes(resolved, looks))
 
 
-def _shard_frames(made: Plan) -> int:
+def _shard_frames(resolved: Plan) -> int:
     """Frames of a shard: the same on every machine, so that a build can go on elsewhere."""
-    frame_bytes = sum(stage.bytes for stage in made.stages)
-    seconds = max(sum(stage.seconds for stage in made.stages) / machine_factor(), 1e-6)
-    many = min(SHARD_SECONDS / seconds, made.recipe.frames / SHARDS, MANY_FRAMES)
+    frame_bytes = sum(stage.bytes for stage in resolved.stages)
+    seconds = max(sum(stage.seconds for stage in resolved.stages) / machine_factor(), 1e-6)
+    many = min(SHARD_SECONDS / seconds, resolved.recipe.frames / SHARDS, MANY_FRAMES)
     frames = max(2 ** int(np.log2(max(many, 1.0))), SHARD_FRAMES)
     return int(np.clip(SHARD_BYTES // max(frame_bytes, 1), 1, frames))
 
 
-def _mean_stages(made: Plan, looks: Sequence[SampledScene]) -> tuple[Stage, ...]:
+def _mean_stages(resolved: Plan, looks: Sequence[SampledScene]) -> tuple[Stage, ...]:
     """The stages, with the mean cost over a few sequences."""
     real = [look.frames[0].index for look in looks if look.real]
     chosen = real[:: -(-len(real) // COSTED)]
-    rows = [stages(made.at(index)) for index in chosen]
+    rows = [stages(resolved.at(index)) for index in chosen]
     spent = [(stage, stage.seconds / len(rows)) for row in rows for stage in row]
     named = {stage.stage: stage for stage, _ in reversed(spent)}  # parts of the noise may vary
     order = dict.fromkeys(stage.stage for stage, _ in spent)
-    return tuple(replace(named[name], seconds=sum(s for one, s in spent if one.stage == name)) for name in order)
+    return tuple(replace(named[name], seconds=sum(s for stage, s in spent if stage.stage == name)) for name in order)
 
 
 def chosen_products(names: Iterable[str]) -> frozenset[str]:

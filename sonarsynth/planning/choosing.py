@@ -66,21 +66,21 @@ def choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
         key = plan.digest, plan.products, tuple(frame.index for look in looks for frame in look.frames)
     except (OSError, ValueError):  # a file that is not there, which what reads it says better
         return _choose(plan, looks)
-    found = _CHOSEN.get(key)
-    if found is None:
-        made = _choose(plan, looks)
-        found = _CHOSEN[key] = made.choices, made.errors
+    cached = _CHOSEN.get(key)
+    if cached is None:
+        chosen = _choose(plan, looks)
+        cached = _CHOSEN[key] = chosen.choices, chosen.errors
         while len(_CHOSEN) > KEPT:
             _CHOSEN.popitem(last=False)
-    return replace(plan, choices=found[0], errors=found[1])
+    return replace(plan, choices=cached[0], errors=cached[1])
 
 
 def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     scene, accuracy = plan.scene, plan.recipe.accuracy
     if not plan.products:  # nothing is traced
         return plan
-    some = _some(looks, 1 if _facets(scene) > LARGE_MESH_FACETS else MEASURED)
-    bent = max((ranging_error(look.scene, look.profile, look.frames) for look in some), default=0.0)
+    sampled = _some(looks, 1 if _facets(scene) > LARGE_MESH_FACETS else MEASURED)
+    bent = max((ranging_error(look.scene, look.profile, look.frames) for look in sampled), default=0.0)
     synthesis, by_synthesis = scene.physics.synthesis.resolve(
         Demand(np.sqrt(SYNTHESIS) * accuracy.cheap, accuracy.exact, lambda method: 0.0, plan.elements)
     )
@@ -95,13 +95,13 @@ def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
         picking=picking,
         placing=placing,
     )
-    made = replace(plan, choices=choices)
-    indices = [look.frames[0].index for look in some]
-    cut = _subarrays(made, indices)
+    chosen = replace(plan, choices=choices)
+    indices = [look.frames[0].index for look in sampled]
+    cut = _subarrays(chosen, indices)
     imaged = bool(plan.products & OF_BEAMS)
-    steering, blurred = beamformer(made, indices) if imaged else (choices.beamforming, 0.0)
+    steering, blurred = beamformer(chosen, indices) if imaged else (choices.beamforming, 0.0)
     return replace(
-        made,
+        chosen,
         choices=replace(
             choices,
             subarrays=cut.parts,
@@ -125,7 +125,7 @@ def _some(looks: Sequence[SampledScene], count: int) -> list[SampledScene]:
         frames = chosen[0].frames
         wanted = np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))
         return [replace(chosen[0], frames=(frames[n],)) for n in wanted]
-    return [replace(one, frames=(one.frames[n * (len(one.frames) - 1) // 2],)) for n, one in enumerate(chosen)]
+    return [replace(look, frames=(look.frames[n * (len(look.frames) - 1) // 2],)) for n, look in enumerate(chosen)]
 
 
 def _negligible(scene: Scene, accuracy: Accuracy) -> float:
@@ -154,20 +154,20 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
         return _ArrayModel(count, "centre", 0.0)
     measures = [PerSensorReference.of(plan, index) for index in indices]
     allowed = np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
-    given = physics.subarrays != "auto"
+    fixed = physics.subarrays != "auto"
     first = min(physics.subarrays, count) if physics.subarrays != "auto" else 1
-    enough = np.inf if given else allowed
-    whole = error = _worst(measures, first, seeing, enough)
+    enough = np.inf if fixed else allowed
+    undivided = error = _worst(measures, first, seeing, enough)
     unseen = plan.recipe.sequences > len(measures)  # in which another body may stand in the way
     if physics.occlusion == "auto" and (error > allowed or unseen):
         better = _worst(measures, first, "sensors", enough)
         if better < WORTHWHILE_GAIN * error:
             seeing, error = "sensors", better
-    if given:
+    if fixed:
         return _ArrayModel(first, seeing, error)
     if error <= allowed:
-        return _ArrayModel(1, seeing, error, whole)
-    return replace(_finer(plan, measures, seeing, error, allowed), whole=whole)
+        return _ArrayModel(1, seeing, error, undivided)
+    return replace(_finer(plan, measures, seeing, error, allowed), whole=undivided)
 
 
 def _finer(
@@ -199,7 +199,7 @@ def _finer(
 
 def _worst(
     measures: Sequence[PerSensorReference],
-    parts: int,
+    count: int,
     occlusion: OcclusionPoint,
     allowed: float,
     faint: float = 1.0,
@@ -207,7 +207,7 @@ def _worst(
     """Largest error of signals in some frames, or the first that is more than is allowed."""
     worst = 0.0
     for measure in measures:
-        worst = max(worst, measure.error(parts, occlusion, faint))
+        worst = max(worst, measure.error(count, occlusion, faint))
         if worst > allowed:
             break
     return worst
@@ -230,30 +230,30 @@ class PerSensorReference:
         sensor = heard_at(plan.elements)[:: 2 if _facets(plan.scene) > LARGE_MESH_FACETS else 1]
         every = replace(plan, choices=replace(plan.choices, negligible=PER_SENSOR_TOLERANCE * plan.choices.negligible))
         rows = []
-        for one in sensor:
-            part = subarray(plan.elements, np.array([one]))
-            rows.append(_pressures(plan, frame, sampled_arrivals(every, frame, part), part.elements))
+        for channel in sensor:
+            single = subarray(plan.elements, np.array([channel]))
+            rows.append(_pressures(plan, frame, sampled_arrivals(every, frame, single), single.elements))
         return PerSensorReference(
             plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows]))
         )
 
-    def error(self, parts: int, occlusion: OcclusionPoint = "centre", faint: float = 1.0) -> float:
+    def error(self, count: int, occlusion: OcclusionPoint = "centre", faint: float = 1.0) -> float:
         """Error of signals, relative, where the array is cut into so many parts, and `faint` of the echoes left out is
         left out: of echoes or direct arrivals."""
         chosen = self.plan.choices
         negligible = faint * chosen.negligible
-        choices = replace(chosen, subarrays=parts, occlusion=occlusion, negligible=negligible)
+        choices = replace(chosen, subarrays=count, occlusion=occlusion, negligible=negligible)
         plan = replace(self.plan, choices=choices)
-        found = tuple(np.zeros_like(x) for x in self.exact)
-        for part in subarrays(self.plan.elements, parts):
+        pressures = tuple(np.zeros_like(x) for x in self.exact)
+        for part in subarrays(self.plan.elements, count):
             rows = np.flatnonzero(np.isin(self.sensor, part.sensor))
             if len(rows):
-                own, place = with_rim(part, np.searchsorted(part.sensor, self.sensor[rows]))
-                arrivals = sampled_arrivals(plan, self.frame, part).for_sensors(place, part.elements.count)
-                for out, made in zip(found, _pressures(plan, self.frame, arrivals, own), strict=True):
-                    out[rows] = made[: len(rows)]
+                own, column = with_rim(part, np.searchsorted(part.sensor, self.sensor[rows]))
+                arrivals = sampled_arrivals(plan, self.frame, part).for_sensors(column, part.elements.count)
+                for out, pressure in zip(pressures, _pressures(plan, self.frame, arrivals, own), strict=True):
+                    out[rows] = pressure[: len(rows)]
         sizes = [float(np.linalg.norm(x)) for x in self.exact]
-        errors = [float(np.linalg.norm(a - b)) for a, b in zip(found, self.exact, strict=True)]
+        errors = [float(np.linalg.norm(a - b)) for a, b in zip(pressures, self.exact, strict=True)]
         return max((e / size for e, size in zip(errors, sizes, strict=True) if size > 0.0), default=0.0)
 
 
@@ -270,7 +270,7 @@ def _pressures(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements)
     start, samples = frame_start(plan, frame), plan.windows.samples
     sonar, snaps = plan.scene.sonar, frame.moment.snaps
     echoes, direct = (
-        method.pressure(arrivals.select(some), snaps, elements, sonar, plan.absorption, start, samples)[0]
-        for some in (~arrivals.direct, arrivals.direct)
+        method.pressure(arrivals.select(mask), snaps, elements, sonar, plan.absorption, start, samples)[0]
+        for mask in (~arrivals.direct, arrivals.direct)
     )
     return echoes, direct

@@ -73,10 +73,10 @@ def _loose(plan: Plan) -> int:
 def _tracing(plan: Plan, size: FrameSize) -> float:
     """Seconds to trace every facet once."""
     pairs = zip(plan.scene.laws, plan.scene.meshes, strict=True)
-    each = {law: SECONDS["trace coherent facet" if law else "trace facet"] for law in (False, True)}
-    whole = sum(len(mesh.faces) * each[law.coherent] for law, mesh in pairs) + plan.propagation.cost(size)
-    whole += _loose(plan) * each[False]
-    return whole
+    per_facet = {law: SECONDS["trace coherent facet" if law else "trace facet"] for law in (False, True)}
+    seconds = sum(len(mesh.faces) * per_facet[law.coherent] for law, mesh in pairs) + plan.propagation.cost(size)
+    seconds += _loose(plan) * per_facet[False]
+    return seconds
 
 
 def _ways(plan: Plan) -> int:
@@ -146,9 +146,9 @@ def _chorus_paths(plan: Plan) -> float:
 def _traced(plan: Plan) -> str:
     """How paths are traced, in words."""
     laws = ", ".join(dict.fromkeys(law.kind for law in plan.scene.laws))
-    parts = plan.choices.subarrays
-    to = "the array" if parts == 1 else f"each of {parts} subarrays"
-    if parts == plan.elements.count > 1:
+    count = plan.choices.subarrays
+    to = "the array" if count == 1 else f"each of {count} subarrays"
+    if count == plan.elements.count > 1:
         to = "each hydrophone separately"
     if plan.choices.occlusion == "sensors":
         to += ", occlusion from each hydrophone"
@@ -212,8 +212,8 @@ def _signal_rows(plan: Plan, size: FrameSize) -> list[Row]:
 def _signal_to_noise(plan: Plan, size: FrameSize, parts: int) -> Row:
     """The parts of the sound in the beams of targets, and the echoes of each of several targets alone."""
     targets, gate = plan.sizes["target"], plan.windows.echo_stop - plan.windows.echo_start
-    seen = size.sensors * gate * plan.scene.sonar.sampling_frequency * SECONDS["transform sensor sample"]
-    seconds = (parts + max(targets, 1)) * seen + (parts + 1) * targets * 30 * size.bins * SECONDS["steer beam bin"]
+    spectra = size.sensors * gate * plan.scene.sonar.sampling_frequency * SECONDS["transform sensor sample"]
+    seconds = (parts + max(targets, 1)) * spectra + (parts + 1) * targets * 30 * size.bins * SECONDS["steer beam bin"]
     seconds += plan.choices.synthesis.cost(size) if targets > 1 else 0.0
     return (SIGNAL_TO_NOISE, "each part in the beams of each target", "always", "64 beams of a target", seconds, 0)
 
@@ -234,18 +234,18 @@ def _sonar_rows(plan: Plan, size: FrameSize) -> list[Row]:
         image = 2 * image + size.sensors * SECONDS["remove sensor"]
     if cancelling is not None:
         image += cancelling.cost(size)
-    asked = "image" in plan.products
-    why = "requested" if asked else "needed by the cloud"
+    requested = "image" in plan.products
+    why = "requested" if requested else "needed by the cloud"
     without = ", direct pulse removed" if plan.windows.direct_removed else ""
     without += "" if cancelling is None else f", {cancelling.row()} cancelling"
     rows.append(
-        ("beamform", plan.choices.beamforming.row() + without, why, _steered(plan), image, 4 * size.beams * asked)
+        ("beamform", plan.choices.beamforming.row() + without, why, _steered(plan), image, 4 * size.beams * requested)
     )
     if "beams" in plan.products:
         delays = len(plan.beam_delays)
-        what, count = f"envelopes of beams, {delays} delays", size.beams * delays
+        description, count = f"envelopes of beams, {delays} delays", size.beams * delays
         seconds = size.beams * size.bins * SECONDS["steer beam bin"] + count * SECONDS["envelope delay"]
-        rows.append(("resolve", what, "requested", "0.005 dB, rounding", seconds, 2 * count))
+        rows.append(("resolve", description, "requested", "0.005 dB, rounding", seconds, 2 * count))
     if "cloud" in plan.products:
         error = "predicted, /cloud/range_error" + _bent(plan)
         seconds = plan.choices.picking.cost(size) + plan.choices.placing.cost(size)

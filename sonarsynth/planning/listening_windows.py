@@ -87,14 +87,14 @@ def _opening(scene: Scene, first_echo: float, supports: PulseDurations, margin: 
     the feet of an echo the direct pulse is taken out, and the window opens with the echoes, which never come before it.
     """
     gate, chosen = scene.processing.echo_window.start, scene.processing.direct_pulse
-    earliest, whole = first_echo - supports.echo_before - margin, first_echo - supports.foot - margin
-    overlap = (whole if gate is None else gate) < supports.clear
+    earliest, unclipped = first_echo - supports.echo_before - margin, first_echo - supports.foot - margin
+    overlap = (unclipped if gate is None else gate) < supports.clear
     removed = chosen == "remove" or (chosen == "auto" and overlap)
     if gate is not None:
         return removed, gate
     if np.isnan(first_echo):
         return removed, supports.after
-    return removed, max(whole, 0.0) if removed and overlap else max(earliest, supports.clear)
+    return removed, max(unclipped, 0.0) if removed and overlap else max(earliest, supports.clear)
 
 
 def _first_sample(first_heard: Floats, supports: PulseDurations, rate: float) -> Floats:
@@ -107,9 +107,9 @@ def frame_start(plan: Plan, frame: Frame) -> float:
     Raises FieldError for a frame that was not looked at before and does not fit in the windows.
     """
     windows, scene = plan.windows, plan.scene
-    known = float(windows.start[frame.index])
-    if np.isfinite(known):
-        return known
+    planned = float(windows.start[frame.index])
+    if np.isfinite(planned):
+        return planned
     (span,) = _spans(SampledScene(scene, plan.profile, (frame,)))
     supports, rate, gate = windows.supports, scene.sonar.sampling_frequency, scene.processing.echo_window
     first = float(_first_sample(np.asarray(span.first), supports, rate))
@@ -142,11 +142,11 @@ def _slack(doppler: bool, frame: Frame, span: _ArrivalInterval, profile: Profile
         moved = 2.0 * (fastest + float(np.linalg.norm(frame.sonar_velocity))) * latest / slowest
     if profile.uniform:
         return moved
-    way = slowest * (span.last - min((s.time for s in frame.moment.snaps), default=0.0))  # m, of all legs together
+    length = slowest * (span.last - min((s.time for s in frame.moment.snaps), default=0.0))  # m, of all legs together
     with np.errstate(divide="ignore", invalid="ignore"):
         gradient = float(np.nanmax(np.abs(np.diff(profile.speed)) / np.diff(profile.depth), initial=0.0))
-    bent = way**3 * gradient**2 / (24.0 * slowest**3)
-    return moved + min(bent, way / slowest - way / float(profile.speed.max()))
+    bent = length**3 * gradient**2 / (24.0 * slowest**3)
+    return moved + min(bent, length / slowest - length / float(profile.speed.max()))
 
 
 @dataclass(frozen=True)
@@ -192,9 +192,9 @@ def _span(frame: Frame, profile: Profile, bottom_depth: float, bounces: int) -> 
         return _ArrivalInterval(0.0, 0.0, 0.0, np.nan, np.nan, 0.0)
     direct = np.array([s.time + float(_straight_time(profile, bottom_depth, s.position, array)) for s in snaps])
     earliest, late_echo = np.full(len(snaps), np.inf), [-np.inf] * len(snaps)
-    parts = [(body, some) for body in frame.moment.bodies for some in in_blocks(len(body.mesh.faces))]
-    for body, some in parts:
-        points = body.pose.to_world(body.mesh.centroid[some])
+    blocks = [(body, facets) for body in frame.moment.bodies for facets in in_blocks(len(body.mesh.faces))]
+    for body, facets in blocks:
+        points = body.pose.to_world(body.mesh.centroid[facets])
         back = _straight_time(profile, bottom_depth, points, array)
         for n, snap in ((n, snap) for n, snap in enumerate(snaps) if snap.illuminates):
             echo = snap.time + _straight_time(profile, bottom_depth, snap.position, points) + back
@@ -249,9 +249,9 @@ def _reflected(frame: Frame, profile: Profile, bottom_depth: float, bounces: int
 
 def _latest(paths: Paths, bounces: int, points: int) -> Floats:
     """Longest travel time (point,) of paths with at most so many reflections."""
-    some = paths.surface + paths.bottom <= bounces
+    selected = paths.surface + paths.bottom <= bounces
     out = np.zeros(points)
-    np.maximum.at(out, paths.pair[some], paths.travel_time[some])
+    np.maximum.at(out, paths.pair[selected], paths.travel_time[selected])
     return out
 
 

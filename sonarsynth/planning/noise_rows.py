@@ -36,13 +36,13 @@ NoiseRow = tuple[str, str, str, str, float, int]
 def sound_parts(scene: Scene) -> tuple[str, ...]:
     """What echoes of a scene are heard against."""
     world = scene.world
-    there = {
+    present = {
         "chorus": world.chorus is not None,
         "reverberation": world.reverberation is not None or bool(world.scatterers),
         "noise": bool(world.environment.noises or world.noise_sources),
         "electronics": scene.sonar.electronics is not None,
     }
-    return tuple(name for name, here in there.items() if here)
+    return tuple(name for name, is_present in present.items() if is_present)
 
 
 def part_names(noises: tuple[Noise, ...]) -> tuple[str, ...]:
@@ -58,66 +58,66 @@ def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
     """A row for each part of the noise."""
     scene, elements = plan.scene, plan.elements
     noises = scene.world.environment.noises
-    here = plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1].sonar_pose
-    sound_speed = float(plan.profile.at(depth(here.position)))
+    sonar_pose = plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1].sonar_pose
+    sound_speed = float(plan.profile.at(depth(sonar_pose.position)))
     centre, rows = np.array([scene.sonar.band.centre]), list[NoiseRow]()
     distant = [] if plan.distant_chorus is None else [(DISTANT_CHORUS, plan.distant_chorus)]
     for name, noise in [*zip(part_names(noises), noises, strict=True), *distant]:
         level = 10.0 * np.log10(float(noise.density(centre)[0]) / REFERENCE_PRESSURE**2)
-        said = f"{level:.1f} dB re 1 uPa2/Hz at {centre[0] / 1e3:.3g} kHz"
-        way, error, work = (
+        text = f"{level:.1f} dB re 1 uPa2/Hz at {centre[0] / 1e3:.3g} kHz"
+        method, error, work = (
             "independent between hydrophones",
             "none",
             noise.cost(size),
         )
         if noise.directions is not None:
-            wrong, way = coherence_error(noise.directions, elements, here, scene.sonar, sound_speed)
-            way, error = (
-                f"{getattr(noise.directions, 'kind', 'by its directions')}: {way}",
+            wrong, method = coherence_error(noise.directions, elements, sonar_pose, scene.sonar, sound_speed)
+            method, error = (
+                f"{getattr(noise.directions, 'kind', 'by its directions')}: {method}",
                 f"{wrong:.2g} of the coherence",
             )
             work = seconds(noise.directions, elements, plan.sizes["sample"])
         if noise.played:
-            way, error = f"{getattr(noise.directions, 'kind', 'one')}: a plane wave each 2 ms", "none on average"
+            method, error = f"{getattr(noise.directions, 'kind', 'one')}: a plane wave each 2 ms", "none on average"
             work = PLAYED_SECONDS * plan.sizes["sensor"] * plan.sizes["sample"]
         elif noise.correlated:
-            way = "by its cross spectral density"
-        rows.append((name, f"{noise.row()}, {way}", said, error, work, 0))
+            method = "by its cross spectral density"
+        rows.append((name, f"{noise.row()}, {method}", text, error, work, 0))
     return [*rows, *_source_rows(plan), *_channel_rows(plan)]
 
 
 def _source_rows(plan: Plan) -> list[NoiseRow]:
     """Rows of the sources of noise. Raises FieldError for one that is out of the water."""
-    rows, each, centre = list[NoiseRow](), plan.sizes["sensor"] * plan.sizes["sample"], plan.scene.sonar.band.centre
+    rows, samples, centre = list[NoiseRow](), plan.sizes["sensor"] * plan.sizes["sample"], plan.scene.sonar.band.centre
     trajectory, bottom = plan.scene.trajectory, plan.scene.world.environment.depth
     for number, source in enumerate(plan.scene.world.noise_sources):
         for step in range(trajectory.frames):
             height = float(pose(source.motion, trajectory.time(step)).position[2])
             if not -bottom <= height < 0.0:
-                where = ("scene", "world", "noise_sources", number, "motion")
-                raise FieldError(where, f"is out of the water: z {height:g} m in frame {step} of {-bottom:g} to 0 m")
-        said = "as recorded"
+                path = ("scene", "world", "noise_sources", number, "motion")
+                raise FieldError(path, f"is out of the water: z {height:g} m in frame {step} of {-bottom:g} to 0 m")
+        text = "as recorded"
         if not isinstance(source.sound, NoiseRecording):
             density = float(source.sound.density(np.array([centre]))[0])
             level = 10.0 * np.log10(density / REFERENCE_PRESSURE**2)
-            said = f"{level:.1f} dB re 1 uPa2/Hz at 1 m and {centre / 1e3:.3g} kHz"
+            text = f"{level:.1f} dB re 1 uPa2/Hz at 1 m and {centre / 1e3:.3g} kHz"
         method = f"{source.sound.kind} from one place, each path at each hydrophone"
-        rows.append((f"noise of {source.name}", method, said, "none", PATH_SECONDS * each, 0))
+        rows.append((f"noise of {source.name}", method, text, "none", PATH_SECONDS * samples, 0))
     return rows
 
 
 def _channel_rows(plan: Plan) -> list[NoiseRow]:
     """Rows of the errors of the channels and of their noise."""
     sonar, rows, sizes = plan.scene.sonar, list[NoiseRow](), plan.sizes
-    each = sizes["sensor"] * sizes["sample"]
+    samples = sizes["sensor"] * sizes["sample"]
     if (errors := sonar.sensor_errors) is not None:
         usual = SensorErrors()
-        given = [name for name in vars(usual) if getattr(errors, name) != getattr(usual, name) and name != "known"]
-        method = f"{', '.join(given) or 'no errors'}; processing knows {errors.known}"
+        changed = [name for name in vars(usual) if getattr(errors, name) != getattr(usual, name) and name != "known"]
+        method = f"{', '.join(changed) or 'no errors'}; processing knows {errors.known}"
         rows.append(
-            (SENSORS, method.replace("_", " "), "requested", "none", ERROR_SECONDS * each, 36 * sizes["sensor"])
+            (SENSORS, method.replace("_", " "), "requested", "none", ERROR_SECONDS * samples, 36 * sizes["sensor"])
         )
     if sonar.electronics is not None:
-        said = f"{sonar.electronics.level:.1f} dB re 1 uPa2/Hz"
-        rows.append((ELECTRONICS, "independent between channels", said, "none", DRAW_SECONDS * each, 0))
+        text = f"{sonar.electronics.level:.1f} dB re 1 uPa2/Hz"
+        rows.append((ELECTRONICS, "independent between channels", text, "none", DRAW_SECONDS * samples, 0))
     return rows

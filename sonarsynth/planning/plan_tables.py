@@ -79,9 +79,9 @@ def as_tables(title: str, stages: Sequence[Stage], left_out: Sequence[Omission])
 def as_html(title: str, stages: Sequence[Stage], left_out: Sequence[Omission], lines: Sequence[str]) -> str:
     """The same as HTML, for notebooks."""
     first, second = rows_of(stages, left_out)
-    parts = [f"<p><b>{escape_html(title)}</b></p>", _html_table(STAGE_COLUMNS, first)]
-    parts += [_html_table(OMISSION_COLUMNS, second)] if second else []
-    return "".join([*parts, *(f"<p>{escape_html(line)}</p>" for line in lines)])
+    blocks = [f"<p><b>{escape_html(title)}</b></p>", _html_table(STAGE_COLUMNS, first)]
+    blocks += [_html_table(OMISSION_COLUMNS, second)] if second else []
+    return "".join([*blocks, *(f"<p>{escape_html(line)}</p>" for line in lines)])
 
 
 def _html_table(columns: Row, rows: Sequence[Row]) -> str:

@@ -142,14 +142,14 @@ class Plan:
         if self.scene.world.chorus is None:
             return None
         sonar, first = self.scene.sonar, self.scene.trajectory.time(0)
-        where = pose(self.scene.trajectory.sonar, first).position
-        return chorus_reach(self.scene, self.profile, where, self.absorption(band_frequencies(sonar)))
+        position = pose(self.scene.trajectory.sonar, first).position
+        return chorus_reach(self.scene, self.profile, position, self.absorption(band_frequencies(sonar)))
 
     @cached_property
     def distant_chorus(self) -> DistantChorus | None:
         """What the chorus of the sequence brings from beyond its reach; none where that is left out."""
-        where = pose(self.scene.trajectory.sonar, self.scene.trajectory.time(0)).position
-        return distant_chorus(self.scene, self.profile, where, self.absorption, self.chorus)
+        position = pose(self.scene.trajectory.sonar, self.scene.trajectory.time(0)).position
+        return distant_chorus(self.scene, self.profile, position, self.absorption, self.chorus)
 
     @cached_property
     def _passed(self) -> StraightPaths:

@@ -35,16 +35,16 @@ def passed_by(frames: Sequence[Frame]) -> StraightPaths:
             rows += [_leg(snap.position, body.pose.position, array) for body in frame.moment.bodies]
         if not frame.moment.snaps:
             rows.append(_leg(array, array, array))
-    where, length = (np.array(column) for column in zip(*rows, strict=True))
-    return StraightPaths(where, length if length.any() else length + 1.0)
+    depths, length = (np.array(column) for column in zip(*rows, strict=True))
+    return StraightPaths(depths, length if length.any() else length + 1.0)
 
 
 def _leg(start: Floats, middle: Floats, end: Floats) -> tuple[Floats, Floats]:
     """Depths (sample,) and lengths (sample,) in m of a path in two straight parts."""
     share = 0.5 + 0.5 * _X
-    where = [a + share[:, None] * (b - a) for a, b in ((start, middle), (middle, end))]
+    points = [a + share[:, None] * (b - a) for a, b in ((start, middle), (middle, end))]
     length = [0.5 * _W * np.linalg.norm(b - a) for a, b in ((start, middle), (middle, end))]
-    return np.maximum(depth(np.concatenate(where)), 0.0), np.concatenate(length)
+    return np.maximum(depth(np.concatenate(points)), 0.0), np.concatenate(length)
 
 
 def mean_absorption(absorption: Absorption, passed: StraightPaths, frequency: np.ndarray | float) -> Floats:
@@ -57,11 +57,11 @@ def mean_absorption(absorption: Absorption, passed: StraightPaths, frequency: np
 def _mean(absorption: Absorption, depths: bytes, lengths: bytes, frequencies: bytes) -> Floats:
     """The same, kept: all frames ask for the same few frequencies."""
     f, passed, length = (np.frombuffer(numbers) for numbers in (frequencies, depths, lengths))
-    where, at = np.unique(np.round(passed, 3), return_inverse=True)
+    unique_depths, at = np.unique(np.round(passed, 3), return_inverse=True)
     weight = np.bincount(at, length) / length.sum()
-    found = np.asarray(absorption_db_per_m(absorption, f[:, None], where) @ weight)
-    found.setflags(write=False)
-    return found
+    mean = np.asarray(absorption_db_per_m(absorption, f[:, None], unique_depths) @ weight)
+    mean.setflags(write=False)
+    return mean
 
 
 def shape_error(
@@ -76,8 +76,8 @@ def shape_error(
     mean = mean_absorption(absorption, passed, frequency)
     if not mean[-1] > 0.0:
         return 0.0
-    each = absorption_db_per_m(absorption, frequency[:, None, None], passed.depth)
-    own = np.einsum("fps,ps->pf", each, passed.length)
+    per_depth = absorption_db_per_m(absorption, frequency[:, None, None], passed.depth)
+    own = np.einsum("fps,ps->pf", per_depth, passed.length)
     if bounces:
         longest = float(passed.length.sum(axis=1).max())
         column = absorption_db_per_m(absorption, frequency, bottom * (0.5 + 0.5 * _X)[:, None])

@@ -87,9 +87,9 @@ def image_shares(water: ChorusWater, bounces: int) -> tuple[ImageHeights, Reflec
     def share(rho: Floats, length: Floats) -> Floats:
         grazing = np.arcsin(np.minimum(heights.climb[:, None] / length, 1.0)).T
         centre = water.sonar.band.centre
-        found = reflected(water.environment, water.profile, heights, grazing, centre)
-        turn = 2.0 * np.pi * centre * found.delay_std  # rough: all of the energy, see `chorus_arrivals`
-        return np.asarray((found.modulus**2 * np.where(turn > 1.0, 1.0, np.exp(-(turn**2)))).T)
+        reflection = reflected(water.environment, water.profile, heights, grazing, centre)
+        turn = 2.0 * np.pi * centre * reflection.delay_std  # rough: all of the energy, see `chorus_arrivals`
+        return np.asarray((reflection.modulus**2 * np.where(turn > 1.0, 1.0, np.exp(-(turn**2)))).T)
 
     return heights, share
 
@@ -118,9 +118,9 @@ def _reach(chorus: Chorus, water: ChorusWater, absorption: tuple[float, ...]) ->
     inner = np.append(edges[edges < reach], reach)
     rings = moments(bounces, inner)
     square, fourth = np.array([m.square for m in rings]), np.array([m.fourth for m in rings])
-    each = np.array([excess_kurtosis(chorus.rate, chorus.deviation, square.sum(), x) for x in fourth])
+    ring_kurtosis = np.array([excess_kurtosis(chorus.rate, chorus.deviation, square.sum(), x) for x in fourth])
     spread = float(level_moment(0.0, chorus.deviation, 4) / level_moment(0.0, chorus.deviation, 2) ** 2)
-    stands_for = _thinning(each, np.pi * np.diff(inner**2), spread)
+    stands_for = _thinning(ring_kurtosis, np.pi * np.diff(inner**2), spread)
     spectrum = power_spectrum(
         chorus.rate,
         level_moment(chorus.level, chorus.deviation, 2),
@@ -135,8 +135,8 @@ def _reach(chorus: Chorus, water: ChorusWater, absorption: tuple[float, ...]) ->
         edges=inner,
         stands_for=stands_for,
         mean_level=10.0 * np.log10(level_moment(chorus.level, chorus.deviation, 2)) + 120.0,
-        kurtosis=float(each.sum()),
-        thinned=float(each @ np.where(stands_for > 1.0, stands_for / spread - 1.0, 0.0)),
+        kurtosis=float(ring_kurtosis.sum()),
+        thinned=float(ring_kurtosis @ np.where(stands_for > 1.0, stands_for / spread - 1.0, 0.0)),
         beyond=float(10.0 * np.log10(max(more, 1e-12))),
         level=float(10.0 * np.log10(mean) + 120.0),
     )

@@ -43,8 +43,8 @@ class DistantDirections:
 
     def intensity(self, sine: Floats) -> Floats:
         """As `NoiseDirections.intensity`."""
-        place = np.searchsorted(self.edges, sine, side="right") - 1
-        return np.asarray(self.powers)[np.clip(place, 0, len(self.powers) - 1)]
+        interval = np.searchsorted(self.edges, sine, side="right") - 1
+        return np.asarray(self.powers)[np.clip(interval, 0, len(self.powers) - 1)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ def distant_chorus(
     water = ChorusWater(scene.world.environment, profile, scene.sonar, float(depth(position)))
     lost = (absorption(knots(scene.sonar)), absorption(band_frequencies(scene.sonar)))
     within = 10.0 ** ((reach.level - 120.0) / 10.0)  # Pa2
-    return _distant(chorus, water, (reach.reach, reach.images, within), tuple(tuple(some.tolist()) for some in lost))
+    return _distant(chorus, water, (reach.reach, reach.images, within), tuple(tuple(loss.tolist()) for loss in lost))
 
 
 def knots(sonar: Sonar) -> Floats:
@@ -94,7 +94,7 @@ class _FarPaths(NamedTuple):
 
     @classmethod
     def of(cls, water: ChorusWater, reach: float, images: int) -> _FarPaths:
-        heights, left = image_shares(water, images)
+        heights, share = image_shares(water, images)
         x, weight = np.polynomial.legendre.leggauss(NODES)
         edges = np.geomspace(reach, max(HORIZON, 2.0 * reach), 2 + int(np.log2(max(HORIZON / reach, 1.0))))
         steps = np.log(edges[1:] / edges[:-1])[:, None]
@@ -102,7 +102,7 @@ class _FarPaths(NamedTuple):
         area = np.pi * (steps * weight).ravel() * rho**2
         climb = np.maximum(heights.climb, CAVITY)[:, None]
         length = np.hypot(rho, climb)
-        return cls(area * left(rho, length) / length**2, length, -heights.turns[:, None] * climb / length, area)
+        return cls(area * share(rho, length) / length**2, length, -heights.turns[:, None] * climb / length, area)
 
 
 @lru_cache(maxsize=16)
@@ -113,23 +113,23 @@ def _distant(
     frequency, sonar = knots(water.sonar), water.sonar
     model = chorus.snap.at_depth(water.environment.depth)
     far = _FarPaths.of(water, *reach[:2])
-    made = model.pulse(0.0, 1.2 * float(chorus.widths.max()) * frequency[-1])
-    bare = [np.abs(pulses.spectrum(frequency, pulses.scaled(made, 1.0, width))) ** 2 for width in chorus.widths]
+    unit_pulse = model.pulse(0.0, 1.2 * float(chorus.widths.max()) * frequency[-1])
+    bare = [np.abs(pulses.spectrum(frequency, pulses.scaled(unit_pulse, 1.0, width))) ** 2 for width in chorus.widths]
     lost = np.array(absorption[0]) * np.log(10.0) / 10.0
     spread = np.array([np.sum(far.share * np.exp(-a * far.length)) for a in lost])
     square = level_moment(chorus.level, chorus.deviation, 2)
-    density = 2.0 * chorus.rate * square * np.mean(bare, axis=0) / made.peak**2 * spread
+    density = 2.0 * chorus.rate * square * np.mean(bare, axis=0) / unit_pulse.peak**2 * spread
     pulse = snap_power(model, sonar, np.array(absorption[1]))
     energy = far.share * _energy(pulse, far.length)
     brought = float(energy.sum())
-    whole = reach[2] / (chorus.rate * square) + brought
+    total = reach[2] / (chorus.rate * square) + brought
     fourth = float(np.sum(energy**2 / far.area)) / pulse.duration
     return DistantChorus(
         frequency=frequency,
         decibels=10.0 * np.log10(np.maximum(density, 1e-300)),
         directions=_directions(far.sine, energy),
-        share=brought / whole,
-        kurtosis=excess_kurtosis(chorus.rate, chorus.deviation, whole, fourth),
+        share=brought / total,
+        kurtosis=excess_kurtosis(chorus.rate, chorus.deviation, total, fourth),
     )
 
 
@@ -147,8 +147,8 @@ def _directions(sine: Floats, energy: Floats) -> DistantDirections:
     above = np.append(0.0, top * 2.0 ** np.arange(1.0 - OCTAVES, 1.0))
     edges = np.unique(np.concatenate([-above, above]))
     brought = np.histogram(sine, edges, weights=energy)[0]
-    some = np.flatnonzero(brought > 0.0)
-    kept = slice(some[0], some[-1] + 1)
+    filled = np.flatnonzero(brought > 0.0)
+    span = slice(filled[0], filled[-1] + 1)
     return DistantDirections(
-        tuple(edges[some[0] : some[-1] + 2].tolist()), tuple((brought / np.diff(edges))[kept].tolist())
+        tuple(edges[filled[0] : filled[-1] + 2].tolist()), tuple((brought / np.diff(edges))[span].tolist())
     )

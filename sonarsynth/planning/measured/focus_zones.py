@@ -34,9 +34,9 @@ def beamformer(plan: Plan, indices: Sequence[int]) -> tuple[Any, float]:
     def error(method: Any) -> float:
         if not sampled:
             sampled.extend(
-                found for found in (_signals_of_frame(plan, index) for index in indices) if found is not None
+                signals for signals in (_signals_of_frame(plan, index) for index in indices) if signals is not None
             )
-        return max((image_error(plan, method, *one) for one in sampled), default=0.0)
+        return max((image_error(plan, method, *sample) for sample in sampled), default=0.0)
 
     demand = Demand(accuracy.image_db / SAFETY, accuracy.exact, error, plan.elements)
     return plan.scene.processing.beamforming.resolve(demand)

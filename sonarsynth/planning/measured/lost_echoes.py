@@ -34,31 +34,31 @@ class EchoLosses:
     below: float  # dB: of the echoes over what is left of the direct pulse, in the echo window
 
 
-def lost_echoes(made: Plan) -> list[str]:
+def lost_echoes(plan: Plan) -> list[str]:
     """Notes on what echoes lose, where the direct pulse is taken out or the echo window cuts more than their feet."""
-    windows = made.windows
-    if not (windows.direct_removed or windows.cut) or not made.products & OF_BEAMS:
+    windows = plan.windows
+    if not (windows.direct_removed or windows.cut) or not plan.products & OF_BEAMS:
         return []
-    rows = [row for index in windows.tight if (row := losses(made.at(index), index)) is not None]
-    found = []
+    rows = [row for index in windows.tight if (row := losses(plan.at(index), index)) is not None]
+    lines = []
     if windows.direct_removed and rows:
         fall, below = (min([MOST, *(getattr(row, name) for row in rows)]) for name in ("fall", "below"))
-        chosen = made.scene.processing.direct_pulse == "auto"
+        chosen = plan.scene.processing.direct_pulse == "auto"
         why = "echoes arrive before it has passed" if chosen else "processing.direct_pulse"
         frames = ", ".join(str(row.frame) for row in rows)
-        found.append(
+        lines.append(
             f"the direct pulse is removed ({why}): it is reduced by {fall:.0f} dB, to {below:.0f} dB below the echoes "
             f"in their window (measured, frame {frames})"
         )
     loss = "the removal of the direct pulse" if windows.direct_removed else "the echo window"
-    for name in made.recipe.target_names:
-        some = ((row.lost[name], row.frame) for row in rows if row.lost.get(name, np.nan) >= 0)
-        share, frame = max(some, default=(0.0, 0))
+    for name in plan.recipe.target_names:
+        shares = ((row.lost[name], row.frame) for row in rows if row.lost.get(name, np.nan) >= 0)
+        share, frame = max(shares, default=(0.0, 0))
         if share > NOTED:
             level = f"{-10 * np.log10(1 - share):.2g} dB" if share < 1 else "all of it"
-            part = f"{100 * share:.1f}" if share < 0.995 else f"{100 * share:.4g}"
-            found.append(f"{name}: {part} % of its echo ({level}) is lost to {loss} in frame {frame}")
-    return found
+            percent = f"{100 * share:.1f}" if share < 0.995 else f"{100 * share:.4g}"
+            lines.append(f"{name}: {percent} % of its echo ({level}) is lost to {loss} in frame {frame}")
+    return lines
 
 
 def losses(plan: Plan, index: int) -> EchoLosses | None:
@@ -76,14 +76,14 @@ def losses(plan: Plan, index: int) -> EchoLosses | None:
     first = int(np.argmax(np.where(straight, loud, -np.inf)))
     lit, method = arrivals.snap == arrivals.snap[first], deposit_for(DEFAULT_ERROR)
 
-    def hear(some: np.ndarray) -> Signals:
-        own = arrivals.select(some & lit)
+    def hear(selected: np.ndarray) -> Signals:
+        own = arrivals.select(selected & lit)
         return method.signals(own, snaps, plan.elements, sonar, plan.absorption, start, windows.samples)
 
     direct = hear(straight)
     echoes = [hear(arrivals.target == target) for target in range(len(frame.moment.bodies))]
-    whole = np.array([_energy(echo.pressure) for echo in echoes])
-    if not whole.sum() > 0:
+    sent = np.array([_energy(echo.pressure) for echo in echoes])
+    if not sent.sum() > 0:
         return None
     total = replace(direct, pressure=direct.pressure + sum(echo.pressure for echo in echoes))
     estimates = locator(plan.scene).locate(total, receiver_of(plan, frame), survey_of(plan, frame), 1)
@@ -91,14 +91,14 @@ def losses(plan: Plan, index: int) -> EchoLosses | None:
     ends = ((clock + edge - start) * sonar.sampling_frequency for edge in (windows.echo_start, windows.echo_stop))
     window = slice(*(max(int(np.ceil(end)), 0) for end in ends))
     alone = _without(plan, direct, estimates)
-    kept = np.zeros(len(echoes))
+    imaged = np.zeros(len(echoes))
     for target, echo in enumerate(echoes):
         both = _without(plan, replace(direct, pressure=direct.pressure + echo.pressure), estimates)
-        kept[target] = _energy((both - alone)[:, window])
-    lost = np.where(whole > FAINTEST * whole.sum(), 1 - kept / np.maximum(whole, 1e-300), np.nan)
+        imaged[target] = _energy((both - alone)[:, window])
+    lost = np.where(sent > FAINTEST * sent.sum(), 1 - imaged / np.maximum(sent, 1e-300), np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
         fall = 10 * float(np.log10(_energy(direct.pressure) / _energy(alone)))
-        below = 10 * float(np.log10(kept.sum() / _energy(alone[:, window])))
+        below = 10 * float(np.log10(imaged.sum() / _energy(alone[:, window])))
     names = [body.name for body in frame.moment.bodies]
     return EchoLosses(index, dict(zip(names, np.clip(lost, 0.0, 1.0).tolist(), strict=True)), fall, below)
 
@@ -107,8 +107,8 @@ def _without(plan: Plan, signals: Signals, estimates: SourceEstimates) -> np.nda
     """Pressure (sensor, sample) as it is imaged; that of the signals where nothing can be, or is to be, taken out."""
     if not plan.windows.direct_removed or not np.isfinite(estimates.time[0]):
         return signals.pressure
-    left = remove(signals, estimates, plan.elements, plan.scene.sonar, plan.windows.supports.clear)
-    return (signals if left is None else left).pressure
+    removed = remove(signals, estimates, plan.elements, plan.scene.sonar, plan.windows.supports.clear)
+    return (signals if removed is None else removed).pressure
 
 
 def _energy(pressure: np.ndarray) -> float:

@@ -27,8 +27,8 @@ def propagation(scene: Scene, profile: Profile, frames: Iterable[Frame], signal:
     def error(model: Propagation) -> float:
         return bending_error(model, scene, profile, frames)
 
-    found: Propagation = scene.physics.tracing.resolve(Demand(SHARE * signal, signal == 0.0, error))[0]
-    return found
+    chosen: Propagation = scene.physics.tracing.resolve(Demand(SHARE * signal, signal == 0.0, error))[0]
+    return chosen
 
 
 def bending_error(model: Propagation, scene: Scene, profile: Profile, frames: Iterable[Frame]) -> float:
@@ -44,7 +44,7 @@ def bending_error(model: Propagation, scene: Scene, profile: Profile, frames: It
 
 
 def difference_of_paths(
-    one: tuple[Propagation, Profile], other: tuple[Propagation, Profile], scene: Scene, frames: Iterable[Frame]
+    first: tuple[Propagation, Profile], second: tuple[Propagation, Profile], scene: Scene, frames: Iterable[Frame]
 ) -> float:
     """Error of signals, relative, by which the paths of one model in one water differ from those of another, as in
     `bending_error`; inf where they differ in number."""
@@ -55,14 +55,14 @@ def difference_of_paths(
         start, end = ways(frame, bottom)
         if not len(start):
             continue
-        mine, theirs = (model.connect(profile, bottom, start, end) for model, profile in (one, other))
-        if not _alike(mine, theirs):
+        paths, theirs = (model.connect(profile, bottom, start, end) for model, profile in (first, second))
+        if not _alike(paths, theirs):
             return np.inf
-        late = 2.0 * np.pi * highest * np.abs(mine.travel_time - theirs.travel_time)
-        turned = np.linalg.norm(mine.arrival - theirs.arrival, axis=1)
-        wave = 2.0 * np.pi * highest / float(other[1].at(depth(array)))
+        late = 2.0 * np.pi * highest * np.abs(paths.travel_time - theirs.travel_time)
+        turned = np.linalg.norm(paths.arrival - theirs.arrival, axis=1)
+        wave = 2.0 * np.pi * highest / float(second[1].at(depth(array)))
         over = wave * elements(scene.sonar.array).aperture * turned
-        louder = np.abs(mine.spreading / theirs.spreading - 1.0)
+        louder = np.abs(paths.spreading / theirs.spreading - 1.0)
         worst = max(worst, 2.0 * float(np.max(late + over + louder, initial=0.0)))
     return worst
 
@@ -83,27 +83,27 @@ def unlike_straight(model: Propagation, frame: Frame, profile: Profile, bottom: 
     """By how much (s) direct paths of a model are later or earlier than straight lines, with room: the most of those to
     `around` bodies and the array, and half as much more."""
     start, end = ways(frame, bottom)
-    paths, lines = (some.connect(profile, bottom, start, end) for some in (model.direct, Straight()))
+    paths, lines = (travel_model.connect(profile, bottom, start, end) for travel_model in (model.direct, Straight()))
     return 1.5 * float(np.max(np.abs(paths.travel_time - lines.travel_time[paths.pair]), initial=0.0))
 
 
 def around(frame: Frame, bottom: float) -> Floats:
     """Corners and middles (point, xyz) of the boxes round the bodies of a frame, in the water."""
-    found = [np.empty((0, 3))]
+    blocks = [np.empty((0, 3))]
     for body in frame.moment.bodies:
         low, high = body.mesh.box
-        found += [body.pose.to_world(low + np.vstack([CORNERS, [0.5, 0.5, 0.5]]) * (high - low))]
-    points = np.concatenate(found)
+        blocks += [body.pose.to_world(low + np.vstack([CORNERS, [0.5, 0.5, 0.5]]) * (high - low))]
+    points = np.concatenate(blocks)
     points[:, 2] = np.clip(points[:, 2], -bottom, 0.0)
     return points
 
 
-def _alike(one: Paths, other: Paths) -> bool:
+def _alike(first: Paths, second: Paths) -> bool:
     """Whether two models find the same paths: the same pairs, reflections and turns, none flagged."""
-    if len(one.pair) != len(other.pair) or one.flag.any() or other.flag.any():
+    if len(first.pair) != len(second.pair) or first.flag.any() or second.flag.any():
         return False
-    same = (np.array_equal(getattr(one, name), getattr(other, name)) for name in ("pair", "surface", "bottom"))
-    return all(same) and not other.turning.any()
+    same = (np.array_equal(getattr(first, name), getattr(second, name)) for name in ("pair", "surface", "bottom"))
+    return all(same) and not second.turning.any()
 
 
 def ranging_error(scene: Scene, profile: Profile, frames: Iterable[Frame]) -> float:
@@ -120,8 +120,8 @@ def ranging_error(scene: Scene, profile: Profile, frames: Iterable[Frame]) -> fl
         for snap in frame.moment.snaps:
             source = frame.sonar_pose.to_body(snap.position[None])[0]
             delay = (np.linalg.norm(points - source, axis=1) + distance - np.linalg.norm(source)) / speed
-            one = isovelocity_solution(delay, beam, source, speed).range
-            other = refracted_solution(delay, beam, source, speed, frame.sonar_pose, profile).range
-            differ = np.abs(one - other)
+            straight = isovelocity_solution(delay, beam, source, speed).range
+            refracted = refracted_solution(delay, beam, source, speed, frame.sonar_pose, profile).range
+            differ = np.abs(straight - refracted)
             worst = max(worst, float(np.nan_to_num(differ, nan=0.0).max(initial=0.0)))
     return worst

@@ -49,20 +49,20 @@ def reverberation_levels(plan: Plan) -> ReverberationLevels | None:
     frame = plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1]
     start = frame_start(plan, frame)
     try:
-        found = frame_scatterers(plan, frame, start)
+        scatterers = frame_scatterers(plan, frame, start)
     except ValueError as error:
         raise FieldError(("scene", "world", "reverberation"), str(error)) from None
     stop = start + plan.windows.samples / scene.sonar.sampling_frequency
     opens = max(stop - (plan.windows.echo_stop - plan.windows.echo_start), start)
-    inside = (found.delay >= opens) & (found.delay < stop)
-    power = np.bincount(found.family[inside], found.energy[inside], len(found.families)) / (stop - opens)
-    count = np.bincount(found.family, minlength=len(found.families))
+    inside = (scatterers.delay >= opens) & (scatterers.delay < stop)
+    power = np.bincount(scatterers.family[inside], scatterers.energy[inside], len(scatterers.families)) / (stop - opens)
+    count = np.bincount(scatterers.family, minlength=len(scatterers.families))
     with np.errstate(divide="ignore"):
         level = 10.0 * np.log10(np.append(power, noise_power(scene) / plan.elements.count)) + 120.0
-    counted = zip(found.families, count.tolist(), level[:-1].tolist(), strict=True)
-    some = tuple(one for one in counted if one[1])
+    counted = zip(scatterers.families, count.tolist(), level[:-1].tolist(), strict=True)
+    families = tuple(row for row in counted if row[1])
     edges = _changes_within_band(plan)
-    return ReverberationLevels(some, found.left_out, float(level[-1]), edges, len(found.delay))
+    return ReverberationLevels(families, scatterers.left_out, float(level[-1]), edges, len(scatterers.delay))
 
 
 def _changes_within_band(plan: Plan) -> float:

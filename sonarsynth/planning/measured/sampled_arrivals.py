@@ -25,22 +25,22 @@ FEW_LAYERS = 1000
 are as many fewer facets."""
 
 
-def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arrivals:
+def arrivals_of(plan: Plan, frame: Frame, subarray: Subarray | None = None) -> Arrivals:
     """Every path of a frame to the middle of the array, or of a part of it, expanded over its hydrophones.
 
     `plan` is that of the frame's sequence. Raises ValueError for anything outside the water.
     """
-    return trace(context_of(plan, frame, part), plan.propagation)
+    return trace(context_of(plan, frame, subarray), plan.propagation)
 
 
-def sampled_arrivals(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arrivals:
+def sampled_arrivals(plan: Plan, frame: Frame, subarray: Subarray | None = None) -> Arrivals:
     """The same by way of about `SAMPLE` facets, which err as all do where their powers add; where facets add with their
     phases, by way of all: of these the sum is smaller than its parts, and what they err by is not."""
-    context = context_of(plan, frame, part)
+    context = context_of(plan, frame, subarray)
     adds = not any(law.coherent or law.passes_sound for law in plan.scene.laws)
     every = one_facet_in(plan.profile, sum(len(mesh.faces) for mesh in plan.scene.meshes), SAMPLE)
-    some = replace(context.tolerances, every=every if adds and every > 4 else 1)
-    return trace(replace(context, tolerances=some), plan.propagation)
+    tolerances = replace(context.tolerances, every=every if adds and every > 4 else 1)
+    return trace(replace(context, tolerances=tolerances), plan.propagation)
 
 
 def one_facet_in(profile: Profile, facets: int, sample: int) -> int:
@@ -48,28 +48,28 @@ def one_facet_in(profile: Profile, facets: int, sample: int) -> int:
     return max(int(facets * max(len(profile.depth) / FEW_LAYERS, 1.0) / sample), 1)
 
 
-def context_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> FrameContext:
+def context_of(plan: Plan, frame: Frame, subarray: Subarray | None = None) -> FrameContext:
     """What a frame is traced in, at the array or a part of it.
 
     What is not traced to any hydrophone, as where parts are, is seen by the array's middle alone.
     """
-    choices, accuracy, receiver = plan.choices, plan.recipe.accuracy, receiver_of(plan, frame, part)
+    choices, accuracy, receiver = plan.choices, plan.recipe.accuracy, receiver_of(plan, frame, subarray)
     tolerances = Tolerances(
         negligible=choices.negligible,
         quadratic=AMPLITUDES * accuracy.cheap,
         shared=accuracy.signal,
-        occlusion=choices.occlusion if part is not None or choices.subarrays == 1 else "centre",
+        occlusion=choices.occlusion if subarray is not None or choices.subarrays == 1 else "centre",
     )
     world = frame.moment
     everything = world.time, world.bodies, world.snaps, plan.medium, receiver, plan.scene.laws, tolerances
     return FrameContext(*everything, scatterers=world.scatterers)
 
 
-def receiver_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Receiver:
+def receiver_of(plan: Plan, frame: Frame, subarray: Subarray | None = None) -> Receiver:
     """The array of a frame, or a part of it."""
     pose, track, own = frame.sonar_pose, frame.sonar_track, plan.elements
-    if part is not None:
-        pose, track, own = subarray_pose(pose, part), track.part(part.centre), part.elements
+    if subarray is not None:
+        pose, track, own = subarray_pose(pose, subarray), track.part(subarray.centre), subarray.elements
     return Receiver(pose, own, plan.scene.sonar, track if plan.scene.physics.doppler else None)
 
 
@@ -80,6 +80,6 @@ def survey_of(plan: Plan, frame: Frame) -> Survey:
     return Survey(plan.scene.world.environment.depth, plan.profile, told)
 
 
-def subarray_pose(pose: Pose, part: Subarray) -> Pose:
+def subarray_pose(pose: Pose, subarray: Subarray) -> Pose:
     """The pose of a part of an array that has a pose."""
-    return Pose(pose.to_world(part.centre[None, :])[0], pose.orientation)
+    return Pose(pose.to_world(subarray.centre[None, :])[0], pose.orientation)

@@ -39,13 +39,13 @@ def sample_frames(recipe: Recipe) -> tuple[SampledScene, ...]:
     """
     steps = sampled_frames(recipe)
     looks = []
-    for sequence, some in steps.items():
+    for sequence, chosen_steps in steps.items():
         with recipe.spanned.naming(sequence):
             scene = recipe.scene_of(sequence)
             check_alike(recipe.described, scene)
             profile = read_inputs(scene)
             check_shrimp(scene)
-            frames = tuple(recipe.frame(recipe.first_frame(sequence) + step)[1] for step in some)
+            frames = tuple(recipe.frame(recipe.first_frame(sequence) + step)[1] for step in chosen_steps)
             for frame in frames:
                 check_frame(scene, frame)
         looks.append(SampledScene(scene, profile, frames))
@@ -59,14 +59,14 @@ def sampled_frames(recipe: Recipe) -> dict[int, list[int]]:
     count = recipe.sequences
     if recipe.frames <= MAX_SAMPLED_FRAMES:
         return {sequence: list(range(recipe.steps(sequence))) for sequence in range(count)}
-    each = min(max(MAX_SAMPLED_FRAMES // count, 2), int(recipe.spanned.steps.max()))
-    some = _spread(count, MAX_SAMPLED_FRAMES // each)
-    return {sequence: _spread(recipe.steps(sequence), each) for sequence in some}
+    frames_each = min(max(MAX_SAMPLED_FRAMES // count, 2), int(recipe.spanned.steps.max()))
+    sequences = _spread(count, MAX_SAMPLED_FRAMES // frames_each)
+    return {sequence: _spread(recipe.steps(sequence), frames_each) for sequence in sequences}
 
 
-def _spread(count: int, most: int) -> list[int]:
+def _spread(count: int, limit: int) -> list[int]:
     """At most so many of 0 to count - 1, evenly spread, both ends among them."""
-    return sorted({int(n) for n in np.linspace(0, count - 1, min(most, count)).round()})
+    return sorted({int(n) for n in np.linspace(0, count - 1, min(limit, count)).round()})
 
 
 def _ends(recipe: Recipe) -> Iterator[SampledScene]:
@@ -83,20 +83,20 @@ def _ends(recipe: Recipe) -> Iterator[SampledScene]:
             yield SampledScene(scene, profile, frames, real=False)
 
 
-def check_alike(first: Scene, other: Scene) -> None:
+def check_alike(first: Scene, second: Scene) -> None:
     """Raises FieldError unless two scenes have targets of the same names, and as many sources: the store's axes.
 
     Of the second, bodies of populations have been drawn: these come and go.
     """
-    world, others = ("scene", "world"), other.world
+    world, others = ("scene", "world"), second.world
     drawn = {name for population in first.world.populations for name in population.slots}
     described = tuple(target for target in others.targets if target.name not in drawn)
-    for what, one, more in (
+    for field, own, more in (
         ("targets", first.world.targets, described),
         ("sources", first.world.sources, others.sources),
     ):
-        if len(one) != len(more):
-            raise FieldError((*world, what), f"all sequences must have equally many: {len(one)} and {len(more)}")
+        if len(own) != len(more):
+            raise FieldError((*world, field), f"all sequences must have equally many: {len(own)} and {len(more)}")
     for i, (a, b) in enumerate(zip(first.world.targets, described, strict=True)):
         if a.name != b.name:
             raise FieldError(

@@ -52,8 +52,8 @@ def thinned(model: Propagation, recipe: Recipe, sequence: int, profile: Profile)
     passed = (above.depth >= low) & (above.depth <= high)
     coarse = polyline(above.depth, above.speed, COARSE)
     for height in HEIGHTS:
-        kept = np.where(passed, polyline(above.depth, above.speed, min(height, COARSE)), coarse)
-        node = above.depth[kept]
+        retained = np.where(passed, polyline(above.depth, above.speed, min(height, COARSE)), coarse)
+        node = above.depth[retained]
         if len(node) > WORTHWHILE * len(above.depth):
             break
         fewer = Profile(node, nearest(node, above.depth, above.at), profile.notes)
@@ -86,11 +86,11 @@ def _above(profile: Profile, bottom: float) -> Profile:
 
 def polyline(depth: Floats, speed: Floats, height: float) -> Bools:
     """(node,) the nodes, ends among them, of a polyline that is nowhere off a profile by more than a height (m/s)."""
-    kept = np.zeros(len(depth), bool)
-    kept[[0, -1]] = True
+    retained = np.zeros(len(depth), bool)
+    retained[[0, -1]] = True
     jumps = np.flatnonzero(np.diff(depth) == 0.0)
-    kept[jumps] = kept[jumps + 1] = True
-    ends = np.flatnonzero(kept)
+    retained[jumps] = retained[jumps + 1] = True
+    ends = np.flatnonzero(retained)
     spans = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
     while spans:
         first, last = spans.pop()
@@ -102,6 +102,6 @@ def polyline(depth: Floats, speed: Floats, height: float) -> Bools:
         worst = int(np.argmax(off))
         if off[worst] > height:
             middle = first + 1 + worst
-            kept[middle] = True
+            retained[middle] = True
             spans += [(first, middle), (middle, last)]
-    return kept
+    return retained

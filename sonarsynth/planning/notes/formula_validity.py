@@ -19,15 +19,15 @@ def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
     Raises FieldError where the sound speed that the sonar believes in cannot be read.
     """
     environment, band = scene.world.environment, scene.sonar.band
-    found = [("sound_speed", note) for note in profile.notes]
-    found += [
+    field_notes = [("sound_speed", note) for note in profile.notes]
+    field_notes += [
         ("absorption", note)
         for note in absorption_notes(environment.absorption, [[band.low], [band.high]], [0.0, environment.depth])
     ]
     if scene.physics.tracing.bounces:
         for name, boundary in (("surface", environment.surface), ("bottom", environment.bottom)):
-            found += [(f"{name}.{field}", note) for field, note in boundary_notes(boundary, band.low, band.high)]
-    lines = [f"scene.world.environment.{field}: {note}" for field, note in found]
+            field_notes += [(f"{name}.{field}", note) for field, note in boundary_notes(boundary, band.low, band.high)]
+    lines = [f"scene.world.environment.{field}: {note}" for field, note in field_notes]
     return (*lines, *noise_notes(scene), *(f"{'.'.join(BELIEVED)}: {note}" for note in _believed(scene)))
 
 

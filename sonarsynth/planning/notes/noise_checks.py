@@ -21,22 +21,22 @@ def check_noises(scene: Scene) -> None:
     Raises FieldError.
     """
     centre = scene.sonar.band.centre
-    for where, noise in _noises(scene):
+    for path, noise in _noises(scene):
         try:
             if isinstance(noise, NoiseRecording):
                 noise.segment(0.0, INSTANT, 1)
             elif not noise.correlated and not noise.density(np.array([centre]))[0] > 0.0:
                 raise ValueError(f"holds nothing of the middle of the band, {centre:g} Hz")
         except ValueError as error:
-            raise FieldError(where, str(error)) from None
+            raise FieldError(path, str(error)) from None
 
 
 def noise_notes(scene: Scene) -> Iterator[str]:
     """Where the formulas of noises do not hold in the band, one line each with its field."""
     band = scene.sonar.band
-    for where, noise in _noises(scene):
+    for path, noise in _noises(scene):
         if not isinstance(noise, NoiseRecording):
-            yield from (f"{'.'.join(map(str, where))}: {note}" for note in noise.validity(band.low, band.high))
+            yield from (f"{'.'.join(map(str, path))}: {note}" for note in noise.validity(band.low, band.high))
 
 
 def _noises(scene: Scene) -> Iterator[tuple[tuple[str | int, ...], Noise | NoiseRecording]]:

@@ -36,10 +36,10 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     if not plan.propagation.bends:
         rows.append(Omission("refraction", "straight rays", _refraction_bound(plan, frame)))
     bounces = plan.propagation.bounces
-    kept = (
+    families = (
         "the direct family" if not bounces else f"paths by at most {bounces} reflections at surface and bottom in all"
     )
-    rows.append(Omission("more reflections", f"requested: {kept}", reflected_bound(plan)))
+    rows.append(Omission("more reflections", f"requested: {families}", reflected_bound(plan)))
     rough = [b for b in (environment.surface, environment.bottom) if rms_height(b) > 0.0]
     if bounces and rough and scene.world.reverberation is None:
         rows.append(
@@ -64,8 +64,8 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     if moving and not scene.physics.doppler:
         rows.append(Omission("Doppler", "not requested: positions are those at the time of the frame", _moved(plan)))
     elif moving:
-        way = "bodies are posed when sound meets their centre; from there constant velocity and spin"
-        rows.append(Omission("motion of targets beyond constant velocity and spin", way, _carried(plan, frame)))
+        model = "bodies are posed when sound meets their centre; from there constant velocity and spin"
+        rows.append(Omission("motion of targets beyond constant velocity and spin", model, _carried(plan, frame)))
     rows += _chorus_left_out(plan) + reverberation_left_out(plan)
     if not environment.noises:
         rows.append(Omission("ambient noise", "none in the recipe", "signals are free of noise"))
@@ -95,13 +95,13 @@ def _chorus_left_out(plan: Plan) -> list[Omission]:
     if chorus is None or reach is None:
         return []
     far = f"snaps beyond {reach.reach:.4g} m, and images by more than {reach.images} reflections"
-    way, bound = "the chorus is heard one snap at a time", f"{reach.beyond:.1f} dB re all of the chorus"
+    reason, bound = "the chorus is heard one snap at a time", f"{reach.beyond:.1f} dB re all of the chorus"
     if (distant := plan.distant_chorus) is not None:
         far = f"single snaps beyond {reach.reach:.4g} m, and images by more than {reach.images} reflections"
-        way = "Gaussian noise of their spectrum, from their directions"
+        reason = "Gaussian noise of their spectrum, from their directions"
         bound = f"no power; excess kurtosis {distant.kurtosis:.2g} of the whole"
     rows = [
-        Omission(far, way, bound),
+        Omission(far, reason, bound),
         Omission(
             "echoes of the chorus off targets", "its snaps light nothing", "those of a snap of its level and place"
         ),
@@ -111,10 +111,10 @@ def _chorus_left_out(plan: Plan) -> list[Omission]:
     rows.append(Omission(faint, "faint", f"each {-FAINT:g} dB re the rms pressure of all of it"))
     many = np.flatnonzero(reach.stands_for > 1.0)
     if many.size:
-        what = f"most snaps beyond {reach.edges[many[0]]:.4g} m"
-        most = int(reach.stands_for.max())
+        snaps = f"most snaps beyond {reach.edges[many[0]]:.4g} m"
+        count = int(reach.stands_for.max())
         bound = f"excess kurtosis {reach.thinned:+.2g}, of {reach.kurtosis:.3g}; no power"
-        rows.append(Omission(what, f"one stands for up to {most} far off, where the sum is Gaussian", bound))
+        rows.append(Omission(snaps, f"one stands for up to {count} far off, where the sum is Gaussian", bound))
     return rows
 
 
@@ -141,11 +141,11 @@ def _refraction_bound(plan: Plan, frame: Frame) -> str:
 
 def _thinned(plan: Plan) -> list[Omission]:
     """Nodes of a measured profile that fewer layers stand for."""
-    read, kept = len(profile_of(plan.scene.world.environment.sound_speed).depth), len(plan.profile.depth)
-    if kept == read:
+    read, nodes = len(profile_of(plan.scene.world.environment.sound_speed).depth), len(plan.profile.depth)
+    if nodes == read:
         return []
     bound = f"{plan.thinning:.1g} of the signals, measured" if plan.thinning else "0: the rest is below the bottom"
-    return [Omission(f"{read} nodes of the sound speed", f"{kept} stand for them", bound)]
+    return [Omission(f"{read} nodes of the sound speed", f"{nodes} stand for them", bound)]
 
 
 def _not_traced(plan: Plan) -> list[Omission]:
@@ -153,10 +153,10 @@ def _not_traced(plan: Plan) -> list[Omission]:
     rows: list[Omission] = []
     choices, count = plan.choices, plan.elements.count
     if choices.subarrays < count:
-        parts = "the array" if choices.subarrays == 1 else f"each of {choices.subarrays} subarrays"
-        known = np.isfinite(plan.errors.expansion)
-        bound = f"{plan.errors.expansion:.1g} of the signals, measured" if known else "not measured"
-        rows.append(Omission("rays to each hydrophone", f"paths are expanded over {parts}", bound))
+        receivers = "the array" if choices.subarrays == 1 else f"each of {choices.subarrays} subarrays"
+        measured = np.isfinite(plan.errors.expansion)
+        bound = f"{plan.errors.expansion:.1g} of the signals, measured" if measured else "not measured"
+        rows.append(Omission("rays to each hydrophone", f"paths are expanded over {receivers}", bound))
     if choices.negligible > 0.0:
         bound = f"{np.sqrt(choices.negligible):.1g} of the echo of each target"
         rows.append(
@@ -247,12 +247,12 @@ def reflected_bound(plan: Plan) -> str:
     bodies, receiver = frame.moment.bodies, Receiver(frame.sonar_pose, plan.elements, sonar)
     fewer = Tolerances(every=one_facet_in(plan.profile, sum(len(body.mesh.faces) for body in bodies), ENOUGH))
     context = FrameContext(frame.time, bodies, frame.moment.snaps, plan.medium, receiver, laws, fewer)
-    found = trace(context, plan.propagation.reflected(bounces + 1))
-    delay_std = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.delay_std) ** 2)
-    power, more = (found.amplitude * delay_std) ** 2, found.surface + found.bottom > bounces
-    parts = []
-    for what, some in (("echoes", ~found.direct), ("snap itself", found.direct)):
-        kept, left = float(power[some & ~more].sum()), float(power[some & more].sum())
-        if kept > 0.0 and left > 0.0:
-            parts.append(f"{what} {10 * np.log10(left / kept):+.1f} dB")
-    return "one reflection more would add, re the paths kept in frame 0: " + (", ".join(parts) or "nothing")
+    arrivals = trace(context, plan.propagation.reflected(bounces + 1))
+    delay_std = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * arrivals.delay_std) ** 2)
+    power, more = (arrivals.amplitude * delay_std) ** 2, arrivals.surface + arrivals.bottom > bounces
+    levels = []
+    for name, mask in (("echoes", ~arrivals.direct), ("snap itself", arrivals.direct)):
+        traced, omitted = float(power[mask & ~more].sum()), float(power[mask & more].sum())
+        if traced > 0.0 and omitted > 0.0:
+            levels.append(f"{name} {10 * np.log10(omitted / traced):+.1f} dB")
+    return "one reflection more would add, re the paths kept in frame 0: " + (", ".join(levels) or "nothing")

@@ -26,43 +26,43 @@ NOTED = 8
 """Sequences that the notes on scenes are from, at most."""
 
 
-def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
+def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     """The notes on a plan, in order of importance."""
-    recipe, scene = made.recipe, made.scene
-    found: list[str] = []
-    if made.looked_at < recipe.frames:
-        found.append(
-            f"the windows are based on {made.looked_at} of {recipe.frames} frames and the ends of the variations; "
+    recipe, scene = plan.recipe, plan.scene
+    lines: list[str] = []
+    if plan.looked_at < recipe.frames:
+        lines.append(
+            f"the windows are based on {plan.looked_at} of {recipe.frames} frames and the ends of the variations; "
             "every other frame is checked when it is rendered, and fails if it does not fit"
         )
-    found += population_notes(recipe) + _shared(recipe, looks)
-    if made.windows.disturbed:
-        found.append(
-            f"{made.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest snap"
+    lines += population_notes(recipe) + _shared(recipe, looks)
+    if plan.windows.disturbed:
+        lines.append(
+            f"{plan.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest snap"
         )
-    if scene.world.chorus is not None and made.chorus is not None:
-        reach, distant = made.chorus, 0.0 if made.distant_chorus is None else made.distant_chorus.share
+    if scene.world.chorus is not None and plan.chorus is not None:
+        reach, distant = plan.chorus, 0.0 if plan.distant_chorus is None else plan.distant_chorus.share
         level = reach.level - 10.0 * np.log10(1.0 - distant)
-        found.append(
+        lines.append(
             f"chorus: {scene.world.chorus.row()}: predicted {level:.0f} dB re 1 uPa rms in the band, "
             f"{100.0 * distant:.2g} % of it from beyond {reach.reach:.4g} m; excess kurtosis of snaps within "
             f"{reach.kurtosis:.3g}"
         )
     cancelled = scene.processing.cancelling is not None
-    if made.propagation.bounces and not cancelled and made.products & OF_BEAMS and made.sizes["emission"]:
-        found.append("reflections of the snap itself enter the image: processing.cancelling removes them")
-    if made.products & OF_BEAMS:
-        found += view_notes(noted(looks))
-    found += lost_echoes(made) + _accuracy(made, looks) + off_the_bottom(scene)
-    if made.sizes["emission"] and made.products & OF_BEAMS:
-        found += assumed_speed_notes(noted(looks))
+    if plan.propagation.bounces and not cancelled and plan.products & OF_BEAMS and plan.sizes["emission"]:
+        lines.append("reflections of the snap itself enter the image: processing.cancelling removes them")
+    if plan.products & OF_BEAMS:
+        lines += view_notes(noted(looks))
+    lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene)
+    if plan.sizes["emission"] and plan.products & OF_BEAMS:
+        lines += assumed_speed_notes(noted(looks))
     for look in noted(looks):
-        found += mirror_notes(look) + overlap_notes(look)
-        found += _extent(look.scene, look.profile)
-        found += _cut(look.scene, look.profile.uniform)
-        found += validity(look.scene, look.profile)
-        found += law_notes(look)
-    return once(found, recipe)
+        lines += mirror_notes(look) + overlap_notes(look)
+        lines += _extent(look.scene, look.profile)
+        lines += _cut(look.scene, look.profile.uniform)
+        lines += validity(look.scene, look.profile)
+        lines += law_notes(look)
+    return once(lines, recipe)
 
 
 def noted(looks: Sequence[SampledScene]) -> list[SampledScene]:
@@ -73,10 +73,10 @@ def noted(looks: Sequence[SampledScene]) -> list[SampledScene]:
 
 def stored_validity(recipe: Recipe, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     """Where formulas and laws of the scenes hold and do not, one line each: as the store has them."""
-    found: list[str] = []
+    lines: list[str] = []
     for look in noted(looks):
-        found += [*held(look), *validity(look.scene, look.profile)]
-    return once(found, recipe)
+        lines += [*held(look), *validity(look.scene, look.profile)]
+    return once(lines, recipe)
 
 
 def _extent(scene: Scene, profile: Profile) -> list[str]:
@@ -85,30 +85,30 @@ def _extent(scene: Scene, profile: Profile) -> list[str]:
     written = scene.world.environment.sound_speed.measured
     if not written or max(first, bottom - last) <= UNKNOWN * bottom:
         return []
-    known = f"at {first:g} m only" if first == last else f"from {first:g} to {last:g} m"
-    return [f"the sound speed is given {known}, but the water is {bottom:g} m deep: it is held constant beyond"]
+    extent = f"at {first:g} m only" if first == last else f"from {first:g} to {last:g} m"
+    return [f"the sound speed is given {extent}, but the water is {bottom:g} m deep: it is held constant beyond"]
 
 
 def _shared(recipe: Recipe, looks: Sequence[SampledScene]) -> list[str]:
     """What sequences of different splits have in common, so that one tells of the other."""
     if recipe.splits is None:
         return []
-    found = []
-    held: dict[str, dict[object, set[int]]] = {"target poses": {}, "snap positions": {}}
+    lines = []
+    splits_by_value: dict[str, dict[object, set[int]]] = {"target poses": {}, "snap positions": {}}
     for look in looks:
         if look.real:
             split, world = recipe.split(look.frames[0].index), look.scene.world
             trajectory = look.scene.trajectory
             poses = tuple((t.motion, trajectory.start, trajectory.interval) for t in world.targets)
             snaps = tuple(tuple(s.place(world.environment.depth).tolist()) for s in world.sources)
-            for what, some in (("target poses", poses), ("snap positions", snaps)):
-                if some:  # scenes without any have nothing in common
-                    held[what].setdefault(some, set()).add(split)
-    for what, splits in held.items():
-        count = sum(len(some) > 1 for some in splits.values())
+            for name, value in (("target poses", poses), ("snap positions", snaps)):
+                if value:  # scenes without any have nothing in common
+                    splits_by_value[name].setdefault(value, set()).add(split)
+    for name, splits in splits_by_value.items():
+        count = sum(len(members) > 1 for members in splits.values())
         if count:
-            found.append(f"{count} sets of {what} occur in more than one split: vary them, or see splits.undivided")
-    return found
+            lines.append(f"{count} sets of {name} occur in more than one split: vary them, or see splits.undivided")
+    return lines
 
 
 def _cut(scene: Scene, uniform: bool) -> tuple[str, ...]:
@@ -124,42 +124,42 @@ def _cut(scene: Scene, uniform: bool) -> tuple[str, ...]:
     )
 
 
-def _accuracy(made: Plan, looks: Sequence[SampledScene]) -> list[str]:
+def _accuracy(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
     """Where the accuracy of the recipe costs a lot, or what the scene chooses does not keep within it."""
-    found, allowed, errors, parts = [], made.recipe.accuracy, made.errors, made.choices.subarrays
-    if parts > 1 and errors.whole > 0.0:
-        found.append(
-            f"accuracy.signal {allowed.signal:g} needs {parts} subarrays, each traced by itself: with one the error is "
+    lines, allowed, errors, count = [], plan.recipe.accuracy, plan.errors, plan.choices.subarrays
+    if count > 1 and errors.whole > 0.0:
+        lines.append(
+            f"accuracy.signal {allowed.signal:g} needs {count} subarrays, each traced by itself: with one the error is "
             f"{errors.whole:.2g}"
         )
-    if made.choices.occlusion == "sensors" and made.scene.physics.occlusion == "auto":
+    if plan.choices.occlusion == "sensors" and plan.scene.physics.occlusion == "auto":
         unseen = "" if errors.whole > allowed.signal else ", and may be more in sequences that were not measured in"
-        found.append(
+        lines.append(
             f"accuracy.signal {allowed.signal:g} needs the targets' occlusion from each hydrophone: with that from "
             f"the array centre the error is {errors.whole:.2g}{unseen}"
         )
     if np.hypot(np.nan_to_num(errors.expansion), np.nan_to_num(errors.synthesis)) > allowed.signal:
-        found.append(
+        lines.append(
             f"signal errors are {errors.expansion:.2g} (paths over the array) and {errors.synthesis:.2g} (synthesis): "
             f"accuracy.signal allows {allowed.signal:g}, but the recipe fixes the method (scene.physics)"
         )
     tolerance = 20.0 * np.log10(1.0 + allowed.signal)
-    if made.absorption_error > tolerance:
-        found.append(
-            f"all paths share the absorption spectrum at their mean depth: up to {made.absorption_error:.2g} dB off at "
+    if plan.absorption_error > tolerance:
+        lines.append(
+            f"all paths share the absorption spectrum at their mean depth: up to {plan.absorption_error:.2g} dB off at "
             f"the ends of the band, where accuracy.signal allows {tolerance:.2g} dB"
         )
     if errors.ranging > allowed.range_m:
-        found.append(
-            f"range errors are {errors.ranging:.2g} m{_why_ranges_err(made.scene, looks)}: accuracy.range_m allows "
-            f"{allowed.range_m:g}, but the recipe requests '{made.choices.placing.kind}' (scene.processing.placing)"
+        lines.append(
+            f"range errors are {errors.ranging:.2g} m{_why_ranges_err(plan.scene, looks)}: accuracy.range_m allows "
+            f"{allowed.range_m:g}, but the recipe requests '{plan.choices.placing.kind}' (scene.processing.placing)"
         )
     if errors.image > allowed.image_db:
-        found.append(
+        lines.append(
             f"beams out of focus have errors of {errors.image:.2g} dB: accuracy.image_db allows "
             f"{allowed.image_db:g}; use more scene.processing.beamforming.zones, or kind dense"
         )
-    return found
+    return lines
 
 
 def _why_ranges_err(scene: Scene, looks: Sequence[SampledScene]) -> str:

@@ -21,14 +21,14 @@ def population_notes(recipe: Recipe) -> list[str]:
     """
     if not recipe.described.world.populations:
         return []
-    some = np.unique(np.linspace(0, recipe.sequences - 1, min(recipe.sequences, LOOKED_AT)).round().astype(int))
-    numbers, tried = [], 0
-    for sequence in some.tolist():
+    sequences = np.unique(np.linspace(0, recipe.sequences - 1, min(recipe.sequences, LOOKED_AT)).round().astype(int))
+    numbers, draws = [], 0
+    for sequence in sequences.tolist():
         with recipe.spanned.naming(sequence):
             drawn = recipe.spanned.bodies(sequence)
         numbers.append(len(drawn.targets))
-        tried += drawn.tried
-    refused = 100.0 * (1.0 - sum(numbers) / tried) if tried else 0.0
+        draws += drawn.tried
+    refused = 100.0 * (1.0 - sum(numbers) / draws) if draws else 0.0
     empty = sum(number == 0 for number in numbers)
     return [
         f"populations: {min(numbers)} to {max(numbers)} bodies in {counted(len(numbers), 'sequence')} drawn, "
@@ -40,11 +40,11 @@ def population_notes(recipe: Recipe) -> list[str]:
 def once(lines: Iterable[str], recipe: Recipe) -> tuple[str, ...]:
     """Notes without repeats: of the bodies of a population that differ in numbers alone, the first, of all of them."""
     slots = {name: p.name for p in recipe.described.world.populations for name in p.slots}
-    found: dict[str, str] = {}
+    unique: dict[str, str] = {}
     for line in lines:
         name, colon, text = line.partition(": ")
         if colon and name in slots:
-            found.setdefault(re.sub(r"[\d.e+-]+", "#", f"{slots[name]}: {text}"), f"{slots[name]}, such as {line}")
+            unique.setdefault(re.sub(r"[\d.e+-]+", "#", f"{slots[name]}: {text}"), f"{slots[name]}, such as {line}")
         else:
-            found.setdefault(line, line)
-    return tuple(found.values())
+            unique.setdefault(line, line)
+    return tuple(unique.values())

@@ -107,9 +107,9 @@ def _check_plain(scene: Scene, number: int) -> None:
     body = PlacedTarget(target.name, plain, pose(target.motion, scene.trajectory.time(0)), np.zeros(3))
     if not _box_in_water(body, bottom_depth):
         size = float(np.ptp(plain.box, axis=0).max())
-        what = f"target '{body.name}', {size:.3g} m long {target.shape.read_as},"
+        name = f"target '{body.name}', {size:.3g} m long {target.shape.read_as},"
         _check_depth(
-            ("scene", "world", "targets", number, "motion"), what, _places(body), bottom_depth, "the first frame"
+            ("scene", "world", "targets", number, "motion"), name, _places(body), bottom_depth, "the first frame"
         )
 
 
@@ -117,12 +117,12 @@ def check_shrimp(scene: Scene) -> None:
     """Every source must be in the water, and its pulse one that can be made and heard."""
     bottom_depth = scene.world.environment.depth
     for i, source in enumerate(scene.world.sources):
-        place = source.place(bottom_depth)
-        if not np.abs(place).max() <= FARTHEST:
+        position = source.place(bottom_depth)
+        if not np.abs(position).max() <= FARTHEST:
             raise FieldError(
                 ("scene", "world", "sources", i, "position"), f"is more than {FARTHEST:g} m from the origin"
             )
-        down = -float(place[2])
+        down = -float(position[2])
         if not 0 <= down <= bottom_depth:
             raise FieldError(
                 ("scene", "world", "sources", i, "position"),
@@ -134,8 +134,8 @@ def check_shrimp(scene: Scene) -> None:
             raise FieldError(("scene", "world", "sources", i, source.pulse_field), str(error)) from None
     if (chorus := scene.world.chorus) is not None:
         try:
-            one = SnappingShrimp(position=(0.0, 0.0), snap=chorus.snap, source_level=chorus.level)
-            _check_pulse(one, bottom_depth, scene.sonar)
+            shrimp = SnappingShrimp(position=(0.0, 0.0), snap=chorus.snap, source_level=chorus.level)
+            _check_pulse(shrimp, bottom_depth, scene.sonar)
         except ValueError as error:
             raise FieldError(("scene", "world", "chorus", "snap"), str(error)) from None
 
@@ -157,8 +157,10 @@ def check_frame(scene: Scene, frame: Frame) -> None:
             raise FieldError(path, f"target '{body.name}' contains the sonar at frame {frame.index}")
     _check_snaps(scene, frame)
     for number, field in enumerate(frame.moment.scatterers):
-        where = ("scene", "world", "scatterers", number)
-        _check_depth(where, "a scatterer", field.position, scene.world.environment.depth, f"frame {frame.index}")
+        scatterer_path = ("scene", "world", "scatterers", number)
+        _check_depth(
+            scatterer_path, "a scatterer", field.position, scene.world.environment.depth, f"frame {frame.index}"
+        )
 
 
 def _check_met(scene: Scene, frame: Frame, number: int) -> None:
@@ -168,14 +170,14 @@ def _check_met(scene: Scene, frame: Frame, number: int) -> None:
     if body.track.still or not snaps:
         return
     met = meeting_times([body.track], snaps, lambda start, end: np.linalg.norm(end - start, axis=1) / slowest)
-    bottom_depth, what = scene.world.environment.depth, f"target '{body.name}', where sound meets it,"
+    bottom_depth, name = scene.world.environment.depth, f"target '{body.name}', where sound meets it,"
     for late in {float(met.min()), float(met.max())}:
-        there = body.later(late)
-        if not _box_in_water(there, bottom_depth):
-            _check_depth(path, what, _places(there), bottom_depth, f"frame {frame.index}")
+        moved = body.later(late)
+        if not _box_in_water(moved, bottom_depth):
+            _check_depth(path, name, _places(moved), bottom_depth, f"frame {frame.index}")
     for snap in snaps:
         if snap.time and inside(body.later(snap.time), snap.position):
-            raise FieldError(path, f"{what} contains a snap at frame {frame.index}")
+            raise FieldError(path, f"{name} contains a snap at frame {frame.index}")
 
 
 def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
@@ -186,8 +188,8 @@ def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
     if array + 2.0 * own > 0.9 * MAX_DOPPLER * slowest:
         sonar = array > 2.0 * own
         path = ("scene", "trajectory", "sonar") if sonar else ("scene", "world", "targets", number, "motion")
-        what, speed = ("the array", array) if sonar else (f"target '{body.name}'", own)
-        raise FieldError(path, f"{what} moves at {speed:.3g} m/s at frame {frame.index}, too fast for sound in water")
+        name, speed = ("the array", array) if sonar else (f"target '{body.name}'", own)
+        raise FieldError(path, f"{name} moves at {speed:.3g} m/s at frame {frame.index}, too fast for sound in water")
 
 
 def _check_snaps(scene: Scene, frame: Frame) -> None:
@@ -242,8 +244,8 @@ def _box_in_water(body: PlacedTarget, bottom_depth: float) -> bool:
 def _places(body: PlacedTarget) -> Floats:
     """Places in the world of the vertices of a body that lie farthest out along each axis of the world, either way."""
     extreme = []
-    for some in in_blocks(len(body.mesh.vertices)):
-        places = body.pose.to_world(body.mesh.vertices[some])
+    for block in in_blocks(len(body.mesh.vertices)):
+        places = body.pose.to_world(body.mesh.vertices[block])
         extreme.append(places[np.concatenate([places.argmin(axis=0), places.argmax(axis=0)])])
     return np.concatenate(extreme)
 
@@ -254,23 +256,23 @@ def _check_pulse(source: SoundSource, bottom_depth: float, sonar: Sonar) -> None
     gain, longest = source.largest_scales
     if fault := model.fault(longest, LONGEST_SNAP):
         raise ValueError(fault)
-    made = model.pulse(0.0, 0.0)
-    if not longest * (made.end - made.start) <= LONGEST_SNAP:
-        raise ValueError(f"lasts {longest * (made.end - made.start):.3g} s; a snap is over in {LONGEST_SNAP:g} s")
-    level = float(20.0 * np.log10(gain * made.peak / REFERENCE_PRESSURE))
+    pulse = model.pulse(0.0, 0.0)
+    if not longest * (pulse.end - pulse.start) <= LONGEST_SNAP:
+        raise ValueError(f"lasts {longest * (pulse.end - pulse.start):.3g} s; a snap is over in {LONGEST_SNAP:g} s")
+    level = float(20.0 * np.log10(gain * pulse.peak / REFERENCE_PRESSURE))
     if not abs(level) <= LOUDEST:
         raise ValueError(f"makes a source level of {level:.3g} dB re 1 uPa at 1 m; {LOUDEST:g} dB is the most")
     for width in {longest, 1.0 / longest}:
-        part = heard_part(waveform(model, width), sonar.antialias)
-        if not part >= FAINTEST:
-            raise ValueError(f"is not heard: the sonar's filter passes only {part:.1g} of it")
+        passed = heard_part(waveform(model, width), sonar.antialias)
+        if not passed >= FAINTEST:
+            raise ValueError(f"is not heard: the sonar's filter passes only {passed:.1g} of it")
 
 
-def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bottom_depth: float, when: str) -> None:
+def _check_depth(path: tuple[str | int, ...], name: str, points: Floats, bottom_depth: float, when: str) -> None:
     if not np.abs(points).max() <= FARTHEST:
-        raise FieldError(path, f"{what} is more than {FARTHEST:g} m from the origin at {when}")
+        raise FieldError(path, f"{name} is more than {FARTHEST:g} m from the origin at {when}")
     shallow, deep = float(depth(points).min()), float(depth(points).max())
     if shallow < -TOLERANCE:
-        raise FieldError(path, f"{what} is {-shallow:.3g} m above the surface at {when}")
+        raise FieldError(path, f"{name} is {-shallow:.3g} m above the surface at {when}")
     if deep > bottom_depth + TOLERANCE:
-        raise FieldError(path, f"{what} is {deep - bottom_depth:.3g} m below the bottom at {when}")
+        raise FieldError(path, f"{name} is {deep - bottom_depth:.3g} m below the bottom at {when}")

@@ -24,8 +24,8 @@ def standing_off(scene: Scene) -> tuple[str, ...]:
 def locator(scene: Scene) -> LocatingMethod:
     """How the sonar locates sources, knowing what it is told of where they stand."""
     demand = Demand(0.0, False, lambda method: 0.0, off_bottom=bool(standing_off(scene)))
-    found: LocatingMethod = scene.processing.locating.resolve(demand)[0]
-    return found
+    locating: LocatingMethod = scene.processing.locating.resolve(demand)[0]
+    return locating
 
 
 def off_the_bottom(scene: Scene) -> list[str]:
@@ -36,14 +36,14 @@ def off_the_bottom(scene: Scene) -> list[str]:
 
 def assumed_speed_notes(looks: Sequence[SampledScene]) -> list[str]:
     """Where the sonar takes the water about it for other water than it knows that it may be, in the worst sequence."""
-    worst, found = OFF, []
+    worst, lines = OFF, []
     for look in looks:
         sonar, depth = look.scene.sonar, -float(look.frames[0].sonar_pose.position[2])
         assumed, error, speed = sonar.assumed_sound_speed, sonar.sound_speed_error, float(look.profile.at(depth))
         if abs(speed - assumed) > worst * error:
             worst = abs(speed - assumed) / max(error, 1e-9)
-            found = [
+            lines = [
                 f"the sonar assumes sound at {assumed:g} m/s, good to {error:g} m/s, and the water about it has "
                 f"{speed:.4g} m/s: places are further off than predicted (scene.sonar.assumed_sound_speed)"
             ]
-    return found
+    return lines

@@ -32,28 +32,28 @@ def chosen(look: SampledScene) -> tuple[Frame, ...]:
 
 def law_notes(look: SampledScene) -> list[str]:
     """Where the laws of a scene do not hold for its bodies, and what meshes stand for."""
-    found: list[str] = []
+    lines: list[str] = []
     targets = zip(look.scene.world.targets, look.scene.laws, bodies(look), strict=True)
     for target, law, body in targets:
-        found += [f"{target.name}: {line}" for line in (*body.mesh.notes, *law.validity(body))]
-    return found
+        lines += [f"{target.name}: {line}" for line in (*body.mesh.notes, *law.validity(body))]
+    return lines
 
 
 def held(look: SampledScene) -> list[str]:
     """Where the law of each body of a scene holds or does not, one line at least a body."""
-    found: list[str] = []
+    lines: list[str] = []
     for target, law, body in zip(look.scene.world.targets, look.scene.laws, bodies(look), strict=True):
         low, high = body.ka
         notes = law.validity(body) or (f"holds, by size, facets and angles: ka {low:.3g} to {high:.3g} in the band",)
-        found += [f"{target.name}: {law.kind}: {line}" for line in notes]
-    return found
+        lines += [f"{target.name}: {law.kind}: {line}" for line in notes]
+    return lines
 
 
 def bodies(look: SampledScene) -> list[Scatterer]:
     """The bodies of a scene as laws are asked about them."""
     sonar, speed = look.scene.sonar, look.profile.speed
     aperture, frames = elements(sonar.array).aperture, chosen(look)
-    found = []
+    scatterers = []
     for number, mesh in enumerate(look.scene.meshes):
         distances, angles = [np.inf], [0.0]
         for frame in frames:
@@ -63,34 +63,34 @@ def bodies(look: SampledScene) -> list[Scatterer]:
             for snap in frame.moment.snaps:
                 angles.append(_between(away, snap.position - centre))
         wavelengths = float(speed.min()) / sonar.band.high, float(speed.max()) / sonar.band.low
-        found.append(Scatterer(mesh, *wavelengths, min(distances), aperture, max(angles)))
-    return found
+        scatterers.append(Scatterer(mesh, *wavelengths, min(distances), aperture, max(angles)))
+    return scatterers
 
 
-def _between(one: Floats, other: Floats) -> float:
+def _between(first: Floats, second: Floats) -> float:
     """Angle (rad) between two vectors (xyz); 0 where one has no length."""
-    lengths = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return float(np.arccos(np.clip(one @ other / lengths, -1.0, 1.0))) if lengths > 0.0 else 0.0
+    lengths = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return float(np.arccos(np.clip(first @ second / lengths, -1.0, 1.0))) if lengths > 0.0 else 0.0
 
 
 def overlap_notes(look: SampledScene) -> list[str]:
     """Which bodies overlap, how, and in which frames."""
     when: dict[tuple[str, str, str], list[int]] = {}
-    known: dict[tuple[int, int, bytes], str | None] = {}
+    overlaps: dict[tuple[int, int, bytes], str | None] = {}
     frames = chosen(look)
     for frame in frames:
-        for one, other in _near(frame):
-            a, b = frame.moment.bodies[one], frame.moment.bodies[other]
-            place = a.pose.to_body(b.pose.position), a.pose.turn_to_body(b.pose.turn_to_world(np.eye(3)))
-            key = one, other, np.round(np.concatenate([place[0], place[1].ravel()]), 9).tobytes()
-            if key not in known:
-                known[key] = overlap(a, b)
-            if how := known[key]:
-                when.setdefault((a.name, b.name, how), []).append(frame.index)
+        for first, second in _near(frame):
+            a, b = frame.moment.bodies[first], frame.moment.bodies[second]
+            relative_pose = a.pose.to_body(b.pose.position), a.pose.turn_to_body(b.pose.turn_to_world(np.eye(3)))
+            key = first, second, np.round(np.concatenate([relative_pose[0], relative_pose[1].ravel()]), 9).tobytes()
+            if key not in overlaps:
+                overlaps[key] = overlap(a, b)
+            if kind := overlaps[key]:
+                when.setdefault((a.name, b.name, kind), []).append(frame.index)
     return [
-        f"{a} and {b} {how} {said(indices, len(frames))}: surfaces inside the other body do not echo; surfaces that "
+        f"{a} and {b} {kind} {said(indices, len(frames))}: surfaces inside the other body do not echo; surfaces that "
         "coincide echo once; visibility and labels treat each body as if it were alone"
-        for (a, b, how), indices in when.items()
+        for (a, b, kind), indices in when.items()
     ]
 
 
@@ -106,10 +106,10 @@ def _near(frame: Frame) -> Iterator[tuple[int, int]]:
     if len(frame.moment.bodies) < 2:
         return
     centre, radius = (np.array(column) for column in zip(*map(sphere_round, frame.moment.bodies), strict=True))
-    for one in range(len(centre) - 1):
-        apart = np.linalg.norm(centre[one + 1 :] - centre[one], axis=1)
-        for other in np.flatnonzero(apart < radius[one] + radius[one + 1 :]).tolist():
-            yield one, one + 1 + other
+    for first in range(len(centre) - 1):
+        apart = np.linalg.norm(centre[first + 1 :] - centre[first], axis=1)
+        for second in np.flatnonzero(apart < radius[first] + radius[first + 1 :]).tolist():
+            yield first, first + 1 + second
 
 
 def view_notes(looks: Sequence[SampledScene]) -> list[str]:
@@ -154,19 +154,19 @@ def mirror_notes(look: SampledScene) -> list[str]:
         if any(float(frame.sonar_pose.to_body(snap.position) @ normal) < 0.0 for snap in frame.moment.snaps):
             snaps.append(frame.index)
         for target, body in zip(look.scene.world.targets, frame.moment.bodies, strict=True):
-            seen = frame.sonar_pose.to_body(body.pose.to_world(_corners(body)))
-            if (seen @ normal >= 0.0).all():
+            corners = frame.sonar_pose.to_body(body.pose.to_world(_corners(body)))
+            if (corners @ normal >= 0.0).all():
                 continue
-            behind = UNIT_BOX.faces[(seen @ normal)[UNIT_BOX.faces].min(axis=1) < 0.0]
-            if box_in_view(mirror_image(seen, normal), behind, sonar.beams).view <= View.PARTLY_IN_VIEW:
+            behind = UNIT_BOX.faces[(corners @ normal)[UNIT_BOX.faces].min(axis=1) < 0.0]
+            if box_in_view(mirror_image(corners, normal), behind, sonar.beams).view <= View.PARTLY_IN_VIEW:
                 when.setdefault(target.name, []).append(frame.index)
     plane = "a planar array cannot tell its two sides apart"
-    found = []
+    lines = []
     if snaps:
-        found = [
+        lines = [
             f"snaps come from behind the array {said(snaps, len(frames))} and are taken for mirror images: {plane}"
         ]
-    return found + [
+    return lines + [
         f"{name}: behind the array {said(indices, len(frames))}, and its mirror image is within the beams: false "
         f"points appear in front of the array; {plane}"
         for name, indices in when.items()

@@ -20,17 +20,17 @@ def check_tracks(scene: Scene) -> None:
     Between frames, while sound is under way, a body goes straight on beyond the ends of its track.
     """
     trajectory = scene.trajectory
-    for where, motion in _motions(scene):
+    for path, motion in _motions(scene):
         if not isinstance(motion, RecordedTrack):
             continue
         try:
             first, last = track_span(motion)
         except TrackError as error:
-            raise FieldError(where, str(error)) from None
+            raise FieldError(path, str(error)) from None
         for step in (0, trajectory.frames - 1):
             if not first - ROUNDING <= (time := trajectory.time(step)) <= last + ROUNDING:
                 raise FieldError(
-                    where,
+                    path,
                     f"{motion.path}: is from {first:.12g} to {last:.12g} s of the motions, but frame {step} of a "
                     f"sequence is at {time:.12g} s (see `start`)",
                 )
