@@ -83,13 +83,13 @@ def residue(image: EnergyImage, loudest: float) -> float:
     return float((RESIDUE * loudest) ** 2 * (image.stop - image.start))
 
 
-def loudest_beams(image: EnergyImage, some: npt.NDArray[np.bool_]) -> tuple[tuple[Ints, Ints], int]:
+def loudest_beams(image: EnergyImage, chosen: npt.NDArray[np.bool_]) -> tuple[tuple[Ints, Ints], int]:
     """Rows and columns of some beams, and how many are left out: the faintest of more than `MAX_BEAMS`."""
-    over = int(some.sum())
+    over = int(chosen.sum())
     if over > MAX_BEAMS:
-        energy = np.where(some & np.isfinite(image.energy), image.energy, -1.0)
-        some = some & (energy >= np.partition(energy, -MAX_BEAMS, axis=None)[-MAX_BEAMS])
-    row, column = np.nonzero(some)
+        energy = np.where(chosen & np.isfinite(image.energy), image.energy, -1.0)
+        chosen = chosen & (energy >= np.partition(energy, -MAX_BEAMS, axis=None)[-MAX_BEAMS])
+    row, column = np.nonzero(chosen)
     return (row, column), over - len(row)
 
 
@@ -129,13 +129,13 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
     row, column = beams
     u = direction(received.image.azimuth[column], received.image.elevation[row])
     power = np.empty((len(u), min(int(window.duration / step) + 1, length)), np.float32)
-    for part in range(0, len(u), BEAMS_AT_ONCE):
-        here = slice(part, part + BEAMS_AT_ONCE)
-        sine = u[here] * (elements.face / c)
+    for first in range(0, len(u), BEAMS_AT_ONCE):
+        block = slice(first, first + BEAMS_AT_ONCE)
+        sine = u[block] * (elements.face / c)
         face = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], f[0], spacing, len(f))
         face /= np.sqrt(face**2 @ share)[:, None]
-        echo = ifft(received.beams.spectra(u[here]) * (face * matched).astype(np.complex64), length, axis=1)
-        ranging_kernels.powers(echo, power[here])
+        echo = ifft(received.beams.spectra(u[block]) * (face * matched).astype(np.complex64), length, axis=1)
+        ranging_kernels.powers(echo, power[block])
     spread = np.sum(taper**2)
     centre = f @ taper**2 / spread
     beta = np.sqrt(max((f - centre) ** 2 @ taper**2 / spread, spacing**2))

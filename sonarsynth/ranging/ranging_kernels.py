@@ -39,23 +39,23 @@ def powers(waves: Any, power: Any) -> None:
 
 
 @nb.njit(cache=True, nogil=True)
-def cut_out(pressure: Any, place: Any, half: int, gain: Any) -> Any:
-    """Samples (sensor, 2 half) about `place` (sensor,), counted in samples, times gain and a flat top.
+def cut_out(pressure: Any, arrival: Any, half: int, gain: Any) -> Any:
+    """Samples (sensor, 2 half) about `arrival` (sensor,), counted in samples, times gain and a flat top.
 
-    The window is 1 in its middle three quarters, with raised-cosine flanks, and moves with the place, not with the
+    The window is 1 in its middle three quarters, with raised-cosine flanks, and moves with the arrival, not with the
     samples: x samples after it opens, its flanks are sin^2(2 pi x/half) on either side. Zeros beyond the ends of
     pressure (sensor, sample).
     """
-    sensors, held = pressure.shape
+    sensors, samples = pressure.shape
     angle = 4 * np.pi / half * np.arange(2 * half)
     cosine, sine = np.cos(angle), np.sin(angle)
     cut = np.zeros((sensors, 2 * half))
     for q in np.flatnonzero(gain):
-        whole = np.floor(place[q])
-        first, part = int(whole) - half, place[q] - whole
-        c, s = np.cos(4 * np.pi / half * part), np.sin(4 * np.pi / half * part)
-        for i in range(max(1, -first), min(2 * half, held - first)):
-            x = i - part
+        sample = np.floor(arrival[q])
+        first, fraction = int(sample) - half, arrival[q] - sample
+        c, s = np.cos(4 * np.pi / half * fraction), np.sin(4 * np.pi / half * fraction)
+        for i in range(max(1, -first), min(2 * half, samples - first)):
+            x = i - fraction
             flat = 1.0 if 0.25 * half <= x <= 1.75 * half else 0.5 - 0.5 * (cosine[i] * c + sine[i] * s)
             cut[q, i] = pressure[q, first + i] * flat * gain[q]
     return cut
@@ -140,15 +140,15 @@ def lag_sums(spectrum: Any, response: Any, template: Any, omega: Any) -> Any:
     omega Im(M conj R), |omega M|^2 and |R|^2; spectrum, response (sensor, bin); template, omega (bin,).
     """
     sensors, bins = spectrum.shape
-    slope, weight, rest = np.zeros(sensors), np.zeros(sensors), np.zeros(sensors)
+    slope, weight, residual = np.zeros(sensors), np.zeros(sensors), np.zeros(sensors)
     for q in range(sensors):
         for k in range(bins):
             m = response[q, k] * template[k]
             r = spectrum[q, k] - m
             slope[q] += omega[k] * (m.imag * r.real - m.real * r.imag)
             weight[q] += omega[k] ** 2 * (m.real**2 + m.imag**2)
-            rest[q] += r.real**2 + r.imag**2
-    return slope, weight, rest
+            residual[q] += r.real**2 + r.imag**2
+    return slope, weight, residual
 
 
 @nb.njit(cache=True, nogil=True)
@@ -168,8 +168,8 @@ def loudest_near(
         low, high = max(top[b] - about, 0), min(top[b] + about + 1, steps)
         for i in range(max(row[b] - up, 0), min(row[b] + up + 1, rows)):
             for j in range(max(column[b] - across, 0), min(column[b] + across + 1, columns)):
-                other = index[i, j]
-                if other >= 0 and np.sum((beam[b] - beam[other]) ** 2) <= reach * reach:
+                neighbour = index[i, j]
+                if neighbour >= 0 and np.sum((beam[b] - beam[neighbour]) ** 2) <= reach * reach:
                     for t in range(low, high):
-                        loudest[b] = max(loudest[b], power[other, t])
+                        loudest[b] = max(loudest[b], power[neighbour, t])
     return loudest

@@ -25,5 +25,5 @@ class ReceivedWindow:
     @property
     def located(self) -> bool:
         """Whether there is a snap to range by."""
-        some = self.estimates
-        return bool(len(some.time) and np.isfinite(some.time[0]) and np.isfinite(some.position[0]).all())
+        estimates = self.estimates
+        return bool(len(estimates.time) and np.isfinite(estimates.time[0]) and np.isfinite(estimates.position[0]).all())

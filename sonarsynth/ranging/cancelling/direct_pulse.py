@@ -51,8 +51,8 @@ def remove_others(
     for row in range(1, len(estimates.time)):
         near = window[0] - reach < estimates.time[row] < window[1] + reach
         if near and np.isfinite(estimates.position[row]).all():
-            left = remove(signals, estimates, elements, sonar, length, row)
-            signals = signals if left is None else left
+            removed = remove(signals, estimates, elements, sonar, length, row)
+            signals = signals if removed is None else removed
     return signals
 
 
@@ -99,33 +99,33 @@ def deviations(signals: Signals, elements: Elements, sonar: Sonar, front: PlaneW
     power, slope = (np.sum(np.abs(m) ** 2, axis=1) for m in (model, omega * model))
     for _ in range(ROUNDS):
         aligned_spectrum = ranging_kernels.turned(wave.spectrum, lag, aligned.frequency[0], aligned.spacing)
-        rest = aligned_spectrum - gain[:, None] * model
-        known = 0.5 * float(np.mean(np.abs(rest[live]) ** 2)) / UNLIKE**2
-        late = np.sum(omega * (model * rest.conj()).imag, axis=1) / (slope + known * (2 * np.pi * band.centre) ** 2)
-        lag, gain = lag + late, gain + np.sum((model.conj() * rest).real, axis=1) / (power + known)
+        residual = aligned_spectrum - gain[:, None] * model
+        prior = 0.5 * float(np.mean(np.abs(residual[live]) ** 2)) / UNLIKE**2
+        late = np.sum(omega * (model * residual.conj()).imag, axis=1) / (slope + prior * (2 * np.pi * band.centre) ** 2)
+        lag, gain = lag + late, gain + np.sum((model.conj() * residual).real, axis=1) / (power + prior)
     return np.where(live, lag, 0.0), np.where(live, gain, 1.0)
 
 
 def trusted(
-    image: EnergyImage, whole: Signals, left: Signals, sonar: Sonar, imaging: Imaging, begin: float
+    image: EnergyImage, received: Signals, remaining: Signals, sonar: Sonar, imaging: Imaging, begin: float
 ) -> EnergyImage:
-    """An image of `left`, which is `whole` without its direct pulse: NaN in beams that may hold too much of it still.
+    """An image of `remaining`, `received` without its direct pulse: NaN in beams that may hold too much of it still.
 
-    Before the echo window there are no echoes, so what `left` holds there, from `begin` (s) on, is left of the direct
-    pulse. Its beams, times the ratio of what was taken out within the window and before it, are what may be left
+    Before the echo window there are no echoes, so what `remaining` holds there, from `begin` (s) on, is of the direct
+    pulse still. Its beams, times the ratio of what was taken out within the window and before it, are what may be left
     within: no more than `MOST` of the energy of a beam, or of `JUDGED` of the brightest.
     """
-    taken, start = replace(left, pressure=whole.pressure - left.pressure), max(begin, left.start)
-    within = _energy(taken, sonar, image.start, image.stop)
+    removed, start = replace(remaining, pressure=received.pressure - remaining.pressure), max(begin, remaining.start)
+    within = _energy(removed, sonar, image.start, image.stop)
     if within == 0:
         return replace(image, remainder=0.0)
-    before = _energy(taken, sonar, start, image.start)
-    rest = imaging(left, start, image.start).energy.astype(float) * (within / max(before, np.finfo(float).tiny))
+    before = _energy(removed, sonar, start, image.start)
+    leakage = imaging(remaining, start, image.start).energy.astype(float) * (within / max(before, np.finfo(float).tiny))
     judged = np.maximum(image.energy, JUDGED * image.energy.max())
-    kept = np.where(rest <= MOST * judged, image.energy, np.float32("nan"))
+    energy = np.where(leakage <= MOST * judged, image.energy, np.float32("nan"))
     loudest = np.unravel_index(image.energy.argmax(), image.energy.shape)
-    share = rest[loudest] / image.energy[loudest] if image.energy[loudest] > 0 else np.nan
-    return replace(image, energy=kept.astype(np.float32), remainder=float(share))
+    share = leakage[loudest] / image.energy[loudest] if image.energy[loudest] > 0 else np.nan
+    return replace(image, energy=energy.astype(np.float32), remainder=float(share))
 
 
 def _energy(signals: Signals, sonar: Sonar, start: float, stop: float) -> float:

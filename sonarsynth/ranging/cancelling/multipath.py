@@ -91,15 +91,15 @@ def images(position: Floats, pose: Pose, bottom_depth: float, bounces: int) -> l
 
     Two paths of each number of reflections: the first at the surface, or at the bottom.
     """
-    found = []
+    paths = []
     for first in (0, 1):
-        place = pose.to_world(position).copy()
+        image = pose.to_world(position).copy()
         for n in range(bounces):
             at_bottom = (first + n) % 2
-            place[2] = -2 * bottom_depth * at_bottom - place[2]
+            image[2] = -2 * bottom_depth * at_bottom - image[2]
             bottom = (n + 1 + first) // 2
-            found.append((n + 1 - bottom, bottom, pose.to_body(place)))
-    return found
+            paths.append((n + 1 - bottom, bottom, pose.to_body(image)))
+    return paths
 
 
 def cancel(
@@ -118,22 +118,22 @@ def cancel(
     if np.sum(elements.gain != 0) < SENSORS:
         return CancelledSignals(signals, ())
     expected = expect(signals, estimates, receiver, bottom, limits.bounces)
-    left, outcomes, taken = signals, [], []
-    for each in sorted(expected, key=lambda e: -e.energy):
-        reason = _out_of_question(each.front, estimates, elements, sonar, window)
-        outcome = Outcome(each, reason) if reason != CANCELLED else find(left, elements, sonar, each, limits)
+    remaining, outcomes, segments = signals, [], []
+    for arrival in sorted(expected, key=lambda e: -e.energy):
+        reason = _out_of_question(arrival.front, estimates, elements, sonar, window)
+        outcome = Outcome(arrival, reason) if reason != CANCELLED else find(remaining, elements, sonar, arrival, limits)
         outcomes.append(outcome)
         if outcome.reason == CANCELLED and outcome.found is not None:
-            taken.append(part_of(left, elements, sonar, outcome.found))
-            left, _ = subtract(left, taken[-1])
-    return CancelledSignals(_settle(left, elements, sonar, taken), tuple(outcomes))
+            segments.append(part_of(remaining, elements, sonar, outcome.found))
+            remaining, _ = subtract(remaining, segments[-1])
+    return CancelledSignals(_settle(remaining, elements, sonar, segments), tuple(outcomes))
 
 
 def expect(
     signals: Signals, estimates: SourceEstimates, receiver: Receiver, bottom_depth: float, bounces: int
 ) -> list[ExpectedArrival]:
     """Every reflected path of every located snap, by image sources and at the assumed sound speed."""
-    elements, sonar, found = receiver.elements, receiver.sonar, []
+    elements, sonar, arrivals = receiver.elements, receiver.sonar, []
     c = sonar.assumed_sound_speed
     for time, position in zip(estimates.time, estimates.position, strict=True):
         distance = float(np.linalg.norm(position))
@@ -143,13 +143,13 @@ def expect(
         aligned = cut(signals, elements, direct.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
         wave = pulse_times.waveform(aligned, elements, c, direct.direction, direct.curvature, direct.time)
         density = 2 * aligned.spacing * np.abs(wave.template) ** 2
-        for surface, bottom, place in images(position, receiver.pose, bottom_depth, bounces):
-            r = float(np.linalg.norm(place))
-            front = PlaneWaveFit(place / r, 1 / r, float(time) + (r - distance) / c)
+        for surface, bottom, image in images(position, receiver.pose, bottom_depth, bounces):
+            r = float(np.linalg.norm(image))
+            front = PlaneWaveFit(image / r, 1 / r, float(time) + (r - distance) / c)
             across, up = front.direction[1:, None] * (elements.face / c)
             face = ranging_kernels.face_responses(across, up, aligned.frequency[0], aligned.spacing, len(density))[0]
-            found.append(ExpectedArrival(surface, bottom, front, float(density @ face**2) * (distance / r) ** 2))
-    return found
+            arrivals.append(ExpectedArrival(surface, bottom, front, float(density @ face**2) * (distance / r) ** 2))
+    return arrivals
 
 
 def _out_of_question(
@@ -197,22 +197,22 @@ def find(signals: Signals, elements: Elements, sonar: Sonar, expected: ExpectedA
     return Outcome(expected, reason, front, excess)
 
 
-def _settle(signals: Signals, elements: Elements, sonar: Sonar, taken: list[WindowSegment]) -> Signals:
+def _settle(signals: Signals, elements: Elements, sonar: Sonar, segments: list[WindowSegment]) -> Signals:
     """Arrivals that overlap are each taken out anew, fitted with the others gone, where that leaves less energy."""
-    parts, first = list(taken), 0.0
+    fits, first = list(segments), 0.0
     for turn in range(PASSES):
         gained = 0.0
-        for n, old in enumerate(parts):
-            if not any(_overlap(old, other, signals) for m, other in enumerate(parts) if m != n):
+        for n, old in enumerate(fits):
+            if not any(_overlap(old, segment, signals) for m, segment in enumerate(fits) if m != n):
                 continue
-            whole, rise = restored(signals, old)
-            fitted = refine(whole, elements, sonar, old.front)
+            restored_signals, rise = restored(signals, old)
+            fitted = refine(restored_signals, elements, sonar, old.front)
             if fitted is None or in_view(fitted[0].direction, elements, sonar):
                 continue
-            new = part_of(whole, elements, sonar, fitted[0])
-            less, fell = subtract(whole, new)
+            new = part_of(restored_signals, elements, sonar, fitted[0])
+            less, fell = subtract(restored_signals, new)
             if rise + fell > 0:
-                signals, parts[n] = less, new
+                signals, fits[n] = less, new
                 gained += rise + fell
         first = gained if turn == 0 else first
         if gained <= SETTLED * first:
@@ -220,6 +220,6 @@ def _settle(signals: Signals, elements: Elements, sonar: Sonar, taken: list[Wind
     return signals
 
 
-def _overlap(one: WindowSegment, other: WindowSegment, signals: Signals) -> bool:
+def _overlap(first: WindowSegment, second: WindowSegment, signals: Signals) -> bool:
     """Whether at any sensor the windows of two parts share a sample."""
-    return bool(np.min(np.abs(one.place - other.place)) < 2 * HALF * signals.sampling_frequency)
+    return bool(np.min(np.abs(first.place - second.place)) < 2 * HALF * signals.sampling_frequency)

@@ -75,16 +75,16 @@ class Candidates:
         row = candidate.row
         if row.reason not in (ACCEPTED, RANGE):
             return refused(row.reason)
-        earlier = [other for other in self.found if other.centre < candidate.centre]
-        if not any(self._may_cause(other, candidate) for other in earlier):
+        earlier = [cause for cause in self.found if cause.centre < candidate.centre]
+        if not any(self._may_cause(cause, candidate) for cause in earlier):
             return row
         return refused(ECHO)
 
-    def _may_cause(self, other: Candidate, candidate: Candidate) -> bool:
-        row, cause = candidate.row, other.row
-        if not np.isfinite(cause.time):  # nothing is known of it, but that it was there
-            return other.power > candidate.power
-        return any(self._may_be_echo(row, source) for source in _sources(cause, self.known))
+    def _may_cause(self, cause: Candidate, candidate: Candidate) -> bool:
+        row, fix = candidate.row, cause.row
+        if not np.isfinite(fix.time):  # nothing is known of it, but that it was there
+            return cause.power > candidate.power
+        return any(self._may_be_echo(row, source) for source in _sources(fix, self.known))
 
     def _may_be_echo(self, row: SourceFix, source: Source) -> bool:
         """Whether a pulse is what a source's echo, or the image itself, would be."""
@@ -110,24 +110,24 @@ class Candidates:
         return not (on_bottom and bool(abs(k - 1 / mirrored) <= slack) and k + slack < 1 / range_)
 
 
-def _sources(row: SourceFix, known: SonarKnowledge) -> list[Source]:
+def _sources(row: SourceFix, knowledge: SonarKnowledge) -> list[Source]:
     """The pulse where its wavefront puts it, and its images in surface and bottom."""
     k = max(row.curvature[0], 1 / FAR)
     direct = Source(row.time, row.chord / k, row.amplitude)
-    speed, found = known.sonar.assumed_sound_speed, [direct]
-    for place in images(direct.place, known.pose, known.bottom_depth, BOUNCES):
-        distance = float(np.linalg.norm(place))
+    speed, sources = knowledge.sonar.assumed_sound_speed, [direct]
+    for image in images(direct.place, knowledge.pose, knowledge.bottom_depth, BOUNCES):
+        distance = float(np.linalg.norm(image))
         longer = distance - 1 / k
-        found.append(Source(row.time + longer / speed, place, row.amplitude / (k * distance)))
-    return [source for source in found if source.time >= row.time]
+        sources.append(Source(row.time + longer / speed, image, row.amplitude / (k * distance)))
+    return [source for source in sources if source.time >= row.time]
 
 
 def images(position: Floats, pose: Pose, bottom: float, bounces: int) -> list[Floats]:
     """Places (xyz) of the images of a source in surface and bottom (m deep), by up to so many reflections."""
-    found = []
+    positions = []
     for first in (0, 1):
-        place = pose.to_world(position).copy()
+        image = pose.to_world(position).copy()
         for n in range(bounces):
-            place[2] = -2 * bottom * ((first + n) % 2) - place[2]
-            found.append(pose.to_body(place))
-    return found
+            image[2] = -2 * bottom * ((first + n) % 2) - image[2]
+            positions.append(pose.to_body(image))
+    return positions

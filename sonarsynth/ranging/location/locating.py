@@ -101,14 +101,14 @@ def locate(
     loud = pulse_times.loudness(signals, live, width)
     rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
     quiet = pulse_times.quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
-    known = SonarKnowledge(elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink)
-    track, candidates = loud.track.copy(), Candidates(known)
+    knowledge = SonarKnowledge(elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink)
+    track, candidates = loud.track.copy(), Candidates(knowledge)
     for _ in range(4 * snaps):
         top = _loudest(track, candidates, signals, snaps)
         if top is None or not track[top] > pulse_times.QUIET * loud.quiet:
             break
         centre = signals.start + top / signals.sampling_frequency
-        candidates.found.append(Candidate(centre, float(track[top]), candidate(signals, known, centre, half, bend)))
+        candidates.found.append(Candidate(centre, float(track[top]), candidate(signals, knowledge, centre, half, bend)))
         track[max(top - width, 0) : top + width + 1] = 0.0
     return as_estimates(candidates.rows, snaps)
 
@@ -117,29 +117,29 @@ def _loudest(track: Floats, candidates: Candidates, signals: Signals, snaps: int
     """Where the signals are loudest; once enough snaps are found, before the first of them: it may be an echo."""
     if candidates.accepted < snaps:
         return int(track.argmax())
-    first = min(each.centre for each in candidates.found if each.row.reason in (ACCEPTED, RANGE))
+    first = min(candidate.centre for candidate in candidates.found if candidate.row.reason in (ACCEPTED, RANGE))
     before = track[: max(round((first - signals.start) * signals.sampling_frequency), 0)]
     return int(before.argmax()) if before.any() else None
 
 
-def candidate(signals: Signals, known: SonarKnowledge, centre: float, half: float, bend: Bend | None) -> SourceFix:
+def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: float, bend: Bend | None) -> SourceFix:
     """The loudest pulse about `centre` (s) by itself; refused where its data do not support a place."""
-    elements, sonar = known.elements, known.sonar
-    found = fit_pulse(signals, elements, sonar, centre, half)
-    if isinstance(found, int):
-        return refused(found)
-    wave, pulse = found
-    if pulse.share > SHARED and pulse.noise > AUDIBLE * known.quiet:
+    elements, sonar = knowledge.elements, knowledge.sonar
+    fitted = fit_pulse(signals, elements, sonar, centre, half)
+    if isinstance(fitted, int):
+        return refused(fitted)
+    wave, pulse = fitted
+    if pulse.share > SHARED and pulse.noise > AUDIBLE * knowledge.quiet:
         return refused(UNRESOLVED)
     if bend is None:
-        return place(wave, pulse, known)
+        return place(wave, pulse, knowledge)
     bent = _refit(pulse, wave, elements, bend.sound_speed, 0.0, sonar.assumed_sound_speed)
-    row = place(wave, pulse, replace(known, gradient=bend.gradient), bent)
+    row = place(wave, pulse, replace(knowledge, gradient=bend.gradient), bent)
     for _ in range(3):  # delays beyond straight ones change little with the place: this settles at once
         extra = bend.delays(row.position)
         if not np.all(np.isfinite(extra)):
             break
-        row = place(_refit(pulse, wave, elements, sonar.assumed_sound_speed, extra), pulse, known, bent)
+        row = place(_refit(pulse, wave, elements, sonar.assumed_sound_speed, extra), pulse, knowledge, bent)
     return row
 
 

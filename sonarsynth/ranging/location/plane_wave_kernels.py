@@ -22,9 +22,9 @@ def tilted_energies(spectrum: Any, response: Any, late: Any, first: float, spaci
     beam = np.zeros((bins, n, n), np.complex128)
     power = np.zeros(bins)
     for q in range(sensors):
-        one, other = np.exp(2j * np.pi * first * late[0, q]), np.exp(2j * np.pi * first * late[1, q])
-        one_on, other_on = np.exp(2j * np.pi * spacing * late[0, q]), np.exp(2j * np.pi * spacing * late[1, q])
-        corner, corner_on = np.conj(one * other) ** steps, np.conj(one_on * other_on) ** steps
+        first_turn, second_turn = np.exp(2j * np.pi * first * late[0, q]), np.exp(2j * np.pi * first * late[1, q])
+        first_step, second_step = np.exp(2j * np.pi * spacing * late[0, q]), np.exp(2j * np.pi * spacing * late[1, q])
+        corner, corner_on = np.conj(first_turn * second_turn) ** steps, np.conj(first_step * second_step) ** steps
         for k in range(bins):
             h = response[q, k]
             power[k] += h * h
@@ -33,9 +33,9 @@ def tilted_energies(spectrum: Any, response: Any, late: Any, first: float, spaci
                 value = row
                 for j in range(n):
                     beam[k, i, j] += value
-                    value *= other
-                row *= one
-            one, other, corner = one * one_on, other * other_on, corner * corner_on
+                    value *= second_turn
+                row *= first_turn
+            first_turn, second_turn, corner = first_turn * first_step, second_turn * second_step, corner * corner_on
     energy = np.zeros((n, n))
     for k in range(bins):
         if power[k] > 0:
@@ -51,15 +51,15 @@ def shares(spectrum: Any, response: Any) -> Any:
     """
     sensors, bins = spectrum.shape
     total = np.zeros(bins, np.complex128)
-    power, whole = np.zeros(bins), np.zeros(bins)
+    power, energy = np.zeros(bins), np.zeros(bins)
     for q in range(sensors):
         for k in range(bins):
             h, x = response[q, k], spectrum[q, k]
             total[k] += h * x
             power[k] += h * h
-            whole[k] += x.real**2 + x.imag**2
+            energy[k] += x.real**2 + x.imag**2
     wave = np.abs(total) ** 2
-    return np.where(power > 0, wave / np.where(power > 0, power, 1.0), 0.0), whole, power
+    return np.where(power > 0, wave / np.where(power > 0, power, 1.0), 0.0), energy, power
 
 
 @nb.njit(cache=True, error_model="numpy", nogil=True)
@@ -69,27 +69,27 @@ def explained(spectrum: Any, response: Any) -> Any:
     total, power = template_sums(spectrum, response)
     for k in range(bins):
         total[k] = total[k] / power[k] if power[k] > 0 else 0.0
-    part = np.empty((sensors, bins), np.complex128)
+    projection = np.empty((sensors, bins), np.complex128)
     for q in range(sensors):
         for k in range(bins):
-            part[q, k] = response[q, k] * total[k]
-    return part
+            projection[q, k] = response[q, k] * total[k]
+    return projection
 
 
 @nb.njit(cache=True, error_model="numpy", nogil=True)
-def add(pressure: Any, place: Any, wave: Any, sign: float) -> Any:
-    """Add sign * wave (sensor, 2 half) to pressure (sensor, sample) about `place`, with the window of `cut_out`.
+def add(pressure: Any, arrival: Any, wave: Any, sign: float) -> Any:
+    """Add sign * wave (sensor, 2 half) to pressure (sensor, sample) about `arrival`, with the window of `cut_out`.
 
     In place. Returns by how much the sum of squares fell (Pa2).
     """
-    sensors, held = pressure.shape
+    sensors, samples = pressure.shape
     half = wave.shape[1] // 2
     fell = 0.0
     for q in range(sensors):
-        whole = np.floor(place[q])
-        first, part = int(whole) - half, place[q] - whole
-        for i in range(max(1, -first), min(2 * half, held - first)):
-            x = i - part
+        sample = np.floor(arrival[q])
+        first, fraction = int(sample) - half, arrival[q] - sample
+        for i in range(max(1, -first), min(2 * half, samples - first)):
+            x = i - fraction
             flat = 1.0 if 0.25 * half <= x <= 1.75 * half else np.sin(2 * np.pi * x / half) ** 2
             old = pressure[q, first + i]
             new = np.float32(old + sign * flat * wave[q, i])

@@ -65,19 +65,19 @@ def cut(signals: Signals, elements: Elements, time: Floats, half: float, band: B
     """As `pulse_times.align`, for a window of `half` (s) to either side; without a band: all frequencies."""
     rate = signals.sampling_frequency
     samples = max(int(half * rate), 4)
-    place = (time - signals.start) * rate
-    window = ranging_kernels.cut_out(signals.pressure, place, samples, (elements.gain != 0) / rate)
+    arrival = (time - signals.start) * rate
+    window = ranging_kernels.cut_out(signals.pressure, arrival, samples, (elements.gain != 0) / rate)
     f = np.asarray(np.arange(samples + 1) * (0.5 * rate / samples), np.float64)
-    kept = slice(None) if band is None else pulse_times.in_band(f, band)
-    spectrum = np.ascontiguousarray(rfft(window, axis=1)[:, kept])
+    bins = slice(None) if band is None else pulse_times.in_band(f, band)
+    spectrum = np.ascontiguousarray(rfft(window, axis=1)[:, bins])
     return AlignedPulse(
-        f[kept], ranging_kernels.turned(spectrum, _since(place, samples) / rate, f[kept][0], f[1]), time, float(f[1])
+        f[bins], ranging_kernels.turned(spectrum, _since(arrival, samples) / rate, f[bins][0], f[1]), time, float(f[1])
     )
 
 
-def _since(place: Floats, samples: int) -> Floats:
-    """From the first sample of a window of 2 `samples` to its place (sensor,), in samples."""
-    return np.asarray(place - np.floor(place) + samples)
+def _since(arrival: Floats, samples: int) -> Floats:
+    """From the first sample of a window of 2 `samples` to the arrival (sensor,), in samples."""
+    return np.asarray(arrival - np.floor(arrival) + samples)
 
 
 def look(signals: Signals, elements: Elements, sonar: Sonar, expected: PlaneWaveFit, search: float) -> PlaneWaveFit:
@@ -128,10 +128,10 @@ def beam_contrast(signals: Signals, elements: Elements, sonar: Sonar, front: Pla
     c = sonar.assumed_sound_speed
     aligned = cut(signals, elements, front.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
     wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
-    own, whole, power = plane_wave_kernels.shares(wave.spectrum, wave.response)
+    own, energy, power = plane_wave_kernels.shares(wave.spectrum, wave.response)
     count = int(np.sum(elements.gain != 0))
-    rest = np.maximum(whole - own, np.finfo(float).eps * whole)
-    ratio = own * (count - 1) / np.where(rest > 0, rest, np.inf)
+    residual = np.maximum(energy - own, np.finfo(float).eps * energy)
+    ratio = own * (count - 1) / np.where(residual > 0, residual, np.inf)
     middle = float(np.median(ratio[power >= np.median(power)]))
     return 10 * float(np.log10(max(middle, 1e-30))), 2 * aligned.spacing * float(own.sum()) / count
 
@@ -165,18 +165,18 @@ def part_of(
     explained = plane_wave_kernels.explained(aligned.spectrum, response) * rate
     explained[:, -1] = 0.0  # half the sampling frequency cannot be moved by parts of a sample
     samples = explained.shape[1] - 1
-    place = (time - signals.start) * rate
-    back = ranging_kernels.turned(explained, -_since(place, samples) / rate, 0.0, aligned.spacing)
-    return WindowSegment(front, place, irfft(back, 2 * samples, axis=1))
+    arrival = (time - signals.start) * rate
+    back = ranging_kernels.turned(explained, -_since(arrival, samples) / rate, 0.0, aligned.spacing)
+    return WindowSegment(front, arrival, irfft(back, 2 * samples, axis=1))
 
 
-def subtract(signals: Signals, part: WindowSegment) -> tuple[Signals, float]:
+def subtract(signals: Signals, segment: WindowSegment) -> tuple[Signals, float]:
     """Signals from which a part is taken, and by how much that lowers their sum of squares (Pa2)."""
-    left = replace(signals, pressure=signals.pressure.copy())
-    return left, float(plane_wave_kernels.add(left.pressure, part.place, part.wave, -1.0))
+    remaining = replace(signals, pressure=signals.pressure.copy())
+    return remaining, float(plane_wave_kernels.add(remaining.pressure, segment.place, segment.wave, -1.0))
 
 
-def restored(signals: Signals, part: WindowSegment) -> tuple[Signals, float]:
+def restored(signals: Signals, segment: WindowSegment) -> tuple[Signals, float]:
     """Signals to which a part that was taken is given back, and by how much that lowers their sum of squares (Pa2)."""
-    whole = replace(signals, pressure=signals.pressure.copy())
-    return whole, float(plane_wave_kernels.add(whole.pressure, part.place, part.wave, 1.0))
+    restored_signals = replace(signals, pressure=signals.pressure.copy())
+    return restored_signals, float(plane_wave_kernels.add(restored_signals.pressure, segment.place, segment.wave, 1.0))

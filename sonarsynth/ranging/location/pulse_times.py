@@ -124,8 +124,8 @@ def excerpt(signals: Signals, centre: float, half: float) -> tuple[npt.NDArray[n
     rate = signals.sampling_frequency
     first = int(np.floor((centre - half - signals.start) * rate))
     count = int(np.ceil(2 * half * rate)) + 1
-    held = signals.pressure.shape[1]
-    a, b = max(first, 0), min(first + count, held)
+    samples = signals.pressure.shape[1]
+    a, b = max(first, 0), min(first + count, samples)
     cut = np.zeros((signals.pressure.shape[0], count), np.float32)
     if b > a:
         cut[:, a - first : b - first] = signals.pressure[:, a:b]
@@ -144,8 +144,8 @@ def envelope_peaks(cut: npt.NDArray[np.float32], rate: float, band: Band) -> tup
     power = wave.real**2 + wave.imag**2
     top = np.clip(power.argmax(axis=1), 1, short - 2)
     rows = np.arange(len(power))
-    place, height = parabola(*(np.sqrt(power[rows, top + i]) for i in (-1, 0, 1)))
-    return (top + place) * (count / (short * rate)), height
+    offset, height = parabola(*(np.sqrt(power[rows, top + i]) for i in (-1, 0, 1)))
+    return (top + offset) * (count / (short * rate)), height
 
 
 def parabola(left: npt.ArrayLike, middle: npt.ArrayLike, right: npt.ArrayLike) -> tuple[Floats, Floats]:
@@ -153,8 +153,8 @@ def parabola(left: npt.ArrayLike, middle: npt.ArrayLike, right: npt.ArrayLike) -
     a, b, c = (np.asarray(v, float) for v in (left, middle, right))
     bend = a - 2 * b + c
     safe = np.where(bend < 0, bend, -1.0)
-    place = np.where(bend < 0, np.clip(0.5 * (a - c) / safe, -0.5, 0.5), 0.0)
-    return np.asarray(place), np.asarray(b - 0.25 * (a - c) * place)
+    offset = np.where(bend < 0, np.clip(0.5 * (a - c) / safe, -0.5, 0.5), 0.0)
+    return np.asarray(offset), np.asarray(b - 0.25 * (a - c) * offset)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,13 +177,13 @@ def align(
     """
     rate = signals.sampling_frequency
     half = max(int(longer * (PULSE_HALF if whole else half_length(band)) * rate), 4)
-    place = (time - signals.start) * rate
-    cut = ranging_kernels.cut_out(signals.pressure, place, half, elements.gain / rate)
+    arrival = (time - signals.start) * rate
+    cut = ranging_kernels.cut_out(signals.pressure, arrival, half, elements.gain / rate)
     f = _frequencies(2 * half, rate)
-    kept = slice(None) if whole else in_band(f, band)
-    since = (place - np.floor(place) + half) / rate
-    spectrum = ranging_kernels.turned(np.ascontiguousarray(rfft(cut, axis=1)[:, kept]), since, f[kept][0], f[1])
-    return AlignedPulse(f[kept], spectrum, time, float(f[1]))
+    bins = slice(None) if whole else in_band(f, band)
+    since = (arrival - np.floor(arrival) + half) / rate
+    spectrum = ranging_kernels.turned(np.ascontiguousarray(rfft(cut, axis=1)[:, bins]), since, f[bins][0], f[1])
+    return AlignedPulse(f[bins], spectrum, time, float(f[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,16 +239,16 @@ def measure(
     """
     wave = waveform(aligned, elements, sound_speed, direction, curvature, time, deaf)
     omega = 2 * np.pi * aligned.frequency
-    slope, weight, rest = ranging_kernels.lag_sums(wave.spectrum, wave.response, wave.template, omega)
+    slope, weight, residuals = ranging_kernels.lag_sums(wave.spectrum, wave.response, wave.template, omega)
     lag = slope / np.where(weight > 0, weight, np.inf)
     live = elements.gain != 0
-    freedom = max(2 * (np.sum(live) - 1) * len(omega) - np.sum(live), 1)
-    left = float(np.sum(rest[live]))
-    held = float(wave.power @ np.abs(wave.template) ** 2)
-    share = left / (held + left) if held + left > 0 else 1.0
+    dof = max(2 * (np.sum(live) - 1) * len(omega) - np.sum(live), 1)
+    noise = float(np.sum(residuals[live]))
+    explained = float(wave.power @ np.abs(wave.template) ** 2)
+    share = noise / (explained + noise) if explained + noise > 0 else 1.0
     if share > ranging_kernels.UNLIKE:
         share = min(share, ranging_kernels.share_beyond_gains(wave.spectrum[live], wave.response[live], wave.template))
-    return Pulse(aligned.frequency, wave.template, time, lag, weight, 2 * left / freedom, wave.power, share, None, deaf)
+    return Pulse(aligned.frequency, wave.template, time, lag, weight, 2 * noise / dof, wave.power, share, None, deaf)
 
 
 def lag_variance(wave: Wavefront, pulse: Pulse, elements: Elements, rounding: float) -> float:

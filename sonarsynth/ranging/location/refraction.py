@@ -42,8 +42,8 @@ def first_rays(profile: Profile, start: Floats, end: Floats) -> FirstRays:
         bottom = max(-a[wet, 2].min(), -b[wet, 2].min(), profile.depth[-1]) + 1.0
         sea = water(profile.depth, profile.speed, float(bottom))
         rays = eigenrays(sea, -a[wet, 2], -b[wet, 2], distance[wet])
-        found, first = np.unique(rays.pair, return_index=True)
-        pair = np.flatnonzero(wet)[found]
+        joined, first = np.unique(rays.pair, return_index=True)
+        pair = np.flatnonzero(wet)[joined]
         time[pair] = rays.travel_time[first]
         heading = across[pair] / np.where(distance[pair] > 0, distance[pair], 1.0)[:, None]
         for vectors, sine in ((departure, rays.start_sine[first]), (arrival, rays.end_sine[first])):

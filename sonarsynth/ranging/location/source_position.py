@@ -96,41 +96,41 @@ def bending_covariance(
     return covariance
 
 
-def place(wave: Wavefront, pulse: Pulse, known: SonarKnowledge, bent: Wavefront | None = None) -> SourceFix:
+def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefront | None = None) -> SourceFix:
     """Ranges and position from a wavefront, and the depth of the bottom where it agrees; errors through the Jacobians.
 
     bent: the wave as the array hears it, where `wave` is the straight one that is left without bending. The direction
     is always that of the wave as heard.
     """
-    elements, sonar, pose = known.elements, known.sonar, known.pose
+    elements, sonar, pose = knowledge.elements, knowledge.sonar, knowledge.pose
     bent = bent or wave
-    timing = lag_variance(wave, pulse, elements, known.rounding) * wave.covariance
+    timing = lag_variance(wave, pulse, elements, knowledge.rounding) * wave.covariance
     full = timing + np.outer(wave.by_sound_speed, wave.by_sound_speed) * sonar.sound_speed_error**2
     if not np.isfinite(full[2, 2]):  # too few sensors to tell the curvature: anything outside the array
         full[2, 2] = 1 / elements.aperture**2
-    fall = -known.bottom_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
+    fall = -knowledge.bottom_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
     slope, by_angle = float(pose.rotation[2] @ wave.direction), wave.tangents @ pose.rotation[2]
     from_depth = fall / slope if slope * fall > 0 else np.nan
-    tilt = by_angle * (KINKED * known.kink * elements.aperture / sonar.assumed_sound_speed)
+    tilt = by_angle * (KINKED * knowledge.kink * elements.aperture / sonar.assumed_sound_speed)
     straight, spread = full, full[:2, :2] + np.outer(tilt, tilt)
     around = spread[0, 0] / max(1 - bent.direction[2] ** 2, 1e-300)
-    fix = _fuse(wave, straight, fall, known)
-    for _ in range(2 * (known.gradient > 0)):  # what bending does depends on the distance, and that a little on bending
+    fix = _fuse(wave, straight, fall, knowledge)
+    for _ in range(2 * (knowledge.gradient > 0)):  # bending depends on the distance, and that a little on bending
         likely = [1 / fix.curvature if fix.curvature > 0 else np.nan, from_depth, elements.aperture]
         distance = next(d for d in likely if np.isfinite(d))
         full = straight + bending_covariance(
-            by_angle, slope, distance, known.gradient, sonar.assumed_sound_speed, elements.aperture
+            by_angle, slope, distance, knowledge.gradient, sonar.assumed_sound_speed, elements.aperture
         )
-        fix = _fuse(wave, full, fall, known)
+        fix = _fuse(wave, full, fall, knowledge)
     with np.errstate(divide="ignore", invalid="ignore"):
         depth_error = np.hypot(from_depth * np.sqrt(by_angle @ full[:2, :2] @ by_angle), sonar.bed_depth_error)
         from_curvature = 1 / wave.curvature if wave.curvature > 0 else np.nan
         curvature_error = np.sqrt(full[2, 2]) * from_curvature**2
     reason = RANGE if not np.sqrt(fix.covariance[2, 2]) <= FARTHEST * fix.curvature else ACCEPTED
-    if not _in_water(wave, full, slope, by_angle, fall, known):
+    if not _in_water(wave, full, slope, by_angle, fall, knowledge):
         reason = OUTSIDE
     time, time_error = _arrival(
-        pulse.longer or pulse, full, timing[3, 3] / max(wave.covariance[3, 3], 1e-300), sonar, known.rounding
+        pulse.longer or pulse, full, timing[3, 3] / max(wave.covariance[3, 3], 1e-300), sonar, knowledge.rounding
     )
     if not np.isfinite(time):
         reason = BAND
@@ -154,20 +154,20 @@ def place(wave: Wavefront, pulse: Pulse, known: SonarKnowledge, bent: Wavefront 
     )
 
 
-def _fuse(wave: Wavefront, covariance: Floats, fall: float, known: SonarKnowledge) -> Fix:
+def _fuse(wave: Wavefront, covariance: Floats, fall: float, knowledge: SonarKnowledge) -> Fix:
     """The wavefront, and where it agrees the depth: slope - k fall = 0 within |k| times the error of the depth.
 
     slope is the sine of the bearing's elevation in the world, fall (m) the height of the bottom above the sonar. In
     (tangents, curvature) the far field is no special case, and the condition is nearly linear: it is made linear anew
     where each step has led (Gauss and Newton), and not used where that does not settle.
     """
-    u, k, p, up = wave.direction, wave.curvature, covariance[:3, :3], known.pose.rotation[2]
+    u, k, p, up = wave.direction, wave.curvature, covariance[:3, :3], knowledge.pose.rotation[2]
     alone = Fix(u, k, p, False)
     slope, by_angle = float(up @ u), wave.tangents @ up
-    if not (known.on_bottom and slope * fall > 0):
+    if not (knowledge.on_bottom and slope * fall > 0):
         return alone
     # near the horizontal the depth says nothing of k
-    noise = (max(abs(k), slope / fall) * known.sonar.bed_depth_error) ** 2
+    noise = (max(abs(k), slope / fall) * knowledge.sonar.bed_depth_error) ** 2
     row = np.array([*by_angle, -fall])
     variance = float(row @ p @ row) + noise
     if not (k * fall - slope) ** 2 <= AGREES * variance:
@@ -202,7 +202,7 @@ def _position(wave: Wavefront, fix: Fix) -> tuple[Floats, Floats]:
 
 
 def _in_water(
-    wave: Wavefront, covariance: Floats, slope: float, by_angle: Floats, fall: float, known: SonarKnowledge
+    wave: Wavefront, covariance: Floats, slope: float, by_angle: Floats, fall: float, knowledge: SonarKnowledge
 ) -> bool:
     """Whether the wavefront alone can come from between surface and bottom, within three standard errors.
 
@@ -210,11 +210,11 @@ def _in_water(
     the bearing this side of the boundary, k room >= slope. An array under the bottom (a shelf overhead) knows none.
     """
     k, p = wave.curvature, covariance[:3, :3]
-    room = fall if slope < 0 else -float(known.pose.position[2])
+    room = fall if slope < 0 else -float(knowledge.pose.position[2])
     if fall > 0 or slope * room <= 0:
         return True
     row = np.array([*by_angle, -room])
-    slack = (max(abs(k), slope / room) * known.sonar.bed_depth_error) ** 2 if slope < 0 else 0.0
+    slack = (max(abs(k), slope / room) * knowledge.sonar.bed_depth_error) ** 2 if slope < 0 else 0.0
     beyond = (slope - k * room) * np.sign(room)
     return bool(beyond <= 3 * np.sqrt(float(row @ p @ row) + slack))
 
@@ -227,10 +227,10 @@ def _arrival(pulse: Pulse, full: Floats, unit: float, sonar: Sonar, rounding: fl
     weight one.
     """
     # `waveform` holds it down
-    whole = np.minimum(1 + pulse.deaf * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)
+    undamped = np.minimum(1 + pulse.deaf * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)
     noise = max(pulse.noise, rounding) / np.maximum(pulse.power, 1e-300)
     low, high = sonar.band.low, sonar.band.high
-    time, error = envelope_peak(pulse.frequency, pulse.template * whole, low, high, noise)
+    time, error = envelope_peak(pulse.frequency, pulse.template * undamped, low, high, noise)
     tilted = max(float(full[3, 3]) - unit / float(np.sum(pulse.weight)), 0.0)
     floor = TIME_FLOOR / (high - low)
     return pulse.time + time, float(np.sqrt(error**2 + tilted + floor**2))

@@ -48,12 +48,12 @@ class Triggered(LocatingMethod):
         from sonarsynth.ranging.location.source_position import ACCEPTED, as_estimates, refused
 
         rows, c, error = [], receiver.sonar.assumed_sound_speed, self.position_error
-        here = float(depth(receiver.pose.position))
+        sonar_depth = float(depth(receiver.pose.position))
         for trigger in survey.triggers:
             own = receiver.pose.to_body(trigger.position)
             r = float(np.linalg.norm(own))
-            there = float(depth(trigger.position))
-            gradient = mean_gradient(survey.profile, here, there, receiver.elements.aperture or 1.0)
+            source_depth = float(depth(trigger.position))
+            gradient = mean_gradient(survey.profile, sonar_depth, source_depth, receiver.elements.aperture or 1.0)
             turned = min(float(np.hypot(error / r, 0.5 * r * gradient / c)), np.pi)
             delay_error = np.hypot(error / c, r * receiver.sonar.sound_speed_error / c**2)
             fix = replace(

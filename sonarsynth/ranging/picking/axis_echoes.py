@@ -84,7 +84,7 @@ def pick(profiles: Profiles, image: EnergyImage, locality: float) -> AxisEchoes:
     rows = np.arange(count)
     top = np.clip(power.argmax(axis=1), 1, power.shape[1] - 2)
     own = power[rows, top]
-    place, _ = pulse_times.parabola(*(np.sqrt(power[rows, top + i]) for i in (-1, 0, 1)))
+    offset, _ = pulse_times.parabola(*(np.sqrt(power[rows, top + i]) for i in (-1, 0, 1)))
     near = np.maximum(_loudest_near(profiles, image, top), own)
     anywhere = maximum_filter1d(power.max(axis=0), profiles.about * 2 + 1)[top]
     noise = np.median(power[:, ::OVERSAMPLING], axis=1)
@@ -96,7 +96,7 @@ def pick(profiles: Profiles, image: EnergyImage, locality: float) -> AxisEchoes:
         off_beam = profiles.width * np.hypot(np.sqrt(excess / 3), OWN_WIDTH)
         jitter = profiles.resolution * np.hypot(np.sqrt(0.5 * noise / own), INTERFERENCE)
         snr = 10 * np.log10(own / noise * np.log(2.0))
-    delay = profiles.first + (top + place) * profiles.step
+    delay = profiles.first + (top + offset) * profiles.step
     clock = np.hypot(jitter, _extent(profiles, top, own))
     return AxisEchoes(np.where(good, delay, np.nan), clock, off_beam, snr)
 

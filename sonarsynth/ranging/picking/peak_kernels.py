@@ -13,15 +13,15 @@ def exceeded(power: Any, index: Any, i: int, j: int, t: int, about: int) -> Any:
     """Whether the value of the beam at (i, j) and delay t has a neighbour that exceeds it, or equals it and comes
     before; neighbours: within one beam and `about` delays. Arrays as for `local_maxima`."""
     rows, columns = index.shape
-    here = index[i, j]
-    value = power[here, t]
+    own = index[i, j]
+    value = power[own, t]
     for k in range(max(i - 1, 0), min(i + 2, rows)):
         for m in range(max(j - 1, 0), min(j + 2, columns)):
-            other = index[k, m]
-            if other >= 0:
+            neighbour = index[k, m]
+            if neighbour >= 0:
                 for s in range(t - about, t + about + 1):
-                    x = power[other, s]
-                    before = other < here or (other == here and s < t)
+                    x = power[neighbour, s]
+                    before = neighbour < own or (neighbour == own and s < t)
                     if x > value or (x == value and before):
                         return True
     return False
@@ -36,15 +36,15 @@ def local_maxima(power: Any, index: Any, row: Any, column: Any, floor: Any, edge
     (2,) says that peaks are resolved: theirs may be outside.
     """
     rows, columns = index.shape
-    found = np.zeros(power.shape, np.bool_)
+    peaks = np.zeros(power.shape, np.bool_)
     for b in range(len(power)):
         i, j = row[b], column[b]
         if (edge[0] and (i == 0 or i == rows - 1)) or (edge[1] and (j == 0 or j == columns - 1)):
             continue
         for t in range(end, power.shape[1] - end):
             top = power[b, t] > floor[b] and power[b, t] >= power[b, t + 1] and power[b, t] > power[b, t - 1]
-            found[b, t] = top and not exceeded(power, index, i, j, t, about)
-    return np.nonzero(found)
+            peaks[b, t] = top and not exceeded(power, index, i, j, t, about)
+    return np.nonzero(peaks)
 
 
 @nb.njit(cache=True, nogil=True)
@@ -73,7 +73,7 @@ def _brought(
     reach = farthest(position)
     spacing = frequency[1] - frequency[0]
     lasting = 2.0 / (frequency[-1] - frequency[0])
-    whole, brought = np.sum(taper), 0.0
+    taper_sum, brought = np.sum(taper), 0.0
     for j in range(i):
         apart = direction[i] - direction[j]
         far = np.sqrt(np.sum(apart**2))
@@ -91,7 +91,7 @@ def _brought(
         total = 0j
         for k in range(bins):
             total += taper[k] * response[k]
-        brought += power[j] * (total.real**2 + total.imag**2) / whole**2
+        brought += power[j] * (total.real**2 + total.imag**2) / taper_sum**2
     return brought
 
 
@@ -109,11 +109,11 @@ def _lobe(x: float, y: float, z: float, at: float, across: Any, weight: Any, rea
     """Modulus of the sum over sensors of what a table (delay,) has at `at` and what positions (xyz, sensor) add."""
     a = b = 0.0
     for q in range(weight.size):
-        place = across[0, q] * x + across[1, q] * y + across[2, q] * z + at
-        n = np.int32(place)
-        part = place - n
-        a += weight[q] * (real[n] + part * (real[n + 1] - real[n]))
-        b += weight[q] * (imaginary[n] + part * (imaginary[n + 1] - imaginary[n]))
+        delay = across[0, q] * x + across[1, q] * y + across[2, q] * z + at
+        n = np.int32(delay)
+        fraction = delay - n
+        a += weight[q] * (real[n] + fraction * (real[n + 1] - real[n]))
+        b += weight[q] * (imaginary[n] + fraction * (imaginary[n + 1] - imaginary[n]))
     return np.sqrt(a * a + b * b)
 
 
@@ -157,13 +157,13 @@ def over_lobes(
 
 @nb.njit(cache=True, nogil=True)
 def power_centres(
-    power: Any, index: Any, row: Any, column: Any, b: Any, t: Any, place: Any, width: Any, about: float, least: Any
+    power: Any, index: Any, row: Any, column: Any, b: Any, t: Any, offset: Any, width: Any, about: float, least: Any
 ) -> Any:
     """Centre of the power about peaks, from their tops (peak, 3) in widths of an echo, under a Gaussian window.
 
-    power, index, row, column: as for `local_maxima`; b, t (peak,) the cells of peaks, place (peak, 3) their tops beside
-    these in cells; width (3,): a cell in widths; about: standard deviation of the window in widths, cut at twice that;
-    least (beam,): power below that is noise.
+    power, index, row, column: as for `local_maxima`; b, t (peak,) the cells of peaks, offset (peak, 3) their tops
+    beside these in cells; width (3,): a cell in widths; about: standard deviation of the window in widths, cut at twice
+    that; least (beam,): power below that is noise.
     """
     rows, columns = index.shape
     centre = np.zeros((len(b), 3))
@@ -173,24 +173,24 @@ def power_centres(
         i0, j0, total = row[b[p]], column[b[p]], 0.0
         first, last = max(t[p] - reach[2], 0), min(t[p] + reach[2] + 1, power.shape[1])
         for s in range(first, last):
-            late[s] = (s - t[p] - place[p, 2]) * width[2]
+            late[s] = (s - t[p] - offset[p, 2]) * width[2]
             fade[s] = np.exp(-0.5 * (late[s] / about) ** 2)
         for i in range(max(i0 - reach[0], 0), min(i0 + reach[0] + 1, rows)):
-            up = (i - i0 - place[p, 0]) * width[0]
+            up = (i - i0 - offset[p, 0]) * width[0]
             for j in range(max(j0 - reach[1], 0), min(j0 + reach[1] + 1, columns)):
-                side = (j - j0 - place[p, 1]) * width[1]
+                right = (j - j0 - offset[p, 1]) * width[1]
                 beam = index[i, j]
                 if beam < 0:
                     continue
-                here, later = 0.0, 0.0
+                faded, later = 0.0, 0.0
                 for s in range(first, last):
                     if power[beam, s] >= least[beam]:
-                        here += fade[s] * power[beam, s]
+                        faded += fade[s] * power[beam, s]
                         later += fade[s] * power[beam, s] * late[s]
-                aside = np.exp(-0.5 * (up**2 + side**2) / about**2)
-                total += aside * here
-                centre[p, 0] += aside * here * up
-                centre[p, 1] += aside * here * side
+                aside = np.exp(-0.5 * (up**2 + right**2) / about**2)
+                total += aside * faded
+                centre[p, 0] += aside * faded * up
+                centre[p, 1] += aside * faded * right
                 centre[p, 2] += aside * later
         centre[p] /= total
     return centre

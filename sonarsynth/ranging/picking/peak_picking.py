@@ -60,8 +60,8 @@ def peak_echoes(
 ) -> PickedEchoes:
     """The peaks of the beams about those over threshold that are echoes, see `Peaks`."""
     image = window.image
-    some = over_threshold(image, threshold, window.loudest)
-    wide = maximum_filter(some, 2 * BESIDE + 1, mode="constant") & np.isfinite(image.energy)
+    over = over_threshold(image, threshold, window.loudest)
+    wide = maximum_filter(over, 2 * BESIDE + 1, mode="constant") & np.isfinite(image.energy)
     beams, left_out = loudest_beams(image, wide)
     if not len(beams[0]):
         return no_echoes(image, left_out)
@@ -72,18 +72,18 @@ def peak_echoes(
     power, index = profiles.power, np.full(image.energy.shape, -1)
     index[beams] = np.arange(len(power))
     b, t = _maxima(profiles, axes, index, least, dynamic_range, side_lobes)
-    place, gain = _tops(power, index, beams, axes.resolved, b, t)
+    top_offset, gain = _tops(power, index, beams, axes.resolved, b, t)
     height = power[b, t] * gain**2
     energy = _energies(window, profiles, axes, b, height)
     keep = (height >= least[b]) & (energy > residue(image, window.loudest))
     keep[keep] = _own(window, profiles, b[keep], t[keep], height[keep], noise[b[keep]])
-    b, t, place, height, energy = b[keep], t[keep], place[keep], height[keep], energy[keep]
+    b, t, top_offset, height, energy = b[keep], t[keep], top_offset[keep], height[keep], energy[keep]
     centre = power_centres(
-        power, index, *beams, b, t, place, axes.step * axes.sharpness, CENTRE_WINDOW, NOISE_CLEAR * noise
+        power, index, *beams, b, t, top_offset, axes.step * axes.sharpness, CENTRE_WINDOW, NOISE_CLEAR * noise
     )
     snr = height / noise[b]
     error = axes.errors(snr, centre)
-    offset = place * axes.step
+    offset = top_offset * axes.step
     return PickedEchoes(
         elevation=image.elevation[profiles.row[b]] + offset[:, 0],
         azimuth=image.azimuth[profiles.column[b]] + offset[:, 1],
@@ -115,8 +115,8 @@ def _maxima(
 
 def _energies(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, height: Floats) -> Floats:
     """Energies (peak,) in Pa2 s: of a peak h exp(-(sharpness t)^2), as a share of all that is in its beam."""
-    whole = profiles.step * profiles.power[b].sum(axis=1, dtype=float)
-    share = height * np.sqrt(np.pi) / axes.sharpness[2] / whole
+    beam_energy = profiles.step * profiles.power[b].sum(axis=1, dtype=float)
+    share = height * np.sqrt(np.pi) / axes.sharpness[2] / beam_energy
     return np.asarray(np.minimum(share, 1.0) * window.image.energy[profiles.row[b], profiles.column[b]])
 
 
@@ -174,9 +174,9 @@ class Axes:
         """
         sharp = np.maximum(self.sharpness, [1e-3, 1e-3, 0.0])
         noise = self.roughness / (sharp**2 * np.sqrt(2.0 * snr[:, None]))
-        known = np.sqrt(noise**2 + (SURFACE_ERROR**2 + (CENTRE_ERROR * centre) ** 2) / sharp**2)
-        unknown = UNKNOWN * np.maximum(1.0 / sharp, 0.5 * self.step)
-        return np.asarray(np.minimum(np.where(self.resolved, known, unknown), [np.pi, np.pi, np.inf]))
+        resolved_error = np.sqrt(noise**2 + (SURFACE_ERROR**2 + (CENTRE_ERROR * centre) ** 2) / sharp**2)
+        unresolved_error = UNKNOWN * np.maximum(1.0 / sharp, 0.5 * self.step)
+        return np.asarray(np.minimum(np.where(self.resolved, resolved_error, unresolved_error), [np.pi, np.pi, np.inf]))
 
 
 def _tangents(elevation: float, azimuth: float) -> Floats:
@@ -193,21 +193,21 @@ def noise_power(profiles: Profiles, image: EnergyImage) -> Floats:
     Aerospace and Electronic Systems 19, 608.
     """
     end = min(int(pulse_times.PULSE_HALF / profiles.step), profiles.power.shape[1] // 4)
-    some = profiles.power[:, end : profiles.power.shape[1] - end : OVERSAMPLING]
-    level, there = np.zeros(image.energy.shape), np.zeros(image.energy.shape)
-    some, half = np.sort(some, axis=1), (some.shape[1] - 1) / 2  # a fifth of the time of np.median
-    median = 0.5 * (some[:, math.floor(half)] + some[:, math.ceil(half)])
+    powers = profiles.power[:, end : profiles.power.shape[1] - end : OVERSAMPLING]
+    level, filled = np.zeros(image.energy.shape), np.zeros(image.energy.shape)
+    powers, half = np.sort(powers, axis=1), (powers.shape[1] - 1) / 2  # a fifth of the time of np.median
+    median = 0.5 * (powers[:, math.floor(half)] + powers[:, math.ceil(half)])
     level[profiles.row, profiles.column] = median / np.log(2.0)
-    there[profiles.row, profiles.column] = 1.0
+    filled[profiles.row, profiles.column] = 1.0
     cells = [2 * int(NOISE_WIDTHS * 2 * profiles.width / step) + 1 if step else 1 for step in _steps(image)]
-    around, of = (uniform_filter(x, cells, mode="constant")[profiles.row, profiles.column] for x in (level, there))
+    around, of = (uniform_filter(x, cells, mode="constant")[profiles.row, profiles.column] for x in (level, filled))
     return np.asarray(np.maximum(around / of, np.finfo(np.float32).tiny))
 
 
 def _steps(image: EnergyImage) -> tuple[float, float]:
     """Steps (rad) of elevation and azimuth; 0 of an axis of one beam."""
-    up, side = (float(axis[1] - axis[0]) if len(axis) > 1 else 0.0 for axis in (image.elevation, image.azimuth))
-    return up, side
+    up, across = (float(axis[1] - axis[0]) if len(axis) > 1 else 0.0 for axis in (image.elevation, image.azimuth))
+    return up, across
 
 
 def _tops(
@@ -220,19 +220,19 @@ def _tops(
     """
     row, column = beams[0][b], beams[1][b]
     top = power[b, t].astype(float) ** SIXTH
-    place, gain = np.zeros((len(b), 3)), np.ones(len(b))
-    for axis, (up, side, late) in enumerate(np.eye(3, dtype=int)):
+    offset, gain = np.zeros((len(b), 3)), np.ones(len(b))
+    for axis, (up, across, late) in enumerate(np.eye(3, dtype=int)):
         sides = []
-        for way in (-1, 1):
-            i = np.clip(row + way * up, 0, index.shape[0] - 1)
-            j = np.clip(column + way * side, 0, index.shape[1] - 1)
-            other = index[i, j]
-            there = np.where(other >= 0, power[other, t + way * late].astype(float) ** SIXTH, top)
-            sides.append(np.minimum(there, top))
+        for step in (-1, 1):
+            i = np.clip(row + step * up, 0, index.shape[0] - 1)
+            j = np.clip(column + step * across, 0, index.shape[1] - 1)
+            neighbour = index[i, j]
+            beyond = np.where(neighbour >= 0, power[neighbour, t + step * late].astype(float) ** SIXTH, top)
+            sides.append(np.minimum(beyond, top))
         if resolved[axis]:
-            place[:, axis], height = pulse_times.parabola(sides[0], top, sides[1])
+            offset[:, axis], height = pulse_times.parabola(sides[0], top, sides[1])
             gain *= (height / top) ** 3
-    return place, gain
+    return offset, gain
 
 
 def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats, noise: Floats) -> Bools:

@@ -23,6 +23,6 @@ class Solution:
 
 def isovelocity_solution(delay: Floats, beam: Floats, source: Floats, sound_speed: float) -> Solution:
     """Closed form; NaN where the target would be too near the line from source to array."""
-    found = bistatic_range(sound_speed * delay, beam, source)
-    r = np.where(found.ill_conditioned, np.nan, found.range)
-    return Solution(r[:, None] * beam, r, found.by_path, found.by_angle, found.by_source)
+    bistatic = bistatic_range(sound_speed * delay, beam, source)
+    r = np.where(bistatic.ill_conditioned, np.nan, bistatic.range)
+    return Solution(r[:, None] * beam, r, bistatic.by_path, bistatic.by_angle, bistatic.by_source)
