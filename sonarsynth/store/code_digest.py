@@ -28,6 +28,6 @@ def code_digest() -> str:
     digest = hashlib.sha256()
     for file in sorted(package.rglob("*.py")):
         inside = file.relative_to(package).as_posix()
-        if not any(inside == part or inside.startswith(f"{part}/") for part in APART):
+        if not any(inside == folder or inside.startswith(f"{folder}/") for folder in APART):
             digest.update(f"{inside}\n".encode() + hashlib.sha256(file.read_bytes()).digest())
     return digest.hexdigest()

@@ -55,8 +55,8 @@ def create(
     clear(hidden(path))
     if path.is_dir() and not any(path.iterdir()):
         path.rmdir()
-    there = path.exists()
-    if there:
+    exists = path.exists()
+    if exists:
         stored = _identity_of(path)
         if not restart:
             check_format(path, stored)
@@ -67,7 +67,7 @@ def create(
         new = scratch / "new"
         lay_out(new, plan, layout, {**described(plan), **begun(source)})
         save_mark(new, layout_mark(new, sync=True))
-        if there:
+        if exists:
             os.rename(path, scratch / "old")
         os.rename(new, path)
     return layout
@@ -119,8 +119,8 @@ def _check_layout(path: Folder) -> None:
     mark = load_layout(path)
     if mark is None:
         raise Damage(f"{path}: {MANIFESTS[0]} is missing or damaged: 'sonarsynth repair' restores it")
-    for name, found in records(path, mark.files):
-        if found != mark.files[name]:
+    for name, actual in records(path, mark.files):
+        if actual != mark.files[name]:
             raise Damage(
                 f"{path}: {name} is missing or has changed since the store was laid out: "
                 "'sonarsynth repair' restores it"
@@ -152,10 +152,10 @@ def root_attributes(path: Folder | str) -> dict[str, Any]:
 def attributes_in(store: Opened) -> dict[str, Any]:
     """The same of a store that is open."""
     try:
-        found = json.loads(read(store, "zarr.json"))["attributes"]
+        attributes = json.loads(read(store, "zarr.json"))["attributes"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return attributes if isinstance(attributes, dict) else {}
 
 
 def _version() -> str:
@@ -180,8 +180,8 @@ def _compare(path: Folder, stored: Mapping[str, Any], wanted: Mapping[str, Any])
     differing = [key for key in [*new, *old] if old.get(key) != new.get(key)]
     if differing:
         key = differing[0]
-        was, now = (_short(some.get(key, "absent")) for some in (old, new))
-        how, difference = "from a different recipe", f"{key}: {was}, now {now}"
+        was, now = (_short(recipe.get(key, "absent")) for recipe in (old, new))
+        manner, difference = "from a different recipe", f"{key}: {was}, now {now}"
     else:
         names = {
             "products": "products",
@@ -190,7 +190,7 @@ def _compare(path: Folder, stored: Mapping[str, Any], wanted: Mapping[str, Any])
             "code_digest": "digest of the code",
         }
         changed = next((key for key in names if stored.get(key) != wanted[key]), None)
-        how, difference = (
+        manner, difference = (
             "differently",
             (
                 "the content of a file that the recipe names has changed"
@@ -198,7 +198,7 @@ def _compare(path: Folder, stored: Mapping[str, Any], wanted: Mapping[str, Any])
                 else f"{names[changed]}: {_short(stored.get(changed))}, now {_short(wanted[changed])}"
             ),
         )
-    raise Mismatch(f"{path} was built {how} ({difference}): use --restart to overwrite it, or another path")
+    raise Mismatch(f"{path} was built {manner} ({difference}): use --restart to overwrite it, or another path")
 
 
 def spelled(odd: Mapping[str, tuple[str, str]]) -> str:
@@ -220,12 +220,12 @@ def plain_recipe(attrs: Mapping[str, Any]) -> Any:
         return None
 
 
-def _flat(value: Any, where: str = "") -> dict[str, Any]:
+def _flat(value: Any, path: str = "") -> dict[str, Any]:
     """Leaves of nested values by dotted path."""
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
     if items is None:
-        return {where: value}
-    return {k: v for key, inner in items for k, v in _flat(inner, f"{where}.{key}" if where else str(key)).items()}
+        return {path: value}
+    return {k: v for key, inner in items for k, v in _flat(inner, f"{path}.{key}" if path else str(key)).items()}
 
 
 def lay_out(path: Path, plan: Plan, layout: Layout, attrs_of_root: Mapping[str, Any]) -> None:
@@ -237,16 +237,16 @@ def lay_out(path: Path, plan: Plan, layout: Layout, attrs_of_root: Mapping[str, 
         extra = sorted(name for g, name in static if g == group and static[g, name][0] != (name,))
         attrs = {"coordinates": " ".join(extra)} if extra and group in framed else {}
         groups.setdefault(group.strip("/"), {}).update(attrs)
-    fixed = {f"{group}/{name}".strip("/"): each for (group, name), each in static.items()}
+    fixed = {f"{group}/{name}".strip("/"): content for (group, name), content in static.items()}
     nodes: dict[str, Any] = (
         {name: GroupMetadata(attributes=attrs) for name, attrs in groups.items()}
         | {array.path: framed_array(array) for array in layout.arrays}
-        | {name: fixed_array(*each) for name, each in fixed.items()}
+        | {name: fixed_array(*content) for name, content in fixed.items()}
     )
     with warnings.catch_warnings(), zarr.config.set({"array.write_empty_chunks": True}):
-        made = dict(zarr.create_hierarchy(store=LocalStore(path), nodes=nodes))  # at once: one by one takes a second
+        created = dict(zarr.create_hierarchy(store=LocalStore(path), nodes=nodes))  # at once: one by one takes a second
         for name, (_, values, _) in fixed.items():
-            array = made[name]
+            array = created[name]
             if values.size and isinstance(array, zarr.Array):
                 array[...] = values.astype(object) if values.dtype.kind == "U" else values
         # zarr-python: "Consolidated metadata is currently not part in the Zarr format 3 specification". Readers that

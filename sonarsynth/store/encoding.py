@@ -33,17 +33,17 @@ def encoded(array: ArrayLayout, block: np.ndarray) -> bytes | None:
     shard with fewer frames than others has no more chunks; a chunk with fewer is filled up.
     """
     chunks = [block[at : at + array.chunk] for at in range(0, len(block), array.chunk)]
-    parts = [None if array.is_fill(chunk) else _chunk(array, chunk) for chunk in chunks]
-    whole = [part for part in parts if part is not None]
-    if array.chunk == array.shard or not whole:
-        return whole[0] if whole else None
+    packed = [None if array.is_fill(chunk) else _chunk(array, chunk) for chunk in chunks]
+    stored = [chunk_bytes for chunk_bytes in packed if chunk_bytes is not None]
+    if array.chunk == array.shard or not stored:
+        return stored[0] if stored else None
     index = np.full((array.shard // array.chunk, 2), NOT_THERE, "<u8")
     at = 0
-    for row, part in zip(index, parts, strict=False):
-        if part is not None:
-            row[:] = at, len(part)
-            at += len(part)
-    return b"".join([*whole, _checked(index.tobytes())])
+    for row, chunk_bytes in zip(index, packed, strict=False):
+        if chunk_bytes is not None:
+            row[:] = at, len(chunk_bytes)
+            at += len(chunk_bytes)
+    return b"".join([*stored, _checked(index.tobytes())])
 
 
 def _chunk(array: ArrayLayout, frames: np.ndarray) -> bytes:

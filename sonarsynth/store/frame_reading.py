@@ -112,23 +112,23 @@ class FrameArray:
     def _chunk(self, number: int) -> np.ndarray:
         """Chunk `number` of the array, (frame, ...) as stored."""
         own = self._chunks
-        shard, place = divmod(number, own.shard // own.chunk)
+        shard, row = divmod(number, own.shard // own.chunk)
         file = self._content(own.file(shard))
         shape = (own.chunk, *own.shape[1:])
         if file is None:
             return np.full(shape, own.fill, own.dtype)
-        where = own.file(shard)
-        first, length = (0, file.size) if own.shard == own.chunk else file.entry(place, own.shard // own.chunk, where)
+        path = own.file(shard)
+        first, length = (0, file.size) if own.shard == own.chunk else file.entry(row, own.shard // own.chunk, path)
         if first == NOT_THERE and length == NOT_THERE:
             return np.full(shape, own.fill, own.dtype)
-        data = _checked(file.part(first, length), where)
+        data = _checked(file.part(first, length), path)
         if len(data) < _HEADER or int.from_bytes(data[4:8], "little") != own.chunk_bytes:
-            raise Damage(f"{where}: a chunk is not of the size that the array has")
+            raise Damage(f"{path}: a chunk is not of the size that the array has")
         block = np.empty(shape, own.dtype)
         try:
             (_large if own.chunk_bytes > LARGE else blosc.decompress)(data, block)
         except (RuntimeError, ValueError, TypeError) as error:
-            raise Damage(f"{where}: a chunk cannot be decoded ({error})") from None
+            raise Damage(f"{path}: a chunk cannot be decoded ({error})") from None
         return block
 
 
@@ -149,18 +149,18 @@ class _File:
         """Some bytes."""
         return os.pread(self._handle, length, first)
 
-    def entry(self, place: int, count: int, where: str) -> tuple[int, int]:
+    def entry(self, row: int, count: int, path: str) -> tuple[int, int]:
         """Where a chunk lies: its first byte and its length. Raises Damage."""
         if self._index is None:
             length = 16 * count + _CRC
             if length > self.size:
-                raise Damage(f"{where}: is too short for its index")
-            index = np.frombuffer(_checked(self.part(self.size - length, length), where), "<u8").reshape(count, 2)
-            there = index[index[:, 0] != NOT_THERE].astype(float)
-            if (there.sum(axis=1) > self.size - length).any():
-                raise Damage(f"{where}: its index leads out of the file")
+                raise Damage(f"{path}: is too short for its index")
+            index = np.frombuffer(_checked(self.part(self.size - length, length), path), "<u8").reshape(count, 2)
+            entries = index[index[:, 0] != NOT_THERE].astype(float)
+            if (entries.sum(axis=1) > self.size - length).any():
+                raise Damage(f"{path}: its index leads out of the file")
             self._index = index
-        first, length = self._index[place].tolist()
+        first, length = self._index[row].tolist()
         return first, length
 
 
@@ -183,11 +183,11 @@ def _blosc2() -> Any:
     return blosc2
 
 
-def _checked(data: bytes, where: str) -> bytes:
+def _checked(data: bytes, path: str) -> bytes:
     """Bytes whose CRC-32C is right, without it."""
     content = data[:-_CRC]
     if len(data) < _CRC or int(google_crc32c.value(content)) != int.from_bytes(data[-_CRC:], "little"):
-        raise Damage(f"{where}: its checksum is wrong: 'sonarsynth repair' restores it")
+        raise Damage(f"{path}: its checksum is wrong: 'sonarsynth repair' restores it")
     return content
 
 
@@ -229,8 +229,8 @@ class FrameReader:
 
     def attributes_of(self, name: str) -> Mapping[str, Any]:
         """Attributes of an array. Raises KeyError."""
-        found: Mapping[str, Any] = self._members[name]["attributes"]
-        return found
+        attributes: Mapping[str, Any] = self._members[name]["attributes"]
+        return attributes
 
     def array(self, name: str) -> FrameArray:
         """An array by its path, such as "image/energy". Raises KeyError where there is none, Mismatch for one that
@@ -245,13 +245,13 @@ class FrameReader:
             self._files.move_to_end(name)
             return self._files[name]
         try:
-            found: _File | None = _File(self.root, name)
+            file: _File | None = _File(self.root, name)
         except FileNotFoundError:
-            found = None
-        self._files[name] = found
+            file = None
+        self._files[name] = file
         while len(self._files) > MOST_FILES:
             self._files.popitem(last=False)
-        return found
+        return file
 
 
 def hold(tree: xr.DataTree, path: Folder) -> None:
@@ -274,24 +274,24 @@ def _content(reader: FrameReader, name: str) -> _File | None:
     return reader.file(name)
 
 
-def _chunks(path: str, found: Mapping[str, Any]) -> _Chunks:
+def _chunks(path: str, metadata: Mapping[str, Any]) -> _Chunks:
     """How an array lies, by its metadata. Raises Mismatch."""
     try:
-        shape, dtype = tuple(int(n) for n in found["shape"]), np.dtype(found["data_type"])
-        shard = int(found["chunk_grid"]["configuration"]["chunk_shape"][0])
-        codecs = found["codecs"]
+        shape, dtype = tuple(int(n) for n in metadata["shape"]), np.dtype(metadata["data_type"])
+        shard = int(metadata["chunk_grid"]["configuration"]["chunk_shape"][0])
+        codecs = metadata["codecs"]
         chunk = shard
         if codecs[0]["name"] == "sharding_indexed":
             chunk = int(codecs[0]["configuration"]["chunk_shape"][0])
             codecs = codecs[0]["configuration"]["codecs"]
-        scale = found["attributes"].get("scale_factor")
-        fill = np.asarray(found["fill_value"], float if dtype.kind == "f" else dtype).astype(dtype)[()]
-        known = [codec["name"] for codec in codecs] == ["bytes", "blosc", "crc32c"] and dtype.kind in "iuf"
-        made = _Chunks(path, shape, dtype, shard, chunk, fill, None if scale is None else np.float32(scale))
+        scale = metadata["attributes"].get("scale_factor")
+        fill = np.asarray(metadata["fill_value"], float if dtype.kind == "f" else dtype).astype(dtype)[()]
+        readable = [codec["name"] for codec in codecs] == ["bytes", "blosc", "crc32c"] and dtype.kind in "iuf"
+        chunks = _Chunks(path, shape, dtype, shard, chunk, fill, None if scale is None else np.float32(scale))
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise Mismatch(f"{path}: its metadata cannot be read ({type(error).__name__}: {error})") from None
-    named = found.get("chunk_key_encoding") == {"name": "default", "configuration": {"separator": "."}}
-    whole = named and 0 < chunk <= shard and shard % chunk == 0 and min(shape, default=0) >= 0
-    if not (known and whole and made.chunk_bytes <= MOST_BYTES):
+    named = metadata.get("chunk_key_encoding") == {"name": "default", "configuration": {"separator": "."}}
+    consistent = named and 0 < chunk <= shard and shard % chunk == 0 and min(shape, default=0) >= 0
+    if not (readable and consistent and chunks.chunk_bytes <= MOST_BYTES):
         raise Mismatch(f"{path}: does not lie as sonarsynth writes it: read it with xarray")
-    return made
+    return chunks

@@ -110,8 +110,8 @@ class Layout:
 
     def check_region(self, start: int, stop: int) -> None:
         """Raise ValueError unless start:stop is one whole shard: two writers of a shard lose each other's frames."""
-        shard, rest = divmod(start, self.shard_frames)
-        if rest or not 0 <= shard < self.shards or stop != self.region(shard).stop:
+        shard, remainder = divmod(start, self.shard_frames)
+        if remainder or not 0 <= shard < self.shards or stop != self.region(shard).stop:
             raise ValueError(f"frames {start}:{stop} are not one whole shard of {self.shard_frames}")
 
     def files(self, shards: int | None = None) -> int:

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 def check_format(path: Folder, attributes: Mapping[Any, Any]) -> None:
     """Raise Mismatch where the root attributes of a store are of another format than this version reads and writes."""
-    found = attributes.get("sonarsynth_format")
-    if found is not None and str(found) != FORMAT_VERSION:
+    stored = attributes.get("sonarsynth_format")
+    if stored is not None and str(stored) != FORMAT_VERSION:
         raise Mismatch(
-            f"{path} was written in format {str(found)[:20]}, and this version reads format {FORMAT_VERSION}: "
+            f"{path} was written in format {str(stored)[:20]}, and this version reads format {FORMAT_VERSION}: "
             "build it again from its recipe with --restart"
         )
 
@@ -65,10 +65,10 @@ def chosen_frames(tree: xr.DataTree, split: str | None = None) -> np.ndarray:
         return built
     if split not in SPLITS:
         raise FieldError(("split",), f"must be one of {', '.join(SPLITS)}, not {split}")
-    found = np.asarray(built[np.asarray(splits_of(tree, built), str) == split])
-    if not len(found):
+    chosen = np.asarray(built[np.asarray(splits_of(tree, built), str) == split])
+    if not len(chosen):
         raise FieldError(("split",), f"no frame of {split} has been built")
-    return found
+    return chosen
 
 
 def splits_of(tree: xr.DataTree, frames: np.ndarray) -> list[str]:

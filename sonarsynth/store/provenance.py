@@ -66,20 +66,20 @@ def made_of(plan: Plan) -> dict[str, Any]:
 
 def planned(plan: Plan) -> dict[str, Any]:
     """The plan, without predicted times (which are the machine's)."""
-    made = plan.as_json()
+    record = plan.as_json()
     for name in ("predicted_seconds", "choices", "shard_frames"):  # attributes of their own, but the first
-        made.pop(name)
-    made["stages"] = [{name: value for name, value in row.items() if name != "seconds"} for row in made["stages"]]
-    finite: dict[str, Any] = _finite(made)
+        record.pop(name)
+    record["stages"] = [{name: value for name, value in row.items() if name != "seconds"} for row in record["stages"]]
+    finite: dict[str, Any] = _finite(record)
     return finite
 
 
 def inputs(plan: Plan) -> dict[str, Any]:
     """SHA-256 of the meshes of each target as used, and of the files that the recipe names (their names, not paths)."""
     recipe = plan.recipe
-    meshes = {name: [mesh.digest for mesh in some] for name, some in recipe.meshes.items()}
+    meshes = {name: [mesh.digest for mesh in meshes_of_target] for name, meshes_of_target in recipe.meshes.items()}
     files = {(Path(path).name, digest(path)) for path in paths(recipe.as_json())}
-    return {"meshes": meshes, "files": [{"name": name, "sha256": found} for name, found in sorted(files)]}
+    return {"meshes": meshes, "files": [{"name": name, "sha256": sha256} for name, sha256 in sorted(files)]}
 
 
 def begun(source: Source | None = None) -> dict[str, Any]:
@@ -99,16 +99,16 @@ def begun(source: Source | None = None) -> dict[str, Any]:
 @cache  # reading the metadata of all libraries takes a quarter of the time in which a small store is laid out
 def versions() -> Mapping[str, str]:
     """Versions of Python, of the libraries that touch numbers, and of the BLAS."""
-    found = {"python": f"{platform.python_implementation()} {platform.python_version()}"}
+    numbers = {"python": f"{platform.python_implementation()} {platform.python_version()}"}
     for name in LIBRARIES:
         try:
-            found[name] = version(name)
+            numbers[name] = version(name)
         except PackageNotFoundError:
             continue
     import numpy as np
 
     blas = np.show_config(mode="dicts").get("Build Dependencies", {}).get("blas", {})
-    return found | {"blas": f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip()}
+    return numbers | {"blas": f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip()}
 
 
 def numeric_versions() -> dict[str, str]:
@@ -116,27 +116,27 @@ def numeric_versions() -> dict[str, str]:
     return _numeric(versions())
 
 
-def _numeric(found: Mapping[str, Any]) -> dict[str, str]:
+def _numeric(numbers: Mapping[str, Any]) -> dict[str, str]:
     """Those of `NUMERIC`; of Python the minor version."""
-    some = {name: str(found[name]) for name in NUMERIC if name in found}
-    if "python" in some:
-        some["python"] = ".".join(some["python"].split(".")[:2])
-    return some
+    numeric = {name: str(numbers[name]) for name in NUMERIC if name in numbers}
+    if "python" in numeric:
+        numeric["python"] = ".".join(numeric["python"].split(".")[:2])
+    return numeric
 
 
 def other_versions(stored: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
     """What may change last digits and is another here than where a store was begun, by its root attributes: the version
     there and here. What only one of them has is not compared: a store that needs it cannot be built without."""
     begun = stored.get(PROVENANCE)
-    there = begun.get("versions") if isinstance(begun, Mapping) else None
-    before, now = _numeric(there) if isinstance(there, Mapping) else {}, numeric_versions()
+    stored_versions = begun.get("versions") if isinstance(begun, Mapping) else None
+    before, now = _numeric(stored_versions) if isinstance(stored_versions, Mapping) else {}, numeric_versions()
     return {name: (old, now[name]) for name, old in before.items() if now.get(name, old) != old}
 
 
-def differing(there: Mapping[str, str], here: Mapping[str, str]) -> str:
+def differing(before: Mapping[str, str], now: Mapping[str, str]) -> str:
     """What differs between two sets of versions, in words; "" where nothing does."""
-    odd = [name for name in here if there.get(name, here[name]) != here[name]]
-    return ", ".join(f"{name} {there[name]} there and {here[name]} here" for name in odd)
+    odd = [name for name in now if before.get(name, now[name]) != now[name]]
+    return ", ".join(f"{name} {before[name]} there and {now[name]} here" for name in odd)
 
 
 def machine() -> dict[str, Any]:
@@ -216,8 +216,8 @@ def _distribution() -> str:
 
 def _leading_number(text: str) -> str:
     """A version without what a builder of kernels may have added, such as a name of a company or a host."""
-    found = re.match(r"[\d.]+", text)
-    return found[0].rstrip(".") if found else ""
+    match = re.match(r"[\d.]+", text)
+    return match[0].rstrip(".") if match else ""
 
 
 def _finite(value: Any) -> Any:

@@ -82,8 +82,8 @@ def _write(store: Opened, plan: Plan, shard: int, frames: Mapping[int, Values], 
             packed = _content(layout, array, region.start, block)  # here: threads keep the memory that they allocate
             under_way.append((array.file(shard), _writers().submit(_put, store, array.file(shard), packed)))
     finally:
-        wait([rest for _, rest in under_way])  # the folder is let go of then
-    files |= {name: rest.result() for name, rest in under_way}
+        wait([task for _, task in under_way])  # the folder is let go of then
+    files |= {name: task.result() for name, task in under_way}
     if isinstance(store, OpenedFolder) and not store.in_its_place():
         raise Damage(f"{store}: {GONE}")
     still()
@@ -147,12 +147,12 @@ def missing(path: Folder | str, plan: Plan, frames: Iterable[int] | None = None)
         if not 0 <= frame < layout.frames:
             raise IndexError(f"frame {frame} is outside 0..{layout.frames - 1}")
         wanted.setdefault(frame // layout.shard_frames, set()).add(frame)
-    there = _have(path, wanted.keys() & set(marked(path)))
+    stored = _have(path, wanted.keys() & set(marked(path)))
     todo = {}
-    for shard, some in sorted(wanted.items()):
-        have = there.get(shard, set())
-        if not some <= have:
-            todo[shard] = tuple(sorted(some | have))
+    for shard, needed in sorted(wanted.items()):
+        have = stored.get(shard, set())
+        if not needed <= have:
+            todo[shard] = tuple(sorted(needed | have))
     return todo
 
 

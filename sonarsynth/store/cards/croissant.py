@@ -74,7 +74,7 @@ def croissant(facts: Facts) -> dict[str, Any]:
     date of publication is that on which the store was begun.
     """
     dataset, created = facts.dataset, facts.created[:10]
-    found = {
+    metadata = {
         "@context": dict(CONTEXT),
         "@type": "sc:Dataset",
         "conformsTo": "http://mlcommons.org/croissant/1.0",
@@ -93,7 +93,7 @@ def croissant(facts: Facts) -> dict[str, Any]:
         "distribution": [*_objects(facts), _files(facts)],
         "recordSet": [*_split_set(facts), *_records(facts)],
     }
-    return {name: value for name, value in found.items() if value not in ("", [])}
+    return {name: value for name, value in metadata.items() if value not in ("", [])}
 
 
 def _address(url: Any) -> str:
@@ -108,9 +108,9 @@ def _licence(text: str) -> str:
 
 
 def _creators(facts: Facts) -> list[dict[str, Any]]:
-    made = f"unnamed, with sonarsynth {facts.attributes.get('sonarsynth_version', '')}".rstrip()
-    creators = facts.dataset.get("creators") or [{"name": made, "organisation": True}]
-    found = []
+    unnamed = f"unnamed, with sonarsynth {facts.attributes.get('sonarsynth_version', '')}".rstrip()
+    creators = facts.dataset.get("creators") or [{"name": unnamed, "organisation": True}]
+    entries = []
     for creator in creators:
         entry = {
             "@type": "sc:Organization" if creator.get("organisation") else "sc:Person",
@@ -119,8 +119,8 @@ def _creators(facts: Facts) -> list[dict[str, Any]]:
         }
         if creator.get("affiliation"):
             entry["affiliation"] = {"@type": "sc:Organization", "name": creator["affiliation"]}
-        found.append({name: value for name, value in entry.items() if value})
-    return found
+        entries.append({name: value for name, value in entry.items() if value})
+    return entries
 
 
 def _objects(facts: Facts) -> Iterator[dict[str, Any]]:

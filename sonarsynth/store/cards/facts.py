@@ -105,8 +105,8 @@ class Facts:
         people = ", ".join(str(_mapping(c).get("name", "")) for c in self.dataset.get("creators", ()))
         year = f" ({self.created[:4]})" if self.created else ""
         dated = f"{people or 'Anonymous'}{year}. {self.title}, version {self.dataset.get('version', '1.0.0')}."
-        made = f"Made with sonarsynth {self.attributes.get('sonarsynth_version', '')}".rstrip() + "."
-        return " ".join(part for part in (dated, made, str(self.dataset.get("url", ""))) if part)
+        tool = f"Made with sonarsynth {self.attributes.get('sonarsynth_version', '')}".rstrip() + "."
+        return " ".join(sentence for sentence in (dated, tool, str(self.dataset.get("url", ""))) if sentence)
 
     @property
     def summary(self) -> str:
@@ -115,13 +115,13 @@ class Facts:
         if own:
             return own
         sizes = _mapping(self.plan.get("sizes"))
-        parts = [f"{self.frames} frames"]
+        phrases = [f"{self.frames} frames"]
         if self.plan.get("sequences"):
-            parts.append(f"in {self.plan['sequences']} sequence{'s' * (self.plan['sequences'] != 1)}")
+            phrases.append(f"in {self.plan['sequences']} sequence{'s' * (self.plan['sequences'] != 1)}")
         if sizes.get("sensor"):
-            parts.append(f"of an array of {sizes['sensor']} hydrophones")
+            phrases.append(f"of an array of {sizes['sensor']} hydrophones")
         return (
-            f"Synthetic passive sonar that is lit by snapping shrimp: {' '.join(parts)}, simulated, each with the "
+            f"Synthetic passive sonar that is lit by snapping shrimp: {' '.join(phrases)}, simulated, each with the "
             "truth that made it: where targets and shrimp are, what each beam meets, and a link budget of levels."
         )
 
@@ -136,9 +136,9 @@ def facts_of(store: Folder) -> Facts:
     for _, mark in load_marks(store, marked(store)):
         if isinstance(mark, Mark):
             complete += len(mark.frames)
-            there = [bytes_ for bytes_, _ in mark.files.values() if bytes_ >= 0]
-            files += len(there)
-            size += sum(there)
+            sizes = [bytes_ for bytes_, _ in mark.files.values() if bytes_ >= 0]
+            files += len(sizes)
+            size += sum(sizes)
             others = _mapping(mark.attributes.get("versions"))
             if others:
                 mixed[", ".join(f"{name} {number}" for name, number in others.items())] += len(mark.frames)
@@ -159,7 +159,7 @@ def facts_of(store: Folder) -> Facts:
 def _arrays(store: Folder) -> tuple[Array, ...]:
     try:
         members = json.loads(read(store, "zarr.json"))["consolidated_metadata"]["metadata"]
-        found = [
+        arrays = [
             Array(
                 path, tuple(m.get("dimension_names") or ()), tuple(m["shape"]), _type(m["data_type"]), m["attributes"]
             )
@@ -168,7 +168,7 @@ def _arrays(store: Folder) -> tuple[Array, ...]:
         ]
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         raise Damage(f"{store}: zarr.json is missing or damaged: 'sonarsynth repair' restores it") from None
-    return tuple(sorted(found, key=lambda a: (a.group, a.path)))
+    return tuple(sorted(arrays, key=lambda a: (a.group, a.path)))
 
 
 def _type(name: Any) -> str:

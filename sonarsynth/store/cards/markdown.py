@@ -49,7 +49,7 @@ def markdown(facts: Facts) -> str:
         _section("The recipe", _recipe(facts)),
         _section("Licence and citation", _rights(facts)),
     )
-    return "\n\n".join(part for part in sections if part) + "\n"
+    return "\n\n".join(section for section in sections if section) + "\n"
 
 
 def _holds(facts: Facts) -> list[str]:
@@ -76,17 +76,17 @@ def _loading(facts: Facts) -> str:
     example = next((a for a in facts.arrays if a.framed and a.group == "image"), None) or next(
         (a for a in facts.arrays if a.framed and a.group), None
     )
-    where = facts.url or facts.name
-    lines = ["import xarray as xr", f'tree = xr.open_datatree({json.dumps(where)}, engine="zarr")']
+    address = facts.url or facts.name
+    lines = ["import xarray as xr", f'tree = xr.open_datatree({json.dumps(address)}, engine="zarr")']
     if example is not None:
-        said = f"{example.meaning}, {example.units}"
-        lines.append(f"first = tree[{json.dumps(example.path)}].isel(frame=0)  # {' '.join(said.split())}")
+        comment = f"{example.meaning}, {example.units}"
+        lines.append(f"first = tree[{json.dumps(example.path)}].isel(frame=0)  # {' '.join(comment.split())}")
     code = "```python\n" + "\n".join(lines).replace("`", "'") + "\n```"
-    return f"{code}\n\n{_code(f'sonarsynth verify {where}')} compares every file with its digest. {DIGESTS}"
+    return f"{code}\n\n{_code(f'sonarsynth verify {address}')} compares every file with its digest. {DIGESTS}"
 
 
 def _variables(facts: Facts) -> str:
-    parts = []
+    texts = []
     for group, arrays in groupby(facts.arrays, key=lambda a: a.group):
         rows = [
             (
@@ -98,8 +98,8 @@ def _variables(facts: Facts) -> str:
             )
             for a in arrays
         ]
-        parts.append(f"### {_code(f'/{group}')}\n\n" + _table(("name", "dimensions", "type", "units", "meaning"), rows))
-    return "\n\n".join(parts)
+        texts.append(f"### {_code(f'/{group}')}\n\n" + _table(("name", "dimensions", "type", "units", "meaning"), rows))
+    return "\n\n".join(texts)
 
 
 def _splits(facts: Facts) -> str:
@@ -107,8 +107,8 @@ def _splits(facts: Facts) -> str:
     if not isinstance(splits, Mapping) or not isinstance(frames, Mapping):
         return ""
     rows = [(name, str(count), str(frames.get(name))) for name, count in splits.items()]
-    said = "By whole sequences: `split` of each frame is the number of a row, from 0."
-    return f"{said}\n\n" + _table(("split", "sequences", "frames"), rows)
+    sentence = "By whole sequences: `split` of each frame is the number of a row, from 0."
+    return f"{sentence}\n\n" + _table(("split", "sequences", "frames"), rows)
 
 
 def _methods(facts: Facts) -> str:
@@ -116,12 +116,12 @@ def _methods(facts: Facts) -> str:
     spans = [
         f"{' with '.join(map(str, entry['names']))} ({entry['values']} values)" for entry in facts.plan.get("grid", ())
     ] + [f"{v['name']} ({v['kind']}, drawn for each sequence)" for v in facts.plan.get("variations", ())]
-    parts = []
+    paragraphs = []
     if spans:
-        parts.append("The sequences span " + "; ".join(map(_text, spans)) + ".")
+        paragraphs.append("The sequences span " + "; ".join(map(_text, spans)) + ".")
     if stages:
-        parts.append(_table(("stage", "method", "why", "error"), stages))
-    return "\n\n".join(parts)
+        paragraphs.append(_table(("stage", "method", "why", "error"), stages))
+    return "\n\n".join(paragraphs)
 
 
 def _left_out(facts: Facts) -> str:
@@ -142,8 +142,8 @@ def _limits(facts: Facts) -> str:
 
 
 def _origin(facts: Facts) -> str:
-    found, attrs = facts.provenance, facts.attributes
-    git, machine = _mapping(found.get("git")), _mapping(found.get("machine"))
+    provenance, attrs = facts.provenance, facts.attributes
+    git, machine = _mapping(provenance.get("git")), _mapping(provenance.get("machine"))
     changed = {True: ", with changes that are not in it", False: "", None: ", perhaps with changes"}
     rows = [
         ("sonarsynth", str(attrs.get("sonarsynth_version", ""))),
@@ -152,17 +152,17 @@ def _origin(facts: Facts) -> str:
         ("digest of the recipe", str(attrs.get("recipe_digest", ""))),
         ("seed", str(attrs.get("seed", ""))),
         ("machine", ", ".join(str(machine[k]) for k in ("cpu", "architecture", "distribution") if machine.get(k))),
-        ("libraries", ", ".join(f"{name} {number}" for name, number in _mapping(found.get("versions")).items())),
+        ("libraries", ", ".join(f"{name} {number}" for name, number in _mapping(provenance.get("versions")).items())),
         *_inputs(_mapping(attrs.get("inputs"))),
     ]
     return _table(("", ""), [row for row in rows if row[1]])
 
 
-def _inputs(found: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for target, digests in _mapping(found.get("meshes")).items():
+def _inputs(recorded: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for target, digests in _mapping(recorded.get("meshes")).items():
         more = f" and {len(digests) - 3} more" if len(digests) > 3 else ""
         yield f"mesh of {target} (SHA-256)", ", ".join(map(str, digests[:3])) + more
-    for file in found.get("files", ()):
+    for file in recorded.get("files", ()):
         yield f"file {file['name']} (SHA-256)", str(file["sha256"])
 
 
@@ -182,11 +182,11 @@ def _recipe(facts: Facts) -> str:
 def _rights(facts: Facts) -> str:
     who = []
     for creator in map(_mapping, facts.dataset.get("creators", ())):
-        rest = [str(creator[k]) for k in ("affiliation", "url") if creator.get(k)]
-        who.append(f"- {_text(', '.join([str(creator.get('name', '')), *rest]))}")
+        details = [str(creator[k]) for k in ("affiliation", "url") if creator.get(k)]
+        who.append(f"- {_text(', '.join([str(creator.get('name', '')), *details]))}")
     licence = str(facts.attributes.get("licence", ""))
-    parts = [f"Licence: {_text(licence)}" if licence else "", "\n".join(who), "To cite it:", _quoted(facts.citation)]
-    return "\n\n".join(part for part in parts if part)
+    texts = [f"Licence: {_text(licence)}" if licence else "", "\n".join(who), "To cite it:", _quoted(facts.citation)]
+    return "\n\n".join(text for text in texts if text)
 
 
 def _section(title: str, body: str) -> str:
@@ -198,8 +198,8 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(map(_cell, line)) + " |" for line in lines)
 
 
-def _rows(found: Any, names: Sequence[str]) -> list[tuple[str, ...]]:
-    rows = found if isinstance(found, list) else []
+def _rows(entries: Any, names: Sequence[str]) -> list[tuple[str, ...]]:
+    rows = entries if isinstance(entries, list) else []
     return [tuple(str(_mapping(row).get(name, "")) for name in names) for row in rows]
 
 
@@ -219,8 +219,8 @@ def _text(text: str) -> str:
 
 def _paragraphs(text: str) -> str:
     """A text of several paragraphs."""
-    parts = (_begun(_text(part)) for part in re.split(r"\n\s*\n", str(text)))
-    return "\n\n".join(part for part in parts if part)
+    paragraphs = (_begun(_text(paragraph)) for paragraph in re.split(r"\n\s*\n", str(text)))
+    return "\n\n".join(paragraph for paragraph in paragraphs if paragraph)
 
 
 def _code(text: str) -> str:

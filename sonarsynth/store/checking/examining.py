@@ -58,7 +58,7 @@ class Findings:
     def files(self) -> dict[str, FileRecord]:
         """Every file that the marks know."""
         fixed = {} if self.layout is None else dict(self.layout.files)
-        return fixed | {name: found for mark in self.marks.values() for name, found in mark.files.items()}
+        return fixed | {name: file for mark in self.marks.values() for name, file in mark.files.items()}
 
     @property
     def attributes(self) -> Mapping[str, Any]:
@@ -88,17 +88,17 @@ def examine(path: Folder, progress: Progress | None = None) -> Findings:
     for number, mark in by_shard(marks, progress):
         if _compare(path, mark, problems):
             shards.add(number)
-    known = Findings(layout, marks, (), manifests, frozenset(fixed), frozenset(shards), frozenset())
-    unmarked, foreign = _strangers(path, known, region, problems)
+    findings = Findings(layout, marks, (), manifests, frozenset(fixed), frozenset(shards), frozenset())
+    unmarked, foreign = _strangers(path, findings, region, problems)
     shards |= unmarked
-    return Findings(layout, marks, tuple(problems), manifests, known.fixed, frozenset(shards), foreign)
+    return Findings(layout, marks, tuple(problems), manifests, findings.fixed, frozenset(shards), foreign)
 
 
 def must_be_store(path: Folder) -> None:
     """Raise Mismatch where there is no store of ours (no mark, no digest of a recipe), or one of another format."""
     if not path.is_dir():
         raise Mismatch(f"{path} is not a store: it is not a folder" if there(path) else f"{path}: no such store")
-    manifest = any(there(path, place) for place in MANIFESTS)
+    manifest = any(there(path, name) for name in MANIFESTS)
     attributes = root_attributes(path)
     if not (manifest or "recipe_digest" in attributes or marked(path)):
         raise Mismatch(f"{path} is not a store of sonarsynth")
@@ -108,15 +108,15 @@ def must_be_store(path: Folder) -> None:
 def _manifests(path: Folder, problems: list[Problem]) -> frozenset[str]:
     """Copies of the mark of the layout that are damaged."""
     bad = set()
-    for place in MANIFESTS:
-        what = "the mark is missing"
+    for name in MANIFESTS:
+        fault = "the mark is missing"
         try:
-            if read_mark(path, place, LAYOUT) is not None:
+            if read_mark(path, name, LAYOUT) is not None:
                 continue
         except Damage as damage:
-            what = str(damage).partition(": ")[2]
-        bad.add(place)
-        problems.append(Problem(place, what))
+            fault = str(damage).partition(": ")[2]
+        bad.add(name)
+        problems.append(Problem(name, fault))
     return frozenset(bad)
 
 
@@ -124,10 +124,10 @@ def frame_count(path: Folder) -> int:
     """Frames of the dataset, by the metadata of the array `frame` or the copy in the root's; 0 where both are lost."""
     for file, inside in (("frame/zarr.json", ()), ("zarr.json", ("consolidated_metadata", "metadata", "frame"))):
         try:
-            found: Any = json.loads(read(path, file))
+            metadata: Any = json.loads(read(path, file))
             for name in inside:
-                found = found[name]
-            return int(found["shape"][0])
+                metadata = metadata[name]
+            return int(metadata["shape"][0])
         except (OSError, ValueError, KeyError, TypeError, IndexError, RecursionError):
             continue
     return 0
@@ -149,8 +149,8 @@ def _marks(
     marks, bad = {}, set()
     for number, mark in load_marks(path, marked(path)):
         if isinstance(mark, Damage):
-            where, _, what = str(mark).partition(": ")
-            problems.append(Problem(where, what, region(number)))
+            file, _, fault = str(mark).partition(": ")
+            problems.append(Problem(file, fault, region(number)))
             bad.add(number)
         elif mark is not None:
             marks[number] = mark
@@ -160,31 +160,31 @@ def _marks(
 def _compare(path: Folder, mark: Mark, problems: list[Problem]) -> set[str]:
     """Names of the files of a mark that are not as recorded."""
     bad = set()
-    for name, found in records(path, mark.files):
+    for name, actual in records(path, mark.files):
         size, digest = mark.files[name]
-        if isinstance(found, FileNotFoundError | NotADirectoryError):
+        if isinstance(actual, FileNotFoundError | NotADirectoryError):
             if (size, digest) == ABSENT:
                 continue
-            what = "the file is missing"
-        elif isinstance(found, OSError):
-            what = f"cannot be read: {found.strerror}"
+            fault = "the file is missing"
+        elif isinstance(actual, OSError):
+            fault = f"cannot be read: {actual.strerror}"
         else:
-            if found == (size, digest):
+            if actual == (size, digest):
                 continue
-            what = f"has {found[0]} bytes, not {max(size, 0)}" if found[0] != size else "its contents have changed"
+            fault = f"has {actual[0]} bytes, not {max(size, 0)}" if actual[0] != size else "its contents have changed"
         bad.add(name)
-        problems.append(Problem(name, what, mark.frames))
+        problems.append(Problem(name, fault, mark.frames))
     return bad
 
 
 def _strangers(
-    path: Folder, known: Findings, region: Callable[[int], tuple[int, ...]], problems: list[Problem]
+    path: Folder, findings: Findings, region: Callable[[int], tuple[int, ...]], problems: list[Problem]
 ) -> tuple[set[int], frozenset[str]]:
     """Files that no mark knows: numbers of the shards that they are data of (a mark is lost, or a build was
     interrupted), and the names of those that are not ours."""
     if isinstance(path, Remote) and not path.listed:
         return set(), frozenset()  # nobody can ask what else there is
-    files = known.files
+    files = findings.files
     folders = {MARKS}
     for name in files:
         while name := name.rpartition("/")[0]:
@@ -194,14 +194,14 @@ def _strangers(
     foreign: list[str] = []
     for name in sorted(set(all_files(path)) - set(files) - folders):
         shard = shard_of(path, name)
-        if shard is None or shard in known.marks:
-            if known.layout is not None or shard is not None:
+        if shard is None or shard in findings.marks:
+            if findings.layout is not None or shard is not None:
                 foreign.append(name)
         else:
             lost.setdefault(shard, []).append(name)
     for shard in sorted(lost):
-        what = "data without a completion mark: build again, or repair, to finish it"
-        problems.append(Problem(f"shard {shard}", what, region(shard)))
+        fault = "data without a completion mark: build again, or repair, to finish it"
+        problems.append(Problem(f"shard {shard}", fault, region(shard)))
     ours = {f"{number}.json" for number in marked(path)} | {PurePosixPath(m).name for m in MANIFESTS}
     foreign += sorted(f"{MARKS}/{name}" for name in entries(path, MARKS) if name not in ours)
     problems.extend(Problem(shown(name), "the file does not belong here") for name in foreign)

@@ -73,22 +73,22 @@ def described(tree: xr.DataTree) -> Iterator[Problem]:
     """Every variable of a tree has units, and every coordinate can be looked up."""
     for node in tree.subtree:
         for name, variable in node.to_dataset(inherit=False).variables.items():
-            where = f"{node.path}/{name}".replace("//", "/")
+            path = f"{node.path}/{name}".replace("//", "/")
             if "units" not in variable.attrs:
-                yield Problem(where, "has no units")
+                yield Problem(path, "has no units")
             if variable.dims == (name,):
-                yield from _coordinate(where, variable)
+                yield from _coordinate(path, variable)
 
 
-def _coordinate(where: str, variable: xr.Variable) -> Iterator[Problem]:
+def _coordinate(path: str, variable: xr.Variable) -> Iterator[Problem]:
     """Labels of an axis: finite and strictly rising or falling numbers, or texts that differ."""
     values = np.asarray(variable.values)
     if values.dtype.kind not in "iuf":
         if len(set(values.tolist())) != len(values):
-            yield Problem(where, "has the same label twice")
+            yield Problem(path, "has the same label twice")
     elif not np.isfinite(values).all():
-        yield Problem(where, f"{int((~np.isfinite(values)).sum())} values are not finite")
+        yield Problem(path, f"{int((~np.isfinite(values)).sum())} values are not finite")
     else:
         step = np.diff(values.astype(float))
         if not (np.all(step > 0) or np.all(step < 0)):
-            yield Problem(where, "neither rises nor falls throughout")
+            yield Problem(path, "neither rises nor falls throughout")

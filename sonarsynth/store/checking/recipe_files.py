@@ -29,10 +29,10 @@ def files_of(path: Folder, attrs: Mapping[str, Any], folder: Path | str | None) 
     if not named:
         return {}
     if folder is None:
-        where = os.path.commonpath([os.path.dirname(os.path.abspath(name)) for name in named])
+        common = os.path.commonpath([os.path.dirname(os.path.abspath(name)) for name in named])
         raise Mismatch(
             f"{path}: its recipe names files, such as {named[0]}, and a store of somebody else may name any of yours: "
-            f"say in which folder they may be looked for, such as --files {where}"
+            f"say in which folder they may be looked for, such as --files {common}"
         )
     root, digests = Path(os.path.realpath(folder)), _digests(attrs)
     return {name: _found(path, name, root, digests.get(PurePath(name).name, set())) for name in named}
@@ -40,28 +40,28 @@ def files_of(path: Folder, attrs: Mapping[str, Any], folder: Path | str | None) 
 
 def _digests(attrs: Mapping[str, Any]) -> dict[str, set[str]]:
     """SHA-256 of the files that a store was made of, by their names."""
-    found: dict[str, set[str]] = {}
+    digests: dict[str, set[str]] = {}
     try:
         for file in attrs["inputs"]["files"]:
-            found.setdefault(str(file["name"]), set()).add(str(file["sha256"]))
+            digests.setdefault(str(file["name"]), set()).add(str(file["sha256"]))
     except (KeyError, TypeError):
         pass
-    return found
+    return digests
 
 
 def _found(path: Folder, name: str, root: Path, digests: set[str]) -> str:
     """The file within a folder that has the longest end of a path in common, and one of the digests."""
-    parts, there = [part for part in PurePath(name).parts if part not in ("/", "..", ".")], False
-    for first in range(len(parts)):
-        inside = "/".join(parts[first:])
+    names, changed = [folder for folder in PurePath(name).parts if folder not in ("/", "..", ".")], False
+    for first in range(len(names)):
+        inside = "/".join(names[first:])
         try:
             with within.opened(root, inside) as file:
-                there, digest = True, hashlib.file_digest(file, "sha256").hexdigest()
+                changed, digest = True, hashlib.file_digest(file, "sha256").hexdigest()
         except OSError:
             continue
         if digest in digests:
             return str(root / inside)
-    if there:
+    if changed:
         raise Mismatch(f"{path}: a file that its recipe names, {name}, has changed since the store was built")
     raise Mismatch(f"{path}: {name}, which its recipe names, is not in {root}")
 

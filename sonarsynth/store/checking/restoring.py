@@ -26,24 +26,24 @@ if TYPE_CHECKING:
     from sonarsynth.planning import Plan
 
 
-def restore(path: Folder, found: Findings, plan: Plan | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def restore(path: Folder, findings: Findings, plan: Plan | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Put back laid-out files and the mark of the layout. Returns their names, and where what was in the way is now.
 
     A plan is needed unless only a copy of the mark is damaged. Files are laid out again beside the store, and moved in
     only where they are what they were, to the byte: raises Mismatch, with nothing changed, where they are not (other
     versions of libraries).
     """
-    if plan is None or (found.layout is not None and not found.fixed):
-        if found.layout is None:
+    if plan is None or (findings.layout is not None and not findings.fixed):
+        if findings.layout is None:
             raise ValueError("a plan is needed to restore what was laid out")
-        moved = move_out(path, obstacles(path, found.manifests))
-        if found.manifests:
-            save_mark(path, found.layout)
-        return tuple(sorted(found.manifests)), moved
-    there = tempfile.TemporaryDirectory(prefix="sonarsynth-") if isinstance(path, Remote) else made(path)
-    with there as folder:
+        moved = move_out(path, obstacles(path, findings.manifests))
+        if findings.manifests:
+            save_mark(path, findings.layout)
+        return tuple(sorted(findings.manifests)), moved
+    workspace = tempfile.TemporaryDirectory(prefix="sonarsynth-") if isinstance(path, Remote) else made(path)
+    with workspace as folder:
         scratch = Path(folder) / "new"
-        attrs = found.attributes or {
+        attrs = findings.attributes or {
             **described(plan),
             **root_attributes(path),  # how it was begun, and as what was planned then
             **attributes(plan),
@@ -51,23 +51,23 @@ def restore(path: Folder, found: Findings, plan: Plan | None) -> tuple[tuple[str
         }
         lay_out(scratch, plan, layout_of(plan), attrs)
         laid = layout_mark(scratch)
-        bad = _to_put_back(path, found, laid)
-        moved = move_out(path, obstacles(path, [*bad, *found.manifests]))
+        bad = _to_put_back(path, findings, laid)
+        moved = move_out(path, obstacles(path, [*bad, *findings.manifests]))
         for name in bad:
             write_in(path, name, (scratch / name).read_bytes())
-        if found.manifests:
-            save_mark(path, found.layout or laid)
-    return (*bad, *sorted(found.manifests)), moved
+        if findings.manifests:
+            save_mark(path, findings.layout or laid)
+    return (*bad, *sorted(findings.manifests)), moved
 
 
-def _to_put_back(path: Folder, found: Findings, laid: Mark) -> list[str]:
+def _to_put_back(path: Folder, findings: Findings, laid: Mark) -> list[str]:
     """Names of laid-out files that are not as they were."""
-    if found.layout is None:
+    if findings.layout is None:
         return sorted(name for name, now in laid.files.items() if not _is(path, name, now))
-    for name in sorted(found.fixed):
-        if laid.files.get(name) != found.layout.files[name]:
+    for name in sorted(findings.fixed):
+        if laid.files.get(name) != findings.layout.files[name]:
             raise Mismatch(f"{path}: {name} cannot be made again as it was: other versions of libraries wrote it")
-    return sorted(found.fixed)
+    return sorted(findings.fixed)
 
 
 def _is(path: Folder, name: str, expected: tuple[int, str]) -> bool:
@@ -156,30 +156,30 @@ def _make_folder(folder: Path) -> None:
 
 def _free(file: Path) -> Path:
     """A name that nothing has."""
-    count, found = 0, file
-    while os.path.lexists(found):
+    count, unused = 0, file
+    while os.path.lexists(unused):
         count += 1
-        found = file.with_name(f"{file.name}.{count}")
-    return found
+        unused = file.with_name(f"{file.name}.{count}")
+    return unused
 
 
 def obstacles(path: Folder, names: Iterable[str]) -> set[str]:
     """What lies where files are to be written and cannot be written over: folders, links and pipes in the place of the
     file, files and links in the place of a folder."""
-    found: set[str] = set()
+    blocked: set[str] = set()
     if isinstance(path, Remote):
-        return found  # an object is in nobody's way
+        return blocked  # an object is in nobody's way
     for name in names:
-        parts = parts_of(name)
-        for count in range(1, len(parts) + 1):
-            some = "/".join(parts[:count])
-            mode = status(path, some)
+        folders = parts_of(name)
+        for count in range(1, len(folders) + 1):
+            inner = "/".join(folders[:count])
+            mode = status(path, inner)
             if mode is None:
                 break
-            if not (stat.S_ISREG if count == len(parts) else stat.S_ISDIR)(mode.st_mode):
-                found.add(some)
+            if not (stat.S_ISREG if count == len(folders) else stat.S_ISDIR)(mode.st_mode):
+                blocked.add(inner)
                 break
-    return found
+    return blocked
 
 
 def drop_empty_folders(path: Folder) -> None:

@@ -135,19 +135,19 @@ def verify(
     """
     path = absolute(path)
     building, stamped = held_by(path), stamps(path, MARKS)
-    found, problems = _look(path, quick, progress)
+    findings, problems = _look(path, quick, progress)
     building = building or held_by(path)
     if problems and (
         building or stamped != stamps(path, MARKS)
     ):  # a build's own doing is over, or has another mark, by now
         before = {problem.where for problem in problems}
-        found, problems = _look(path, quick, progress)
+        findings, problems = _look(path, quick, progress)
         changed = {name for name, _ in stamped.items() ^ stamps(path, MARKS).items()}
-        problems = [p for p in problems if p.where in before and _lasting(p, found, changed)]
+        problems = [p for p in problems if p.where in before and _lasting(p, findings, changed)]
     rows = [] if problems or building or quick else _run(path, checks)
     spoiled = {frame for problem in problems for frame in problem.frames}
-    complete = tuple(sorted({f for mark in found.marks.values() for f in mark.frames} - spoiled))
-    files = found.files
+    complete = tuple(sorted({f for mark in findings.marks.values() for f in mark.frames} - spoiled))
+    files = findings.files
     size = sum(max(size, 0) for size, _ in files.values())
     return Report(
         str(path), frame_count(path), complete, len(files), size, tuple(problems), tuple(rows), quick, building
@@ -156,23 +156,23 @@ def verify(
 
 def _look(path: Folder, quick: bool, progress: Progress | None) -> tuple[Findings, list[Problem]]:
     """What there is in a store, and everything that is wrong with it."""
-    found = examine(path, progress if quick else None)
-    problems = list(found.problems)
-    if not quick and found.layout is not None and not found.fixed:
-        whole = {number: mark for number, mark in found.marks.items() if number not in found.shards}
-        for _, mark in by_shard(whole, progress):
+    findings = examine(path, progress if quick else None)
+    problems = list(findings.problems)
+    if not quick and findings.layout is not None and not findings.fixed:
+        intact = {number: mark for number, mark in findings.marks.items() if number not in findings.shards}
+        for _, mark in by_shard(intact, progress):
             problems.extend(read_back(path, mark))
         problems.extend(structure(path))
-    return found, problems
+    return findings, problems
 
 
-def _lasting(problem: Problem, found: Findings, changed: set[str]) -> bool:
+def _lasting(problem: Problem, findings: Findings, changed: set[str]) -> bool:
     """Whether a problem is of what no build has in hand: it was there before, and its mark was not written since."""
     if problem.where.endswith(".partial"):
         return False
     folder, _, name = problem.where.rpartition("/")
     if folder != MARKS and problem.frames:
-        shard = next((n for n, mark in found.marks.items() if problem.frames[0] in mark.frames), None)
+        shard = next((n for n, mark in findings.marks.items() if problem.frames[0] in mark.frames), None)
         name = "" if shard is None else f"{shard}.json"
     elif folder != MARKS:
         name = f"{LAYOUT}.json"

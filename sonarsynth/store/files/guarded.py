@@ -42,26 +42,26 @@ class GuardedReads(LocalStore):
         """Parts of files."""
         return [await self.get(key, prototype, part) for key, part in key_ranges]
 
-    def _content(self, key: str, prototype: BufferPrototype | None, part: ByteRequest | None) -> Buffer | None:
+    def _content(self, key: str, prototype: BufferPrototype | None, byte_range: ByteRequest | None) -> Buffer | None:
         if key.rpartition("/")[2].startswith(".z"):
             return None
         try:
             with within.opened(self.root, key) as file:
-                data = _part(file, part)
+                data = _part(file, byte_range)
         except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
             return None
         return (prototype or default_buffer_prototype()).buffer.from_bytes(data)
 
 
-def _part(file: Any, part: ByteRequest | None) -> bytes:
+def _part(file: Any, byte_range: ByteRequest | None) -> bytes:
     """A part of a file, as zarr asks for it."""
     length = -1
-    if isinstance(part, RangeByteRequest):
-        file.seek(part.start)
-        length = part.end - part.start
-    elif isinstance(part, OffsetByteRequest):
-        file.seek(part.offset)
-    elif isinstance(part, SuffixByteRequest):
-        file.seek(max(0, file.seek(0, io.SEEK_END) - part.suffix))
-    found: bytes = file.read(length)
-    return found
+    if isinstance(byte_range, RangeByteRequest):
+        file.seek(byte_range.start)
+        length = byte_range.end - byte_range.start
+    elif isinstance(byte_range, OffsetByteRequest):
+        file.seek(byte_range.offset)
+    elif isinstance(byte_range, SuffixByteRequest):
+        file.seek(max(0, file.seek(0, io.SEEK_END) - byte_range.suffix))
+    content: bytes = file.read(length)
+    return content

@@ -58,25 +58,25 @@ def holder(file: Remote) -> str:
 
 def who(file: Remote) -> str:
     """Who holds a lock, such as "process 7 on here"; "" where nobody does, or nobody has renewed it."""
-    found = _read(file)
-    return "" if not found or _gone(found) or file.age() > LEASE else _named(found)
+    claim = _read(file)
+    return "" if not claim or _gone(claim) or file.age() > LEASE else _named(claim)
 
 
-def _named(found: dict[str, Any]) -> str:
-    return f"process {found.get('process')} on {found.get('host')}"
+def _named(claim: dict[str, Any]) -> str:
+    return f"process {claim.get('process')} on {claim.get('host')}"
 
 
 def _take(file: Remote, name: str, lease: float) -> None:
     while not file.write_if_absent(_content(name, 0)):
-        found = _read(file)
-        if found and not _gone(found):
-            _wait_out(file, found, lease)
+        claim = _read(file)
+        if claim and not _gone(claim):
+            _wait_out(file, claim, lease)
         file.unlink(missing_ok=True)
     if holder(file) != name:  # two took over at once
         raise LeaseHeld("another process")
 
 
-def _wait_out(file: Remote, found: dict[str, Any], lease: float) -> None:
+def _wait_out(file: Remote, claim: dict[str, Any], lease: float) -> None:
     """Wait until a lock is not renewed any more. Raises LeaseHeld as soon as it is."""
     until = time.monotonic() + lease
     while time.monotonic() < until:
@@ -84,7 +84,7 @@ def _wait_out(file: Remote, found: dict[str, Any], lease: float) -> None:
         now = _read(file)
         if not now:
             return
-        if now != found:
+        if now != claim:
             raise LeaseHeld(_named(now))
 
 
@@ -115,16 +115,16 @@ def _content(name: str, beat: int) -> bytes:
 
 def _read(file: Remote) -> dict[str, Any]:
     try:
-        found = json.loads(file.read_bytes())
+        claim = json.loads(file.read_bytes())
     except (FileNotFoundError, ValueError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return claim if isinstance(claim, dict) else {}
 
 
-def _gone(found: dict[str, Any]) -> bool:
+def _gone(claim: dict[str, Any]) -> bool:
     """True where the holder was a process of this machine, and is no more."""
-    process, started = found.get("process"), found.get("started")
-    ours = found.get("machine") == _machine() and bool(started) and isinstance(process, int)
+    process, started = claim.get("process"), claim.get("started")
+    ours = claim.get("machine") == _machine() and bool(started) and isinstance(process, int)
     return ours and isinstance(process, int) and _started(process) != started
 
 

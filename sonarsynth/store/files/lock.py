@@ -120,15 +120,15 @@ def _holder(store: Folder) -> str:
         return ""
 
 
-def _wait_for_writers(held: Path, wait: float) -> None:
-    file, until = held.with_suffix(".writers"), time.monotonic() + wait
+def _wait_for_writers(lock_file: Path, wait: float) -> None:
+    file, until = lock_file.with_suffix(".writers"), time.monotonic() + wait
     while file.exists():
         try:
             handle = _take(file)
         except StoreLocked:
             if time.monotonic() > until:
                 raise StoreLocked(
-                    f"{held.with_suffix('')}: a worker of an earlier build is still writing: end it first"
+                    f"{lock_file.with_suffix('')}: a worker of an earlier build is still writing: end it first"
                 ) from None
             time.sleep(0.05)
         else:
@@ -136,9 +136,9 @@ def _wait_for_writers(held: Path, wait: float) -> None:
             return
 
 
-def _drop_writers(held: Path) -> None:
+def _drop_writers(lock_file: Path) -> None:
     """Remove the file of the writers, if none is left."""
-    file = held.with_suffix(".writers")
+    file = lock_file.with_suffix(".writers")
     if file.exists():
         with suppress(StoreLocked):
             handle = _take(file)
@@ -146,12 +146,12 @@ def _drop_writers(held: Path) -> None:
             os.close(handle)
 
 
-def _take(file: Path, how: int = fcntl.LOCK_EX | fcntl.LOCK_NB) -> int:
+def _take(file: Path, operation: int = fcntl.LOCK_EX | fcntl.LOCK_NB) -> int:
     """Open and lock the file that is there now: one that its last holder removed meanwhile is not it."""
     while True:
         handle = open_own(file, os.O_RDWR | os.O_CREAT)
         try:
-            fcntl.flock(handle, how)
+            fcntl.flock(handle, operation)
         except BlockingIOError:
             holder = _who(handle)
             os.close(handle)

@@ -36,25 +36,25 @@ MOST_METADATA: Final = 1 << 28
 """Bytes of a mark or of metadata, at most: a file of a store may say that it is larger than memory."""
 
 
-def folder_of(where: Folder | str) -> Folder:
+def folder_of(address: Folder | str) -> Folder:
     """The place that a path or a URL names; file:// is a path. Raises Unreachable for a URL that cannot be one."""
-    if isinstance(where, Path | Remote):
-        return where
-    if where.startswith("file://"):
-        return Path(where.removeprefix("file://"))
-    return Remote(where) if re.match(r"[A-Za-z][A-Za-z0-9+.-]*://", where) else Path(where)
+    if isinstance(address, Path | Remote):
+        return address
+    if address.startswith("file://"):
+        return Path(address.removeprefix("file://"))
+    return Remote(address) if re.match(r"[A-Za-z][A-Za-z0-9+.-]*://", address) else Path(address)
 
 
-def absolute(where: Folder | str) -> Folder:
+def absolute(address: Folder | str) -> Folder:
     """The same wherever this process goes. Where it is a link, what that leads to: the lock and all that is beside a
     store is beside its folder, by whatever way it was named. Raises OSError for links in a circle."""
-    folder = folder_of(where)
+    folder = folder_of(address)
     if isinstance(folder, Remote):
         return folder
-    found = Path(os.path.realpath(folder))
-    if found.is_symlink():
+    resolved = Path(os.path.realpath(folder))
+    if resolved.is_symlink():
         raise OSError(errno.ELOOP, "is a link that leads nowhere", str(folder))
-    return found
+    return resolved
 
 
 def named_after(store: Folder | str) -> Path:
@@ -63,10 +63,10 @@ def named_after(store: Folder | str) -> Path:
     folder = folder_of(store)
     if isinstance(folder, Remote):
         return Path(folder.name)
-    found = Path(os.path.realpath(folder)) if folder.name in ("", "..") else folder  # such as "."
-    if not found.name:
+    path = Path(os.path.realpath(folder)) if folder.name in ("", "..") else folder  # such as "."
+    if not path.name:
         raise OSError(errno.EISDIR, "is no place for a store", str(store))
-    return found
+    return path
 
 
 def beside(store: Folder | str, suffix: str) -> Folder:
@@ -145,9 +145,9 @@ def record(folder: Folder, name: str, *, sync: bool = False, size: int | None = 
     if isinstance(folder, Remote):
         return record_of((folder / name).read_bytes())
     with within.opened(folder, name) as file:
-        found = os.fstat(file.fileno()).st_size
-        if size is not None and found != size:
-            return found, ""
+        actual_size = os.fstat(file.fileno()).st_size
+        if size is not None and actual_size != size:
+            return actual_size, ""
         if sync:
             os.fsync(file.fileno())
         digest = hashlib.file_digest(file, "sha256").hexdigest()
@@ -160,8 +160,8 @@ def records(folder: Folder, expected: Mapping[str, FileRecord]) -> Iterator[tupl
     Where they are far, as many at a time as should fit in memory by the records that are expected.
     """
     if isinstance(folder, Remote):
-        for some in _batches(expected):
-            for name, content in folder.read_each(some):
+        for batch in _batches(expected):
+            for name, content in folder.read_each(batch):
                 yield name, content if isinstance(content, OSError) else record_of(content)
         return
     for name in sorted(expected):
@@ -215,8 +215,8 @@ def stamps(folder: Folder, name: str) -> dict[str, object]:
     contents."""
     if isinstance(folder, Remote):
         return (folder / name).stamps()
-    found = {inner: within.status(folder, f"{name}/{inner}") for inner in within.listed(folder, name)}
-    return {inner: (status.st_ino, status.st_mtime_ns) for inner, status in found.items() if status is not None}
+    statuses = {inner: within.status(folder, f"{name}/{inner}") for inner in within.listed(folder, name)}
+    return {inner: (status.st_ino, status.st_mtime_ns) for inner, status in statuses.items() if status is not None}
 
 
 def there(folder: Folder, name: str = "") -> bool:
@@ -263,8 +263,8 @@ def read_beside(file: Folder) -> bytes:
     """A file beside a store. Raises FileNotFoundError, and Mismatch for what is no plain file."""
     if isinstance(file, Remote):
         return file.read_bytes()
-    with open(within.open_own(file, os.O_RDONLY), "rb") as found:
-        return found.read()
+    with open(within.open_own(file, os.O_RDONLY), "rb") as handle:
+        return handle.read()
 
 
 def remove(folder: Opened, name: str, *, sync: bool = True) -> None:

@@ -43,14 +43,14 @@ class Remote:
     url: str
 
     def __post_init__(self) -> None:
-        scheme, found, rest = self.url.partition("://")
-        host, _, path = rest.partition("/")
-        if not found or "::" in self.url or not re.fullmatch(r"[a-z][a-z0-9+.-]*", scheme):
+        scheme, separator, address = self.url.partition("://")
+        host, _, path = address.partition("/")
+        if not separator or "::" in self.url or not re.fullmatch(r"[a-z][a-z0-9+.-]*", scheme):
             raise Unreachable(f"{self.url}: is not the URL of a store, such as s3://bucket/remus.zarr")
         if "@" in host:
             shown = f"{scheme}://...@{host.rpartition('@')[2]}/{path}"
             raise Unreachable(f"{shown}: a URL may hold no credentials: the driver takes them from the environment")
-        if "?" in rest or "#" in rest:
+        if "?" in address or "#" in address:
             raise Unreachable(f"{self.url.partition('?')[0].partition('#')[0]}: a URL may hold no ? and no #")
         if not path.strip("/") and not (scheme == "memory" and host):
             raise Unreachable(f"{self.url}: names no place in {host or scheme}: add a name, such as /remus.zarr")
@@ -93,8 +93,8 @@ class Remote:
 
         with self._told():
             options = OPTIONS.get(self.scheme, {})
-            found: tuple[Any, str] = fsspec.core.url_to_fs(self.url, use_listings_cache=False, **options)
-        return found
+            filesystem: tuple[Any, str] = fsspec.core.url_to_fs(self.url, use_listings_cache=False, **options)
+        return filesystem
 
     @property
     def driver(self) -> Any:
@@ -134,8 +134,8 @@ class Remote:
 
     def stamps(self) -> dict[str, object]:
         """What tells of each object beneath whether it was written again; nothing where it cannot be listed."""
-        found = self._beneath() if self.listed else {}
-        return {name: tuple(str(facts.get(key)) for key in _STAMPS) for name, facts in found.items()}
+        objects = self._beneath() if self.listed else {}
+        return {name: tuple(str(facts.get(key)) for key in _STAMPS) for name, facts in objects.items()}
 
     def age(self) -> float:
         """Seconds since an object was written; 0 where nobody knows, or it is not there."""
@@ -150,11 +150,11 @@ class Remote:
             raise Unreachable(f"{self.url}: cannot be listed")
         with self._told():
             try:
-                found = self.driver.find(self.path, detail=True)
+                objects = self.driver.find(self.path, detail=True)
             except FileNotFoundError:
                 return {}
         start = len(self.path.rstrip("/")) + 1
-        return {path[start:]: facts for path, facts in sorted(found.items()) if len(path) > start}
+        return {path[start:]: facts for path, facts in sorted(objects.items()) if len(path) > start}
 
     def read_bytes(self) -> bytes:
         """The content of an object. Raises FileNotFoundError."""
@@ -170,12 +170,12 @@ class Remote:
         """The contents of objects beneath, many at a time; FileNotFoundError for those that are not there."""
         waiting = list(names)
         for first in range(0, len(waiting), AT_ONCE):
-            some = waiting[first : first + AT_ONCE]
-            paths = {f"{self.path}/{name}": name for name in some}
+            batch = waiting[first : first + AT_ONCE]
+            paths = {f"{self.path}/{name}": name for name in batch}
             with self._told():
-                found = self.driver.cat(list(paths), on_error="return") if len(paths) > 1 else self._one(*paths)
+                contents = self.driver.cat(list(paths), on_error="return") if len(paths) > 1 else self._one(*paths)
             for path, name in paths.items():
-                content = found.get(path, FileNotFoundError(name))
+                content = contents.get(path, FileNotFoundError(name))
                 if isinstance(content, Exception) and not isinstance(content, FileNotFoundError):
                     with self._told():
                         raise content
@@ -198,9 +198,9 @@ class Remote:
         self._writable()
         names = list(contents)
         for first in range(0, len(names), AT_ONCE):
-            some = {f"{self.path}/{name}": contents[name] for name in names[first : first + AT_ONCE]}
+            batch = {f"{self.path}/{name}": contents[name] for name in names[first : first + AT_ONCE]}
             with self._told(writing=True):
-                self.driver.pipe(some)
+                self.driver.pipe(batch)
 
     def write_if_absent(self, content: bytes) -> bool:
         """Write an object that is not there; False where it is. At once, where the driver can do that (S3 can)."""

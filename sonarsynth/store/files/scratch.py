@@ -91,8 +91,8 @@ def sweep(path: Path, *, links: bool = False) -> None:
     unless `links` may be there."""
     waiting = [str(path)]
     while waiting:
-        with os.scandir(waiting.pop()) as found:
-            for entry in found:
+        with os.scandir(waiting.pop()) as entries:
+            for entry in entries:
                 if entry.is_symlink() and not links:
                     inside = os.path.relpath(entry.path, path)
                     raise Damage(f"{path}: {inside} is a link, which no store has: 'sonarsynth repair' moves it out")

@@ -61,10 +61,10 @@ def held(root: Path) -> Iterator[OpenedFolder]:
 
 def parts_of(name: str) -> list[str]:
     """The folders of a name, and the file. Raises OSError for a name that leaves the folder or is of no file."""
-    parts = name.split("/")
-    if any(part in ("", ".", "..") or "\0" in part for part in parts):
+    names = name.split("/")
+    if any(inner in ("", ".", "..") or "\0" in inner for inner in names):
         raise OSError(errno.EINVAL, "is no name of a file in a store", name)
-    return parts
+    return names
 
 
 @contextmanager
@@ -152,8 +152,8 @@ def open_own(file: Path, flags: int) -> int:
         if error.errno in (errno.ELOOP, errno.ENXIO, errno.EISDIR):
             raise Mismatch(f"{file}: is a link or no plain file, and is not written or read: move it away") from None
         raise
-    found = os.fstat(handle)
-    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+    file_status = os.fstat(handle)
+    if not stat.S_ISREG(file_status.st_mode) or file_status.st_nlink > 1:
         os.close(handle)
         raise Mismatch(f"{file}: is a second name of another file, or none: move it away")
     return handle
@@ -171,18 +171,18 @@ def folder_of(root: Root, name: str, *, make: bool = False) -> Iterator[tuple[in
 def _walked(root: Root, folders: Sequence[str], make: bool = False) -> Iterator[int]:
     """A handle of a folder in `root`, made where it is to be."""
     handle = os.dup(root.handle) if isinstance(root, OpenedFolder) else _open(None, str(root), _FOLDER, str(root))
-    where = str(root)
+    path = str(root)
     try:
-        for part in folders:
-            where = f"{where}/{part}"
+        for folder in folders:
+            path = f"{path}/{folder}"
             try:
-                inner = _open(handle, part, _FOLDER, where)
+                inner = _open(handle, folder, _FOLDER, path)
             except FileNotFoundError:
                 if not make:
                     raise
                 with suppress(FileExistsError):
-                    os.mkdir(part, dir_fd=handle)
-                inner = _open(handle, part, _FOLDER, where)
+                    os.mkdir(folder, dir_fd=handle)
+                inner = _open(handle, folder, _FOLDER, path)
             os.close(handle)
             handle = inner
         yield handle
@@ -190,13 +190,13 @@ def _walked(root: Root, folders: Sequence[str], make: bool = False) -> Iterator[
         os.close(handle)
 
 
-def _open(folder: int | None, name: str, flags: int, where: str) -> int:
+def _open(folder: int | None, name: str, flags: int, path: str) -> int:
     """A handle; OSError says where a link was met."""
     try:
         return os.open(name, flags, dir_fd=folder)
     except OSError as error:
         link = _is_link(folder, name)
-        raise OSError(errno.ELOOP if link else error.errno, IS_LINK if link else error.strerror, where) from None
+        raise OSError(errno.ELOOP if link else error.errno, IS_LINK if link else error.strerror, path) from None
 
 
 def _is_link(folder: int | None, name: str) -> bool:
