@@ -38,7 +38,7 @@ def supports_of(looks: Sequence[SampledScene]) -> PulseDurations:
         before, after = _support(scene, SUPPORT, turned=turned) + across
         plain = _support(scene, SUPPORT, turned=False)[1]
         clear = min(after, plain + across + TAIL)  # a turned pulse may never end: what echoes meanwhile must be heard
-        echo, foot = (_support(scene, part, turned=turned) + across for part in (ECHO_SUPPORT, FOOT))
+        echo, foot = (_support(scene, threshold, turned=turned) + across for threshold in (ECHO_SUPPORT, FOOT))
         rows.append((before, after, *echo, clear, foot.max()))
     return PulseDurations(*(float(n) for n in np.max(rows, axis=0)))
 
@@ -66,18 +66,18 @@ def blur_of(scene: Scene) -> float:
     environment, bounces = scene.world.environment, scene.physics.tracing.bounces
     heights = [law.rms_roughness for law in scene.laws]
     roughest = max(rms_height(environment.surface), rms_height(environment.bottom))
-    most = np.hypot(max(heights, default=0.0), roughest * np.sqrt(bounces))
-    if not most > 0.0:
+    height = np.hypot(max(heights, default=0.0), roughest * np.sqrt(bounces))
+    if not height > 0.0:
         return 0.0
-    delay_std = 2.0 * most / SLOWEST  # at the steepest grazing angle
+    delay_std = 2.0 * height / SLOWEST  # at the steepest grazing angle
     silent = max((silencing_blur(w, scene.sonar.antialias) for w in extreme_waveforms(scene)), default=0.0)
     return float(PULSE_FEET * min(delay_std, silent))
 
 
 def extreme_waveforms(scene: Scene) -> list[Waveform]:
     """What each source may sound like at the most: as its model, as long as it may become, and as short."""
-    found = []
+    waveforms = []
     for source in scene.world.sources:
         model, longest = source.model(scene.world.environment.depth), source.largest_scales[1]
-        found += [at_longest(waveform(model, width)) for width in sorted({1.0, longest, 1.0 / longest})]
-    return found
+        waveforms += [at_longest(waveform(model, width)) for width in sorted({1.0, longest, 1.0 / longest})]
+    return waveforms

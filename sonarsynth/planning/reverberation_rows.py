@@ -30,11 +30,11 @@ def reverberation_rows(plan: Plan) -> list[NoiseRow]:
     why = f"{families or 'nothing'} re 1 uPa in the echo window; noise of a beam {levels.noise:.0f} dB"
     error = plan.recipe.accuracy.speckle
     per_pulse = scatterers_per_pulse(error, shape=SINC)
-    said = f"{error:.2g} of the contrast at a hydrophone: {per_pulse:.2g} scatterers in 1/bandwidth; 3 % of each path"
+    bound = f"{error:.2g} of the contrast at a hydrophone: {per_pulse:.2g} scatterers in 1/bandwidth; 3 % of each path"
     sizes = plan.sizes
     seconds = levels.scatterers * sizes["sensor"] * PATH_SECONDS + CELL_SECONDS
     seconds += sizes["sensor"] * sizes["sample"] * SAMPLE_SECONDS
-    return [(REVERBERATION, method, why, said, seconds, 0)]
+    return [(REVERBERATION, method, why, bound, seconds, 0)]
 
 
 def reverberation_left_out(plan: Plan) -> list[Omission]:

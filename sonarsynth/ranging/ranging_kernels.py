@@ -120,7 +120,7 @@ def share_beyond_gains(spectrum: Any, response: Any, template: Any) -> float:
 
     Twice what the best gains leave: of another wave they take what is in phase, which is half.
     """
-    power = held = 0.0
+    power = explained = 0.0
     for q in range(len(spectrum)):
         along = loud = 0.0
         for k in range(len(template)):
@@ -129,8 +129,8 @@ def share_beyond_gains(spectrum: Any, response: Any, template: Any) -> float:
             loud += m.real**2 + m.imag**2
             power += p.real**2 + p.imag**2
         if along > 0.0:
-            held += along**2 / loud
-    return 2.0 * (power - held) / power if power > 0.0 else 1.0
+            explained += along**2 / loud
+    return 2.0 * (power - explained) / power if power > 0.0 else 1.0
 
 
 @nb.njit(cache=True, nogil=True)
