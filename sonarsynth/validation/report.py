@@ -53,11 +53,11 @@ def _knobs(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 def _trades(rows: Sequence[Row], quantity: str) -> list[RefinementCurve]:
     """Those of one quantity."""
-    made = []
+    curves = []
     for name, of in _knobs([row for row in rows if row.quantity == quantity]).items():
         columns = [r.counts["facets"] for r in of], [r.cost for r in of], [r.got for r in of], [r.expected for r in of]
-        made.append(RefinementCurve(name, *columns))
-    return made
+        curves.append(RefinementCurve(name, *columns))
+    return curves
 
 
 def _sphere(rows: Sequence[Row]) -> Figure:

@@ -54,17 +54,17 @@ def compare_arrivals(plan: Plan, index: int, file: Path) -> list[RayComparison]:
     """
     plan = plan.at(index)
     frame = plan.recipe.frame(index)[1]
-    snap, found = _nearest(frame, file)
+    snap, arrivals = _nearest(frame, file)
     wanted = None if plan.recipe.rays is None else plan.recipe.rays.eigenrays
     request = replace(EigenrayRequest() if wanted is None else wanted, targets="none")
     return paired(
-        [line for line in eigenray_lines(plan, frame, request) if line.name == f"snap {snap} to array"], found
+        [line for line in eigenray_lines(plan, frame, request) if line.name == f"snap {snap} to array"], arrivals
     )
 
 
-def paired(ours: Sequence[RayLine], found: BellhopArrivals) -> list[RayComparison]:
+def paired(ours: Sequence[RayLine], arrivals: BellhopArrivals) -> list[RayComparison]:
     """Rays of both, in the order of their delays."""
-    theirs, none = _merged(found), np.full(4, np.nan)
+    theirs, none = _merged(arrivals), np.full(4, np.nan)
     rows = [
         (
             (line.event.count("surface"), line.event.count("bottom")),
@@ -92,8 +92,8 @@ def paired(ours: Sequence[RayLine], found: BellhopArrivals) -> list[RayCompariso
 
 def comparison_table(rays: Sequence[RayComparison], file: Path) -> str:
     """The comparison, a line a ray; arrivals of more reflections than any ray of ours has are only counted."""
-    most = max((ray.surface + ray.bottom for ray in rays if np.isfinite(ray.delay[0])), default=0)
-    shown = [ray for ray in rays if ray.surface + ray.bottom <= most]
+    max_reflections = max((ray.surface + ray.bottom for ray in rays if np.isfinite(ray.delay[0])), default=0)
+    shown = [ray for ray in rays if ray.surface + ray.bottom <= max_reflections]
     rows: list[tuple[str, ...]] = [HEADINGS]
     for ray in shown:
         cells = [f"{1e3 * _either(ray.delay):.4f}", f"{1e6 * (ray.delay[0] - ray.delay[1]):.3f}"]
@@ -117,8 +117,8 @@ def _summary(rays: Sequence[RayComparison], shown: int) -> str:
         late = max(abs(ray.delay[0] - ray.delay[1]) for ray in both)
         loud = max(abs(ray.loss[0] - ray.loss[1]) for ray in both)
         words += f"; delays differ by {1e6 * late:.3g} us at most, levels by {loud:.2g} dB"
-    left = len(rays) - shown
-    return words + (f"; {left} arrivals of more reflections not looked for" if left else "")
+    omitted = len(rays) - shown
+    return words + (f"; {omitted} arrivals of more reflections not looked for" if omitted else "")
 
 
 def _either(pair: tuple[float, float]) -> float:
@@ -128,26 +128,26 @@ def _either(pair: tuple[float, float]) -> float:
 
 def _nearest(frame: Frame, file: Path) -> tuple[int, BellhopArrivals]:
     """The snap that a file is of, and its arrivals. Raises ArrivalsError."""
-    array, found = frame.sonar_pose.position, read_arrivals(file)
+    array, arrivals = frame.sonar_pose.position, read_arrivals(file)
     best: tuple[float, int, tuple[float, float, float]] | None = None
     for number, snap in enumerate(frame.moment.snaps):
         ends = (float(depth_of(snap.position)), float(depth_of(array)), float(np.hypot(*(array - snap.position)[:2])))
-        off = np.abs(np.subtract(ends, found.nearest(*ends)))
+        off = np.abs(np.subtract(ends, arrivals.nearest(*ends)))
         within = OFF * np.maximum(1.0, [max(ends[:2]), max(ends[:2]), ends[2]])
         if (off <= within).all() and (best is None or off.max() < best[0]):
             best = (float(off.max()), number, ends)
     if best is None:
         raise ArrivalsError(f"{file}: has no source and receiver where a snap and the array are in frame {frame.index}")
-    return best[1], found.at(*best[2])
+    return best[1], arrivals.at(*best[2])
 
 
-def _merged(found: BellhopArrivals) -> list[tuple[tuple[int, int], np.ndarray]]:
+def _merged(arrivals: BellhopArrivals) -> list[tuple[tuple[int, int], np.ndarray]]:
     """Bounces, and delay, angles and loss of each ray: what is of the same ray added up, weighted by amplitude."""
-    amplitude = 10.0 ** (-found.loss / 20.0)
-    rows = np.column_stack([found.delay, found.launch, found.arrival, amplitude])
+    amplitude = 10.0 ** (-arrivals.loss / 20.0)
+    rows = np.column_stack([arrivals.delay, arrivals.launch, arrivals.arrival, amplitude])
     groups: list[tuple[tuple[int, int], list[np.ndarray]]] = []
-    for i in np.lexsort((found.launch, found.bottom, found.surface)):
-        bounces, row = (int(found.surface[i]), int(found.bottom[i])), rows[i]
+    for i in np.lexsort((arrivals.launch, arrivals.bottom, arrivals.surface)):
+        bounces, row = (int(arrivals.surface[i]), int(arrivals.bottom[i])), rows[i]
         if groups and groups[-1][0] == bounces:
             last = groups[-1][1][-1]
             if row[1] - last[1] < SAME_RAY and abs(row[0] - last[0]) < SAME_TIME * last[0]:
@@ -155,12 +155,12 @@ def _merged(found: BellhopArrivals) -> list[tuple[tuple[int, int], np.ndarray]]:
                 continue
         groups.append((bounces, [row]))
     merged = []
-    for bounces, some in groups:
-        table = np.array(some)
-        whole = table[:, 3].sum()
-        mean = table[:, :3].T @ table[:, 3] / whole if whole > 0.0 else table[0, :3]
+    for bounces, group in groups:
+        table = np.array(group)
+        total = table[:, 3].sum()
+        mean = table[:, :3].T @ table[:, 3] / total if total > 0.0 else table[0, :3]
         with np.errstate(divide="ignore"):
-            merged.append((bounces, np.append(mean, -20.0 * np.log10(whole))))
+            merged.append((bounces, np.append(mean, -20.0 * np.log10(total))))
     return merged
 
 

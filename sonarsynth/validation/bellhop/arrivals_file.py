@@ -55,12 +55,12 @@ def read_arrivals(path: Path) -> ArrivalsFile:
         text = data.decode("ascii")
     except UnicodeDecodeError:
         raise ArrivalsError(f"{path}: is not a text file: arrivals in binary (run 'a') are not read") from None
-    head, _, rest = text.lstrip().partition("\n")
+    head, _, body = text.lstrip().partition("\n")
     if re.match(r"['\"]3D", head):
         raise ArrivalsError(f"{path}: is of BELLHOP3D, which is not read")
     plane = re.match(r"['\"]2D", head) is not None
     try:
-        numbers = _Numbers(path, np.array((rest if plane else text).split(), float))
+        numbers = _Numbers(path, np.array((body if plane else text).split(), float))
     except ValueError as error:
         raise ArrivalsError(f"{path}: is no file of arrivals ({str(error)[:60]})") from None
     frequency = float(numbers.take(1)[0])

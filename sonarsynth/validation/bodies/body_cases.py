@@ -97,7 +97,7 @@ class Point:
 
 def measured(mesh: Mesh, towards: Floats, exact: Complexes) -> Point:
     """Backscatter of a rigid convex mesh to directions (way, xyz) against exact amplitudes (frequency,) over `BAND`."""
-    echoes, cost = timed(lambda: np.array([backscatter(mesh, way, BAND) for way in towards]), repeats=1)
+    echoes, cost = timed(lambda: np.array([backscatter(mesh, direction, BAND) for direction in towards]), repeats=1)
     predicted = expected_error(mesh, SOUND_SPEED / BAND[-1]) * (BAND / BAND[-1])  # in proportion while it is small
     edge = float(np.linalg.norm(mesh.corners - np.roll(mesh.corners, -1, axis=1), axis=2).mean())
     return Point(len(mesh.faces), edge, cost / len(towards), np.abs(echoes / exact - 1.0), predicted)
@@ -110,16 +110,16 @@ def trade_rows(case: str, reference: str, points: Sequence[Point]) -> Iterator[R
     `mesh_resolution.expected_error` says. That holds and the order shows from `ASYMPTOTIC` down.
     """
     for point in points:
-        bound, got = 2.0 * float(point.predicted[-1]), float(point.rms[-1])
-        rest = point.milliseconds, PER_ASPECT, {"facets": point.facets, "values": len(point.error)}
-        yield Row(case, reference, AMPLITUDE, "1", bound, got, *rest, case)
+        bound, error = 2.0 * float(point.predicted[-1]), float(point.rms[-1])
+        columns = point.milliseconds, PER_ASPECT, {"facets": point.facets, "values": len(point.error)}
+        yield Row(case, reference, AMPLITUDE, "1", bound, error, *columns, case)
     fine = [point for point in points if point.predicted[-1] <= ASYMPTOTIC]
     ratio = np.array([point.rms / point.predicted for point in fine])
-    rest = fine[-1].milliseconds, PER_ASPECT, {"facets": fine[-1].facets, "values": ratio.size}
+    columns = fine[-1].milliseconds, PER_ASPECT, {"facets": fine[-1].facets, "values": ratio.size}
     worst = float(np.maximum(ratio, 1.0 / ratio).max())
-    yield Row(case, "expectation", "error as expected", "factor", 2.0, worst, *rest)
+    yield Row(case, "expectation", "error as expected", "factor", 2.0, worst, *columns)
     note = f"order in the length of edges: {order(fine):.3f}"
-    yield Row(case, reference, "order less 2", "1", 0.2, abs(order(fine) - 2.0), *rest, note=note)
+    yield Row(case, reference, "order less 2", "1", 0.2, abs(order(fine) - 2.0), *columns, note=note)
 
 
 def order(points: Sequence[Point]) -> float:

@@ -89,9 +89,9 @@ def _broadside(radius: float, length: float, quick: bool) -> Iterator[Row]:
     case = f"rigid cylinder, {radius:g} by {length:g} m"
     frequency = np.arange(25e3, 110.1e3, 5e3 if quick else 1e3)
     aspect = np.array([90.0])
-    got, cost = timed(lambda: facet_level(frequency, aspect, radius, length), repeats=0)
-    error = float(np.abs(got - series_level(frequency, aspect, radius, length)).max())
-    counts = {"facets": _facets(radius, length), "values": got.size}
+    levels, cost = timed(lambda: facet_level(frequency, aspect, radius, length), repeats=0)
+    error = float(np.abs(levels - series_level(frequency, aspect, radius, length)).max())
+    counts = {"facets": _facets(radius, length), "values": levels.size}
     yield Row(case, SERIES, "broadside", "dB", FAIR, error, cost, PER_ASPECT, counts)
 
 
@@ -101,31 +101,33 @@ def _facets(radius: float, length: float) -> int:
 
 def _side(case: str, radius: float, length: float, mesh: Mesh, quick: bool) -> Iterator[Row]:
     """The side alone, as in the series, round to 45 degrees: lobe by lobe, over the rms in the band."""
-    side = np.abs(mesh.normal[:, 0]) < 0.5
+    on_side = np.abs(mesh.normal[:, 0]) < 0.5
     aspects = np.arange(90.0, 44.0, -15.0 if quick else -1.0)
 
     def echo(towards: Floats) -> Complexes:
-        lit = side & lit_and_seen(-towards, towards, mesh.normal)
+        lit = on_side & lit_and_seen(-towards, towards, mesh.normal)
         return mesh_amplitude(mesh.corners, -towards, towards, wavenumber(BAND), lit)
 
-    got, cost = timed(lambda: np.array([echo(way) for way in round_x(aspects)]), repeats=0)
+    echoes, cost = timed(lambda: np.array([echo(direction) for direction in round_x(aspects)]), repeats=0)
     angle = np.radians(aspects)[:, None]
     exact = cylinder_amplitude(BAND, angle, radius=radius, length=length, sound_speed=SOUND_SPEED)
-    counts = {"facets": len(mesh.faces), "values": got.size}
-    error = float(_relative(got, exact).max())
+    counts = {"facets": len(mesh.faces), "values": echoes.size}
+    error = float(_relative(echoes, exact).max())
     yield Row(case, SERIES, "side, 90 to 45 deg", "1", SIDE, error, cost / len(aspects), PER_ASPECT, counts)
 
 
 def _all_round(case: str, radius: float, length: float, mesh: Mesh, quick: bool) -> Iterator[Row]:
     """Side and end from end-on to broadside, against the integral; end-on that is a disc's."""
     aspects = np.arange(0.0, 90.1, 15.0 if quick else 1.0)
-    got, cost = timed(lambda: np.array([backscatter(mesh, way, BAND) for way in round_x(aspects)]), repeats=0)
+    echoes, cost = timed(
+        lambda: np.array([backscatter(mesh, direction, BAND) for direction in round_x(aspects)]), repeats=0
+    )
     exact = lit_cylinder(np.radians(aspects)[:, None], wavenumber(BAND), radius, length)
-    counts = {"facets": len(mesh.faces), "values": got.size}
-    error = float(_relative(got, exact).max())
+    counts = {"facets": len(mesh.faces), "values": echoes.size}
+    error = float(_relative(echoes, exact).max())
     yield Row(case, INTEGRAL, "all round, 0 to 90 deg", "1", ROUND, error, cost / len(aspects), PER_ASPECT, counts)
 
 
-def _relative(got: Complexes, exact: Complexes) -> Floats:
+def _relative(echoes: Complexes, exact: Complexes) -> Floats:
     """Rms error over the band, over the rms (aspect,)."""
-    return np.asarray(np.sqrt(np.mean(np.abs(got - exact) ** 2, axis=1) / np.mean(np.abs(exact) ** 2, axis=1)))
+    return np.asarray(np.sqrt(np.mean(np.abs(echoes - exact) ** 2, axis=1) / np.mean(np.abs(exact) ** 2, axis=1)))

@@ -38,11 +38,11 @@ def triangle_rows(quick: bool) -> Iterator[Row]:
     for turned in (False, True):
         case = "triangles turned any way" if turned else "triangles in their own plane"
         note = "allowed more by the rounding of corners and of the phase" if turned else ""
-        for way in (MIRROR, NEAR, ANY, EDGES):
-            errors = np.array([_error(rng, height, size, way, turned) for height in HEIGHTS for size in sizes])
-            got, bound = worst(errors[:, 0], errors[:, 1])
+        for direction in (MIRROR, NEAR, ANY, EDGES):
+            errors = np.array([_error(rng, height, size, direction, turned) for height in HEIGHTS for size in sizes])
+            error, bound = worst(errors[:, 0], errors[:, 1])
             unit, counts = ("edge squared" if turned else "area"), {"facets": len(errors), "values": len(errors)}
-            yield Row(case, "50 digits", way, unit, bound, got, cost, "us a facet", counts, note=note)
+            yield Row(case, "50 digits", direction, unit, bound, error, cost, "us a facet", counts, note=note)
 
 
 def _cost(corners: Floats, wave: Floats) -> float:
@@ -50,14 +50,14 @@ def _cost(corners: Floats, wave: Floats) -> float:
     return 1e3 * timed(lambda: triangle_integral(corners, wave))[1] / len(corners)
 
 
-def _error(rng: np.random.Generator, height: float, size: float, way: str, turned: bool) -> tuple[float, float]:
+def _error(rng: np.random.Generator, height: float, size: float, direction: str, turned: bool) -> tuple[float, float]:
     """Error of the integral over one random triangle, over its area or its longest edge squared, and the bound."""
     flat = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [rng.uniform(-0.2, 1.2), height, 0.0]])
     flat -= np.array([rng.uniform(), height / 3.0, 0.0])
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0] if turned else np.eye(3)
     corners, edges = flat @ turn.T, (flat - np.roll(flat, 1, axis=0)) @ turn.T
     normal = turn[:, 2]
-    match way:
+    match direction:
         case "at the mirror angle":
             wave = normal
         case "1e-8 off the mirror angle":

@@ -65,11 +65,11 @@ def cylinder_panels() -> tuple[Panel, Panel]:
     over_frequency = Panel(title, KHZ, y, tuple(curves), -0.4, 0.4, bounds=fair)
     aspect, (radius, length) = np.arange(0.0, 90.01, 0.1), cylinder.BODIES[0]
     k = wavenumber(MIDDLE)
-    whole = decibels(lit_cylinder(np.radians(aspect), k, radius, length))
+    integral = decibels(lit_cylinder(np.radians(aspect), k, radius, length))
     facets = cylinder.facet_level(np.array([MIDDLE]), aspect, radius, length)[0]
     series = cylinder.series_level(np.array([MIDDLE]), aspect, radius, length)[0]
     pictured = (
-        Curve("integral, side and end", aspect, whole, "exact", 0),
+        Curve("integral, side and end", aspect, integral, "exact", 0),
         Curve("series, side only", aspect, series, "other", 0),
         Curve("facets", aspect, facets, "facets", 0),
     )
@@ -92,10 +92,10 @@ def plate_panels() -> tuple[Panel, Panel]:
     over_frequency = Panel(title, KHZ, STRENGTH, curves, -50.0, 30.0)
     off = np.arange(0.0, 90.01, 0.05)
     into, out = plate.fan_out(off)
-    one = np.array([MIDDLE])
+    middle = np.array([MIDDLE])
     exact = decibels(rectangular_plate(plate.SIDES, into, out, wavenumber(MIDDLE)))
-    points = decibels(plate.points_echo(dots, into, out, one)[:, 0])
-    facets = decibels(plate.echoes(two, into, out, one)[:, 0])
+    points = decibels(plate.points_echo(dots, into, out, middle)[:, 0])
+    facets = decibels(plate.echoes(two, into, out, middle)[:, 0])
     pictured = (
         Curve("closed form", off, exact, "exact", 0),
         Curve(f"{len(dots)} points", off, points, "other", 0),

@@ -52,7 +52,7 @@ def echoes(corners: Floats, incident: Floats, scattered: Floats, frequency: Floa
     """Far-field amplitudes (pair, frequency) (m) of rigid facets, for pairs of directions (pair, xyz)."""
     k = wavenumber(frequency)
     pairs = zip(incident, scattered, strict=True)
-    return np.array([mesh_amplitude(corners, one, other, k) for one, other in pairs])
+    return np.array([mesh_amplitude(corners, inward, outward, k) for inward, outward in pairs])
 
 
 def pairs(count: int) -> tuple[Floats, Floats]:
@@ -73,22 +73,22 @@ def _most(area: float) -> Floats:
     return area * BAND / SOUND_SPEED
 
 
-def _error(got: Complexes, exact: Complexes, area: float) -> float:
+def _error(amplitude: Complexes, exact: Complexes, area: float) -> float:
     """Largest error (pair, frequency) over area/wavelength."""
-    return float((np.abs(got - exact) / _most(area)).max())
+    return float((np.abs(amplitude - exact) / _most(area)).max())
 
 
 def _rectangle() -> Iterator[Row]:
     """Two facets against sinc lobes, and |f| = A/lambda straight back."""
     incident, scattered = pairs(200)
-    got, cost = timed(lambda: echoes(rectangle(), incident, scattered, BAND))
-    counts = {"facets": 2, "values": got.size}
+    amplitude, cost = timed(lambda: echoes(rectangle(), incident, scattered, BAND))
+    counts = {"facets": 2, "values": amplitude.size}
     size = float(np.prod(SIDES))
-    rest = cost / len(incident), PER_ASPECT, counts
-    error = _error(got, _exact(incident, scattered), size)
-    yield Row("rectangle", CLOSED, AMPLITUDE, "A/wavelength", TIGHT, error, *rest)
-    straight = float(np.abs(np.abs(got[0]) / _most(size) - 1.0).max())
-    yield Row("rectangle", "A/wavelength", "straight back", "1", TIGHT, straight, *rest)
+    columns = cost / len(incident), PER_ASPECT, counts
+    error = _error(amplitude, _exact(incident, scattered), size)
+    yield Row("rectangle", CLOSED, AMPLITUDE, "A/wavelength", TIGHT, error, *columns)
+    straight = float(np.abs(np.abs(amplitude[0]) / _most(size) - 1.0).max())
+    yield Row("rectangle", "A/wavelength", "straight back", "1", TIGHT, straight, *columns)
 
 
 def _nulls() -> Iterator[Row]:
@@ -98,25 +98,25 @@ def _nulls() -> Iterator[Row]:
     sines = [(first, first + n * wavelength / SIDES[0]) for n in (1, 2, 3, 10) for first in (0.0, 0.3)]
     into = np.array([[s, 0.0, -np.sqrt(1.0 - s * s)] for s, _ in sines])
     out = np.array([[s, 0.0, np.sqrt(1.0 - s * s)] for _, s in sines])
-    got, cost = timed(lambda: echoes(rectangle(), into, out, np.array([frequency])))
+    amplitude, cost = timed(lambda: echoes(rectangle(), into, out, np.array([frequency])))
     counts = {"facets": 2, "values": len(sines)}
-    left = float(np.abs(got).max()) * wavelength / float(np.prod(SIDES))
-    rest = cost / len(sines), PER_ASPECT
-    yield Row("rectangle", CLOSED, "nulls", "A/wavelength", TIGHT, left, *rest, counts)
+    null = float(np.abs(amplitude).max()) * wavelength / float(np.prod(SIDES))
+    columns = cost / len(sines), PER_ASPECT
+    yield Row("rectangle", CLOSED, "nulls", "A/wavelength", TIGHT, null, *columns, counts)
     sine = NULL / (2.0 * np.pi / wavelength * RADIUS)
     ring = polygon(4000)
-    there = np.array([[sine, 0.0, np.sqrt(1.0 - sine**2)]])
-    got, cost = timed(lambda: echoes(ring, DOWN[None], there, np.array([frequency])), repeats=1)
-    left = float(np.abs(got).max()) * wavelength / (np.pi * RADIUS**2)
-    yield Row("disc", CLOSED, "null", "A/wavelength", 1e-6, left, cost, PER_ASPECT, {"facets": len(ring), "values": 1})
+    direction = np.array([[sine, 0.0, np.sqrt(1.0 - sine**2)]])
+    amplitude, cost = timed(lambda: echoes(ring, DOWN[None], direction, np.array([frequency])), repeats=1)
+    null = float(np.abs(amplitude).max()) * wavelength / (np.pi * RADIUS**2)
+    yield Row("disc", CLOSED, "null", "A/wavelength", 1e-6, null, cost, PER_ASPECT, {"facets": len(ring), "values": 1})
 
 
 def split(corners: Floats, rng: np.random.Generator) -> Floats:
     """Every facet (facet, 3, xyz) cut in three at a random point inside, needles among them."""
     share = rng.dirichlet([0.4, 0.4, 0.4], len(corners))
     point = np.einsum("fc,fcx->fx", share, corners)
-    parts = [np.stack([corners[:, i], corners[:, (i + 1) % 3], point], axis=1) for i in range(3)]
-    return np.concatenate(parts)
+    thirds = [np.stack([corners[:, i], corners[:, (i + 1) % 3], point], axis=1) for i in range(3)]
+    return np.concatenate(thirds)
 
 
 def _pieces(quick: bool) -> Iterator[Row]:
@@ -124,20 +124,20 @@ def _pieces(quick: bool) -> Iterator[Row]:
     incident, scattered = pairs(6)
     rng = stream(SEED, "accuracy", "pieces")
     corners = rectangle()
-    whole = echoes(corners, incident, scattered, BAND)
+    uncut = echoes(corners, incident, scattered, BAND)
     for _ in range(5 if quick else 9):
         corners = split(corners, rng)
-        got, cost = timed(lambda: echoes(corners, incident, scattered, BAND), repeats=1)  # noqa: B023 -- called here
-        error = _error(got, whole, float(np.prod(SIDES)))
-        counts = {"facets": len(corners), "values": got.size}
-        rest = cost / len(incident), PER_ASPECT, counts, PIECES
-        yield Row(PIECES, WHOLE, AMPLITUDE, "A/wavelength", TIGHT, error, *rest)
+        amplitude, cost = timed(lambda: echoes(corners, incident, scattered, BAND), repeats=1)  # noqa: B023 -- called here
+        error = _error(amplitude, uncut, float(np.prod(SIDES)))
+        counts = {"facets": len(corners), "values": amplitude.size}
+        columns = cost / len(incident), PER_ASPECT, counts, PIECES
+        yield Row(PIECES, WHOLE, AMPLITUDE, "A/wavelength", TIGHT, error, *columns)
 
 
 def tiles(cells: int) -> Floats:
     """Corners (facet, 3, xyz) of the rectangle cut into so many cells along its width, each halved; nearly square."""
     along = round(cells * SIDES[0] / SIDES[1])
-    x, y = (np.linspace(-0.5 * side, 0.5 * side, n + 1) for side, n in zip(SIDES, (along, cells), strict=True))
+    x, y = (np.linspace(-0.5 * length, 0.5 * length, n + 1) for length, n in zip(SIDES, (along, cells), strict=True))
     i, j = (index.ravel() for index in np.meshgrid(np.arange(along), np.arange(cells), indexing="ij"))
     at = [np.stack([x[i + p], y[j + q], 0.0 * i], axis=1) for p, q in ((0, 0), (1, 0), (1, 1), (0, 1))]
     return np.concatenate([np.stack([at[0], at[1], at[2]], axis=1), np.stack([at[0], at[2], at[3]], axis=1)])
@@ -160,16 +160,16 @@ def _points(quick: bool) -> Iterator[Row]:
     exact = _exact(incident, scattered)
     for cells in (4, 8, 16) if quick else (2, 4, 8, 16, 32, 64, 128):
         corners = tiles(cells)
-        got, cost = timed(lambda: points_echo(corners, incident, scattered, BAND))  # noqa: B023 -- called here
+        amplitude, cost = timed(lambda: points_echo(corners, incident, scattered, BAND))  # noqa: B023 -- called here
         edges = corners[[0, len(corners) // 2]] - np.roll(corners[[0, len(corners) // 2]], 1, axis=1)
         change = np.einsum("fex,px->pfe", edges, incident - scattered)[:, None] * wavenumber(BAND)[:, None, None]
         off = np.minimum(np.sum(change**2, axis=-1) / 72.0, 2.0).mean(axis=-1)
         along = 0.5 * np.abs((incident - scattered)[:, 2])
         bound = float((off * along[:, None]).max())
-        error = _error(got, exact, float(np.prod(SIDES)))
-        counts = {"facets": len(corners), "values": got.size}
-        rest = cost / len(incident), PER_ASPECT, counts, POINTS
-        yield Row(POINTS, CLOSED, AMPLITUDE, "A/wavelength", bound + TIGHT, error, *rest)
+        error = _error(amplitude, exact, float(np.prod(SIDES)))
+        counts = {"facets": len(corners), "values": amplitude.size}
+        columns = cost / len(incident), PER_ASPECT, counts, POINTS
+        yield Row(POINTS, CLOSED, AMPLITUDE, "A/wavelength", bound + TIGHT, error, *columns)
 
 
 def polygon(sides: int) -> Floats:
@@ -185,19 +185,19 @@ def _polygons(quick: bool) -> Iterator[Row]:
     exact = circular_plate(RADIUS, incident[:, None], scattered[:, None], wavenumber(BAND))
     for sides in (16, 64, 256) if quick else (8, 16, 32, 64, 128, 256, 512, 1024, 4096):
         corners = polygon(sides)
-        got, cost = timed(lambda: echoes(corners, incident, scattered, BAND))  # noqa: B023 -- called here
+        amplitude, cost = timed(lambda: echoes(corners, incident, scattered, BAND))  # noqa: B023 -- called here
         missing = 1.0 - float(np.sinc(2.0 / sides))
-        error = _error(got, exact, np.pi * RADIUS**2)
-        counts = {"facets": sides, "values": got.size}
-        rest = cost / len(incident), PER_ASPECT, counts, POLYGON
-        yield Row(POLYGON, CLOSED, AMPLITUDE, "A/wavelength", missing + TIGHT, error, *rest)
+        error = _error(amplitude, exact, np.pi * RADIUS**2)
+        counts = {"facets": sides, "values": amplitude.size}
+        columns = cost / len(incident), PER_ASPECT, counts, POLYGON
+        yield Row(POLYGON, CLOSED, AMPLITUDE, "A/wavelength", missing + TIGHT, error, *columns)
 
 
 def _face() -> Iterator[Row]:
     """The face of a box, as users get it: A/wavelength, in dB."""
     box = Box(size=(0.2, *SIDES))
-    got, cost = timed(lambda: target_strength(box, BAND, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), SOUND_SPEED))
-    error = float(np.abs(got - 20.0 * np.log10(_most(float(np.prod(SIDES))))).max())
+    level, cost = timed(lambda: target_strength(box, BAND, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), SOUND_SPEED))
+    error = float(np.abs(level - 20.0 * np.log10(_most(float(np.prod(SIDES))))).max())
     yield Row(
         "face of a box",
         "A/wavelength",
@@ -207,7 +207,7 @@ def _face() -> Iterator[Row]:
         error,
         cost,
         PER_ASPECT,
-        {"facets": 12, "values": got.size},
+        {"facets": 12, "values": level.size},
     )
 
 

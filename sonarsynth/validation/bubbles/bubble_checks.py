@@ -71,56 +71,56 @@ def timed(
     times: list[float] = []
     while len(times) < 5 and sum(times) < 0.2:
         began = time.process_time()
-        found = bubble_collapse.collapse.__wrapped__(cavity, rebounds, tolerance, method)
+        bubble = bubble_collapse.collapse.__wrapped__(cavity, rebounds, tolerance, method)
         times.append(time.process_time() - began)
-    return found, 1e3 * float(np.median(times))
+    return bubble, 1e3 * float(np.median(times))
 
 
 def row(
-    case: str, reference: str, quantity: str, unit: str, expected: float, got: float, cost: float, found: Collapse
+    case: str, reference: str, quantity: str, unit: str, expected: float, error: float, cost: float, bubble: Collapse
 ) -> Row:
     """A row of a solved bubble."""
-    counts = {"evaluations": found.evaluations}
-    return Row(case, reference, quantity, unit, expected, abs(float(got)), cost, "ms a bubble", counts)
+    counts = {"evaluations": bubble.evaluations}
+    return Row(case, reference, quantity, unit, expected, abs(float(error)), cost, "ms a bubble", counts)
 
 
-def numbers_of(found: Collapse) -> tuple[float, ...]:
+def numbers_of(bubble: Collapse) -> tuple[float, ...]:
     """What the references state: time and radius of the collapse, pressure there, time and radius of the rebound."""
-    after = found.largest[0]
-    there = float(bubble_collapse.pressure(0.0, found))
-    return found.collapse_time, found.minimum_radius, there, after.time + found.collapse_time, after.radius
+    after = bubble.largest[0]
+    pressure = float(bubble_collapse.pressure(0.0, bubble))
+    return bubble.collapse_time, bubble.minimum_radius, pressure, after.time + bubble.collapse_time, after.radius
 
 
-def worst(got: tuple[float, ...], expected: tuple[float, ...]) -> float:
+def worst(values: tuple[float, ...], expected: tuple[float, ...]) -> float:
     """The largest relative error."""
-    return float(np.abs(np.array(got) / expected - 1.0).max())
+    return float(np.abs(np.array(values) / expected - 1.0).max())
 
 
 def frozen_rows(quick: bool) -> Iterator[Row]:
     """Collapse and rebound, to all that is known of them."""
     for (equation, gas), expected in NUMBERS.items():
-        found, cost = timed(described(gas, compressible=equation == "Keller-Miksis"))
+        bubble, cost = timed(described(gas, compressible=equation == "Keller-Miksis"))
         case = f"{equation}, {gas:g} Pa"
-        yield row(case, FROZEN, "collapse, rebound", "1", 1e-7, worst(numbers_of(found), expected), cost, found)
+        yield row(case, FROZEN, "collapse, rebound", "1", 1e-7, worst(numbers_of(bubble), expected), cost, bubble)
         if not quick or gas == 1000.0:
-            yield from series_rows(case, found, cost)
+            yield from series_rows(case, bubble, cost)
     for gas in (1000.0,) if quick else (100.0, 1000.0):
-        found, cost = timed(described(gas, core=True))
-        yield from series_rows(f"Keller-Miksis with a hard core, {gas:g} Pa", found, cost)
+        bubble, cost = timed(described(gas, core=True))
+        yield from series_rows(f"Keller-Miksis with a hard core, {gas:g} Pa", bubble, cost)
 
 
-def series_rows(case: str, found: Collapse, cost: float) -> Iterator[Row]:
+def series_rows(case: str, bubble: Collapse, cost: float) -> Iterator[Row]:
     """Every number of a bubble and its rebound, and the waveform, against the power series."""
-    best = exact(found.cavity)
+    best = exact(bubble.cavity)
     (low, high), (first, last) = best.radii, best.times
-    again = found.largest[0]
-    yield row(case, SERIES, "smallest radius", "1", TOLERANCE, found.minimum_radius / low - 1.0, cost, found)
-    yield row(case, SERIES, "collapse time", "1", 0.1 * TOLERANCE, found.collapse_time / first - 1.0, cost, found)
-    got = (again.time + found.collapse_time, again.radius)
-    yield row(case, SERIES, "rebound", "1", TOLERANCE, worst(got, (last, high)), cost, found)
-    expected, own = waveform(exact_spectrum(best)), waveform(spectrum(found))
+    again = bubble.largest[0]
+    yield row(case, SERIES, "smallest radius", "1", TOLERANCE, bubble.minimum_radius / low - 1.0, cost, bubble)
+    yield row(case, SERIES, "collapse time", "1", 0.1 * TOLERANCE, bubble.collapse_time / first - 1.0, cost, bubble)
+    rebound = (again.time + bubble.collapse_time, again.radius)
+    yield row(case, SERIES, "rebound", "1", TOLERANCE, worst(rebound, (last, high)), cost, bubble)
+    expected, own = waveform(exact_spectrum(best)), waveform(spectrum(bubble))
     miss = np.abs(expected - own).max() / np.abs(expected).max()
-    yield row(case, SERIES, "waveform below 200 kHz", "of peak", 1e-8, miss, cost, found)
+    yield row(case, SERIES, "waveform below 200 kHz", "of peak", 1e-8, miss, cost, bubble)
 
 
 def exact_spectrum(best: ExactCollapse) -> np.ndarray:
@@ -129,9 +129,9 @@ def exact_spectrum(best: ExactCollapse) -> np.ndarray:
     return np.asarray(np.exp(-2j * np.pi * np.outer(HERTZ, time)) @ (best.weight * best.pressure))
 
 
-def spectrum(found: Collapse) -> np.ndarray:
+def spectrum(bubble: Collapse) -> np.ndarray:
     """The same of a solved bubble, as snaps have it; its ends are not faded."""
-    return pulses.spectrum(HERTZ, bubble_pulse.pulse(found, float(HERTZ[-1]), fade=0.0))
+    return pulses.spectrum(HERTZ, bubble_pulse.pulse(bubble, float(HERTZ[-1]), fade=0.0))
 
 
 def waveform(S: np.ndarray, corner: float = 200e3) -> Floats:
@@ -143,14 +143,14 @@ def waveform(S: np.ndarray, corner: float = 200e3) -> Floats:
 def level_rows(quick: bool) -> Iterator[Row]:
     """Peak source levels, before filters and behind them, as tabled."""
     for gas, (raw, *limited) in LEVELS.items():
-        found, cost = timed(described(gas))
+        bubble, cost = timed(described(gas))
         case = f"Keller-Miksis, {gas:g} Pa"
-        yield row(case, TABLE, "peak", "dB", PRINTED, bubble_pulse.source_level(found) - raw, cost, found)
-        S = spectrum(found)
+        yield row(case, TABLE, "peak", "dB", PRINTED, bubble_pulse.source_level(bubble) - raw, cost, bubble)
+        S = spectrum(bubble)
         for corner, level in zip((200.0, 100.0), limited, strict=True):
-            got = 20.0 * np.log10(np.ptp(waveform(S, 1e3 * corner)) / REFERENCE_PRESSURE)
-            yield row(case, TABLE, f"p-p below {corner:g} kHz", "dB", PRINTED, got - level, cost, found)
+            peak_to_peak = 20.0 * np.log10(np.ptp(waveform(S, 1e3 * corner)) / REFERENCE_PRESSURE)
+            yield row(case, TABLE, f"p-p below {corner:g} kHz", "dB", PRINTED, peak_to_peak - level, cost, bubble)
     for (depth, gas), level in {} if quick else DEEPER.items():
-        found, cost = timed(described(gas, depth))
+        bubble, cost = timed(described(gas, depth))
         case = f"Keller-Miksis, {gas:g} Pa at {depth:g} m"
-        yield row(case, TABLE, "peak", "dB", PRINTED, bubble_pulse.source_level(found) - level, cost, found)
+        yield row(case, TABLE, "peak", "dB", PRINTED, bubble_pulse.source_level(bubble) - level, cost, bubble)

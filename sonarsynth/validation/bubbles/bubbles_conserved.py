@@ -32,16 +32,16 @@ def left(time: Floats) -> Floats:
 def rayleigh_rows() -> Iterator[Row]:
     """The collapse of an empty cavity to a point."""
     case = "empty cavity"
-    found, cost = timed(EMPTY)
-    yield row(case, RAYLEIGH, "collapse time", "1", 1e-10, found.collapse_time / UNIT / COLLAPSE - 1.0, cost, found)
+    bubble, cost = timed(EMPTY)
+    yield row(case, RAYLEIGH, "collapse time", "1", 1e-10, bubble.collapse_time / UNIT / COLLAPSE - 1.0, cost, bubble)
     before = np.geomspace(1e-4, 0.9, 20)
-    wall, x = bubble_collapse.wall(-before * UNIT, found), left(before)
-    yield row(case, RAYLEIGH, "radius over time", "1", 1e-7, np.abs(wall.radius / RADIUS / x - 1.0).max(), cost, found)
+    wall, x = bubble_collapse.wall(-before * UNIT, bubble), left(before)
+    yield row(case, RAYLEIGH, "radius over time", "1", 1e-7, np.abs(wall.radius / RADIUS / x - 1.0).max(), cost, bubble)
     before = np.array([1e-1, 1e-2, 1e-3, 1e-4])
-    wall, x = bubble_collapse.wall(-before * UNIT, found), left(before)
+    wall, x = bubble_collapse.wall(-before * UNIT, bubble), left(before)
     exponent = wall.speed * -before * UNIT / wall.radius
     law = np.sqrt(2.0 / 3.0 * (x**-3 - 1.0)) * before / x
-    yield row(case, RAYLEIGH, "exponent towards 2/5", "1", 1e-7, np.abs(exponent - law).max(), cost, found)
+    yield row(case, RAYLEIGH, "exponent towards 2/5", "1", 1e-7, np.abs(exponent - law).max(), cost, bubble)
     tight, cost = timed(EMPTY, 1e-13)
     end = float(bubble_collapse.wall(-1e-6 * UNIT, tight).radius) / RADIUS / 1e-6**0.4 / LAW
     yield row(f"{case}, tolerance 1e-13", "the 2/5 law", "radius at last", "1", 1e-6, end - 1.0, cost, tight)
@@ -52,12 +52,12 @@ def conserved_rows(quick: bool) -> Iterator[Row]:
     for gas in (1000.0,) if quick else (10.0, 100.0, 1000.0, 3000.0, 10e3):
         cavity = described(gas, compressible=False)._replace(viscosity=0.0, surface_tension=0.0)
         case = f"Rayleigh-Plesset without losses, {gas:g} Pa"
-        found, cost = timed(cavity)
+        bubble, cost = timed(cavity)
         least = smallest(cavity) * RADIUS
-        yield row(case, ENERGY, "smallest radius", "1", 1e-9, found.minimum_radius / least - 1.0, cost, found)
-        found, cost = timed(cavity, 1e-9, rebounds=1)
+        yield row(case, ENERGY, "smallest radius", "1", 1e-9, bubble.minimum_radius / least - 1.0, cost, bubble)
+        bubble, cost = timed(cavity, 1e-9, rebounds=1)
         case += ", tolerance 1e-9"
-        yield row(case, ENERGY, "energy, two collapses", "1", 1e-8, drift(found), cost, found)
+        yield row(case, ENERGY, "energy, two collapses", "1", 1e-8, drift(bubble), cost, bubble)
 
 
 def smallest(cavity: Cavity) -> float:
@@ -70,10 +70,10 @@ def smallest(cavity: Cavity) -> float:
     return float(np.exp(brentq(left_over, -25.0, -1e-3, xtol=1e-15, rtol=1e-15)))
 
 
-def drift(found: Collapse) -> float:
+def drift(bubble: Collapse) -> float:
     """Largest change of the energy over all of what was solved, relative; times are dense about each collapse."""
-    first, last = found.clock[[0, -1]]
+    first, last = bubble.clock[[0, -1]]
     near = np.geomspace(1e-12, 1e-5, 40)
-    about = np.concatenate([turn.time + np.append(-near, near) for turn in found.smallest])
-    time = np.concatenate([np.linspace(first, last, 2000), found.clock, about])
-    return float(np.abs(bubble_collapse.energy(time, found) / bubble_collapse.energy(first, found) - 1.0).max())
+    about = np.concatenate([turn.time + np.append(-near, near) for turn in bubble.smallest])
+    time = np.concatenate([np.linspace(first, last, 2000), bubble.clock, about])
+    return float(np.abs(bubble_collapse.energy(time, bubble) / bubble_collapse.energy(first, bubble) - 1.0).max())

@@ -42,42 +42,44 @@ def extreme_rows(quick: bool) -> Iterator[Row]:
             yield from _solved_or_refused(gas, depth)
     for name, (model, reason) in HOPELESS.items():
         began = time.process_time()
-        got = verdict(model, 5.0)
+        refusal = verdict(model, 5.0)
         cost = 1e3 * (time.process_time() - began)
-        wrong = float(not (reason in got if reason else got == ""))
-        note = f"refused: {got}" if got else "solved"
+        wrong = float(not (reason in refusal if reason else refusal == ""))
+        note = f"refused: {refusal}" if refusal else "solved"
         yield Row(f"Keller-Miksis, {name}", PRESSURES, "verdict", "wrong", 0.0, wrong, cost, OF, {}, None, note)
 
 
 def verdict(model: KellerMiksis, depth: float) -> str:
     """Why a described snap is refused at a depth (m), in one line; nothing for one that is solved."""
     try:
-        made = model.pulse(depth, HIGHEST)
+        pulse = model.pulse(depth, HIGHEST)
     except ValueError as error:
         return str(error)
-    return "" if np.isfinite(made.strength).all() and np.isfinite(made.peak) else "its pulse is not finite, unsaid"
+    return "" if np.isfinite(pulse.strength).all() and np.isfinite(pulse.peak) else "its pulse is not finite, unsaid"
 
 
 def _solved_or_refused(gas: float, depth: float) -> Iterator[Row]:
     """The snap's verdict against the wall speed of the series; and what was solved, whether refused or not."""
     model = KellerMiksis(gas_pressure=gas)
     of = model.cavity(depth)
-    found, cost = timed(of)
+    bubble, cost = timed(of)
     best = exact(of)
     case = f"Keller-Miksis, {gas:g} Pa at {depth:g} m"
     mach = best.fastest / of.sound_speed
-    got = verdict(model, depth)
-    note = f"refused: {got}" if got else f"solved, Mach {mach:.2g}"
-    right = (mach > model.largest_mach) == ("largest_mach" in got) and (got == "" or "largest_mach" in got)
-    counts = {"evaluations": found.evaluations}
+    refusal = verdict(model, depth)
+    note = f"refused: {refusal}" if refusal else f"solved, Mach {mach:.2g}"
+    right = (mach > model.largest_mach) == ("largest_mach" in refusal) and (refusal == "" or "largest_mach" in refusal)
+    counts = {"evaluations": bubble.evaluations}
     yield Row(case, SERIES, "verdict", "wrong", 0.0, float(not right), cost, OF, counts, None, note)
-    yield row(case, SERIES, "largest wall speed", "1", 1e-3, found.mach / mach - 1.0, cost, found)
-    yield row(case, SERIES, "smallest radius", "1", TOLERANCE, found.minimum_radius / best.radii[0] - 1.0, cost, found)
-    miss = found.collapse_time / best.times[0] - 1.0
-    yield row(case, SERIES, "collapse time", "1", 0.1 * TOLERANCE, miss, cost, found)
-    expected, own = waveform(exact_spectrum(best)), waveform(spectrum(found))
+    yield row(case, SERIES, "largest wall speed", "1", 1e-3, bubble.mach / mach - 1.0, cost, bubble)
+    yield row(
+        case, SERIES, "smallest radius", "1", TOLERANCE, bubble.minimum_radius / best.radii[0] - 1.0, cost, bubble
+    )
+    miss = bubble.collapse_time / best.times[0] - 1.0
+    yield row(case, SERIES, "collapse time", "1", 0.1 * TOLERANCE, miss, cost, bubble)
+    expected, own = waveform(exact_spectrum(best)), waveform(spectrum(bubble))
     for quantity, bound, error in (
         ("waveform below 200 kHz", 1e-8, np.abs(expected - own).max()),
         ("peak below 200 kHz", 1e-8, expected.max() - own.max()),
     ):
-        yield row(case, SERIES, quantity, "of peak", bound, error / np.abs(expected).max(), cost, found)
+        yield row(case, SERIES, quantity, "of peak", bound, error / np.abs(expected).max(), cost, bubble)

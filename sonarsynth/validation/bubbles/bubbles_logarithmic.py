@@ -61,9 +61,9 @@ def _timed(run: Callable[[], Any], count: int) -> float:
     return 1e6 * float(np.median(times)) / count
 
 
-def _row(reference: str, quantity: str, unit: str, expected: float, got: Any, cost: float, points: int) -> Row:
+def _row(reference: str, quantity: str, unit: str, expected: float, error: Any, cost: float, points: int) -> Row:
     of = "us a frequency" if "spectrum" in quantity else "us a time"
-    return Row(CASE, reference, quantity, unit, expected, abs(float(got)), cost, of, {"evaluations": points})
+    return Row(CASE, reference, quantity, unit, expected, abs(float(error)), cost, of, {"evaluations": points})
 
 
 def _computed(t: Floats) -> Floats:
@@ -72,8 +72,8 @@ def _computed(t: Floats) -> Floats:
 
 def _wall_rows(quick: bool) -> Iterator[Row]:
     cost = _timed(lambda: _computed(WALL[:, 0]), len(WALL))
-    known = WALL[:, 1:].T
-    miss = np.abs(_computed(WALL[:, 0]) - known) / np.where(known == 0.0, 1.0, np.abs(known))
+    tabulated = WALL[:, 1:].T
+    miss = np.abs(_computed(WALL[:, 0]) - tabulated) / np.where(tabulated == 0.0, 1.0, np.abs(tabulated))
     for name, error in zip(("radius", "speed", "acceleration", "pressure"), miss, strict=True):
         yield _row(TABLE, name, "1", 1e-10, error.max(), cost, len(WALL))
     times = -np.geomspace(1e-9, 2e-3, 6 if quick else 40)
@@ -107,14 +107,14 @@ def _collapse_rows() -> Iterator[Row]:
     L = (3.0 - np.sqrt(5.0)) / 2.0
     factor = L * (2.0 - L) * np.exp(-2.0 * L)  # 0.28790
     size = frozen.density * (2.0 * frozen.a) ** 3 / TAU**2
-    found = minimize_scalar(
+    minimum = minimize_scalar(
         lambda x: -float(snap_pressure.pressure(-x, frozen)),
         bounds=(0.1 * TAU, TAU),
         method="bounded",
         options={"xatol": 1e-12},
     )
     cost = _timed(lambda: snap_pressure.pressure(-TAU, frozen), 1)
-    yield _row(CLOSED, "peak, growth frozen", "1", 1e-9, -found.fun / size / factor - 1.0, cost, 1)
+    yield _row(CLOSED, "peak, growth frozen", "1", 1e-9, -minimum.fun / size / factor - 1.0, cost, 1)
     yield _row(CLOSED, "net impulse", "Pa s", 0.0, float(snap_pressure.impulse(0.0, BUBBLE)), cost, 1)
     x, w = snap_pressure.quadrature(BUBBLE, 2e5)
     p = snap_pressure.pressure(-x, BUBBLE)
@@ -170,6 +170,6 @@ def _edges(frequency: float) -> Floats:
     longest = 2.0 / frequency if frequency > 0.0 else 3e-4
     graded = -TAU * np.append(0.0, 2.0 ** np.arange(-2, 20))
     even = np.arange(0.0, start, -min(longest, 3e-4))
-    kept = graded[graded > -longest * 0.7]
-    joined = np.unique(np.concatenate([kept, even[even < kept.min()], [start]]))
+    fine = graded[graded > -longest * 0.7]
+    joined = np.unique(np.concatenate([fine, even[even < fine.min()], [start]]))
     return np.asarray(joined)

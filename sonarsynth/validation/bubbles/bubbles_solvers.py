@@ -50,27 +50,27 @@ def solver_rows(quick: bool) -> Iterator[Row]:
         default = (p.form, p.method, p.tolerance) == DEFAULT
         case = f"{p.form}, {p.method} {p.tolerance:g}"
         knob = f"{p.form}, {p.method}{DEFAULTS if default else ''}"
-        rest = p.milliseconds, "ms a bubble", {"evaluations": p.evaluations}, knob
+        columns = p.milliseconds, "ms a bubble", {"evaluations": p.evaluations}, knob
         if np.isnan(p.radii):
             note = "the solver gives up: its steps are shorter than float64 tells apart"
-            yield Row(case, SERIES, "gave up", "", 1.0, 1.0, *rest, note)
+            yield Row(case, SERIES, "gave up", "", 1.0, 1.0, *columns, note)
             continue
         expected, note = (TOLERANCE, "the default") if default else (BOUND[p.form] * p.tolerance, "")
-        yield Row(case, SERIES, QUANTITY, "1", expected, p.radii, *rest, note)
-        yield Row(case, SERIES, "collapse time", "1", expected, p.collapse, *rest, note)
+        yield Row(case, SERIES, QUANTITY, "1", expected, p.radii, *columns, note)
+        yield Row(case, SERIES, "collapse time", "1", expected, p.collapse, *columns, note)
 
 
 def solver_points(quick: bool) -> list[Point]:
     """All solvers at all tolerances; quick: the explicit ones, at three."""
     cavity = described(GAS)
     methods: list[Method] = ["DOP853", "LSODA"] if quick else ["DOP853", "RK45", "LSODA", "Radau", "BDF"]
-    made = []
+    points = []
     for form in FORMS:
         for method in methods:
             for tolerance in TOLERANCES[:3] if quick else TOLERANCES:
-                made.append(_measured(cavity, form, method, tolerance))
-    made.append(_measured(cavity, *DEFAULT))
-    return made
+                points.append(_measured(cavity, form, method, tolerance))
+    points.append(_measured(cavity, *DEFAULT))
+    return points
 
 
 def solver_picture(rows: Sequence[Row]) -> Figure | None:
@@ -92,17 +92,17 @@ def _measured(cavity: Cavity, form: str, method: Method, tolerance: float) -> Po
     times: list[float] = []
     while len(times) < 7 and sum(times) < 0.1:
         began = time.process_time()
-        found = _run(cavity, form, method, tolerance)
+        run = _run(cavity, form, method, tolerance)
         times.append(time.process_time() - began)
     best = exact(cavity)
-    radii = np.abs(np.array([found.radius, found.rebound]) / best.radii - 1.0).max()
-    late = abs(found.time / best.times[0] - 1.0)
-    return Point(form, method, tolerance, 1e3 * float(np.median(times)), float(radii), late, found.evaluations)
+    radii = np.abs(np.array([run.radius, run.rebound]) / best.radii - 1.0).max()
+    late = abs(run.time / best.times[0] - 1.0)
+    return Point(form, method, tolerance, 1e3 * float(np.median(times)), float(radii), late, run.evaluations)
 
 
 def _run(cavity: Cavity, form: str, method: Method, tolerance: float) -> Run:
     plain = FORMS[form]
     if plain is not None:
         return solve(cavity, plain, method, tolerance)
-    found = bubble_collapse.collapse.__wrapped__(cavity, 0, tolerance, method)
-    return Run(found.collapse_time, found.minimum_radius, found.largest[0].radius, found.evaluations)
+    bubble = bubble_collapse.collapse.__wrapped__(cavity, 0, tolerance, method)
+    return Run(bubble.collapse_time, bubble.minimum_radius, bubble.largest[0].radius, bubble.evaluations)

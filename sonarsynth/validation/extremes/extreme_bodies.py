@@ -52,18 +52,18 @@ def echo(law: FacetLaw, mesh: Mesh, radius: float, frequency: Floats) -> Floats:
     """Target strength (frequency,) in dB re 1 m2 of what a frame has of a sphere 200 radii off."""
     far = 200.0 * radius
     band = float(frequency[0]), float(frequency[-1])
-    found = traced([snap(BESIDE)], ONE, [body(mesh, (far, 0.0, 0.0))], [law], band)
-    found = found.select(~found.direct)
+    arrivals = traced([snap(BESIDE)], ONE, [body(mesh, (far, 0.0, 0.0))], [law], band)
+    arrivals = arrivals.select(~arrivals.direct)
     if law.coherent:
-        return np.asarray(20.0 * np.log10(np.abs(transfer(found, frequency)) * far**2))
-    return np.full(len(frequency), 10.0 * np.log10(float((found.amplitude**2).sum()) * far**4))
+        return np.asarray(20.0 * np.log10(np.abs(transfer(arrivals, frequency)) * far**2))
+    return np.full(len(frequency), 10.0 * np.log10(float((arrivals.amplitude**2).sum()) * far**4))
 
 
 def _law(law: MirrorLobe | Kirchhoff) -> CaseResult:
     """Each sphere is as exact as the law says without a word, or as far off as its note says."""
     soft = isinstance(law, Kirchhoff) and law.surface == "soft"
     boundary: Literal["rigid", "soft"] = "soft" if soft else "rigid"
-    parts = []
+    results = []
     for radius, low in SPHERES:
         frequency = np.geomspace(low, 3.4 * low, 9)
         shape = Sphere(radius=radius, edge=radius / 8.0)
@@ -72,52 +72,52 @@ def _law(law: MirrorLobe | Kirchhoff) -> CaseResult:
         error = echo(law, mesh, radius, frequency) - 20.0 * np.log10(np.abs(exact))
         note = law.too_small(Scatterer(mesh, C / frequency[-1], C / frequency[0]))
         if note is None:
-            parts.append(off(error, OFF + MESHED, "dB", f"{radius:g} m, unsaid:"))
+            results.append(off(error, OFF + MESHED, "dB", f"{radius:g} m, unsaid:"))
             continue
-        least, most = map(float, re.findall(r"[-+]\d+\.\d", note))
-        within = bool((error >= least - MESHED).all() and (error <= most + MESHED).all())
-        parts.append(holds(within, f"{radius:g} m: {error.min():+.1f} to {error.max():+.1f} dB off, and said to be"))
-    return together(*parts)
+        lowest, highest = map(float, re.findall(r"[-+]\d+\.\d", note))
+        within = bool((error >= lowest - MESHED).all() and (error <= highest + MESHED).all())
+        results.append(holds(within, f"{radius:g} m: {error.min():+.1f} to {error.max():+.1f} dB off, and said to be"))
+    return together(*results)
 
 
 def _isotropic() -> CaseResult:
     """Whatever the size: a strength for each facet that is lit and seen, and a note that it is no body's."""
-    law, parts = Isotropic(strength=0.01), []
+    law, results = Isotropic(strength=0.01), []
     for radius, low in SPHERES:
         mesh = mesh_of(Sphere(radius=radius, edge=radius / 4.0))
         lit = int((mesh.normal[:, 0] < 0.0).sum())
         level = echo(law, mesh, radius, np.array([low, 3.4 * low]))[0]
-        parts.append(off(level - 20.0 * np.log10(0.01) - 10.0 * np.log10(lit), 0.1, "dB", f"{radius:g} m:"))
-        said = " ".join(law.validity(Scatterer(mesh, C / (3.4 * low), C / low)))
-        parts.append(holds("not the level of a body" in said, "noted"))
-    return together(parts)
+        results.append(off(level - 20.0 * np.log10(0.01) - 10.0 * np.log10(lit), 0.1, "dB", f"{radius:g} m:"))
+        notes = " ".join(law.validity(Scatterer(mesh, C / (3.4 * low), C / low)))
+        results.append(holds("not the level of a body" in notes, "noted"))
+    return together(results)
 
 
 def _bearings() -> CaseResult:
     """Bounds within the view, mirrored with the bearing, none exactly where a flag says so."""
     beams, mesh = BeamGrid(azimuths=3, elevations=3), mesh_of(Box(size=(0.5, 3.0, 1.0)))
     receiver = Receiver(POSE, elements(Romanis()), Sonar(beams=beams))
-    edge, parts, flags = 0.5 * beams.azimuth_span, [], set()
+    edge, results, flags = 0.5 * beams.azimuth_span, [], set()
     for bearing in np.deg2rad(np.arange(0.0, 181.0, 5.0)):
         boxes = []
-        for side in (bearing, -bearing):
-            there = body(mesh, 5.0 * direction(np.array(side), np.array(0.0)), 0.5 * np.pi - side)
-            context = FrameContext(0.0, (there,), (), Medium(WATER, PROFILE), receiver)
-            found = label(context, Straight(), np.zeros(0))
-            boxes.append(found.image_box[0])
-            flags.add(int(found.view[0]))
+        for azimuth in (bearing, -bearing):
+            target = body(mesh, 5.0 * direction(np.array(azimuth), np.array(0.0)), 0.5 * np.pi - azimuth)
+            context = FrameContext(0.0, (target,), (), Medium(WATER, PROFILE), receiver)
+            labels = label(context, Straight(), np.zeros(0))
+            boxes.append(labels.image_box[0])
+            flags.add(int(labels.view[0]))
             none = bool(np.isnan(boxes[-1]).all())
-            parts.append(holds(none == (found.view[0] > View.PARTLY_IN_VIEW), "a box, or a flag"))
-            parts.append(holds(none or bool((np.abs(boxes[-1]) <= edge + 1e-12).all()), "within the view"))
+            results.append(holds(none == (labels.view[0] > View.PARTLY_IN_VIEW), "a box, or a flag"))
+            results.append(holds(none or bool((np.abs(boxes[-1]) <= edge + 1e-12).all()), "within the view"))
         left, right = boxes
-        parts.append(off(np.nan_to_num(left + right[[1, 0, 2, 3]] * [1, 1, -1, -1]), 1e-9, "rad", "mirrored:"))
+        results.append(off(np.nan_to_num(left + right[[1, 0, 2, 3]] * [1, 1, -1, -1]), 1e-9, "rad", "mirrored:"))
     expected = {View.IN_VIEW, View.PARTLY_IN_VIEW, View.OUTSIDE_VIEW, View.BEHIND}
-    return together(parts, holds(flags == expected, f"flags {sorted(flags)}"))
+    return together(results, holds(flags == expected, f"flags {sorted(flags)}"))
 
 
 def _relief() -> CaseResult:
     """A wall before the snap, of nearly the depth and of all of it; one too low to be any; a needle beside the way."""
-    base, parts = recipe(((Sphere(radius=0.5, edge=0.3), (20.0, 0.0, 0.0)),)), []
+    base, results = recipe(((Sphere(radius=0.5, edge=0.3), (20.0, 0.0, 0.0)),)), []
 
     def over(height: float, x: Floats, y: Floats) -> Recipe:
         z = np.zeros((3, 4))
@@ -134,16 +134,16 @@ def _relief() -> CaseResult:
         wall, needle = np.array([7.0, 7.1, 7.2, 7.3]), np.array([9.0, 9.001, 9.002, 9.003])
         wide, thin = np.array([-500.0, 0.0, 500.0]), np.array([9.0, 9.001, 9.002])
         plain = heard(base)
-        parts += [refused(lambda: heard(over(40.0, wall, wide)), "rises 40 m over a bottom that is 40 m deep")]
+        results += [refused(lambda: heard(over(40.0, wall, wide)), "rises 40 m over a bottom that is 40 m deep")]
         hidden = heard(over(39.999, wall, wide))
-        parts += [holds(not hidden.direct.any(), "no snap behind a wall up to a millimetre under the surface")]
-        for words, other in (
+        results += [holds(not hidden.direct.any(), "no snap behind a wall up to a millimetre under the surface")]
+        for words, arrivals in (
             ("nothing of a rise of 9 cm", heard(over(0.09, wall, wide))),
             ("all of the snap beside a needle of 30 m", heard(over(30.0, needle, thin))),
         ):
-            same = bool(np.array_equal(other.delay[other.direct], plain.delay[plain.direct]))
-            parts += [holds(same and bool(np.isfinite(other.amplitude).all()), words)]
-    return together(parts)
+            same = bool(np.array_equal(arrivals.delay[arrivals.direct], plain.delay[plain.direct]))
+            results += [holds(same and bool(np.isfinite(arrivals.amplitude).all()), words)]
+    return together(results)
 
 
 CASES = (

@@ -13,41 +13,41 @@ from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off
 
 def _rayleigh() -> CaseResult:
     """To the last billionth of the time: the radius over R0 is that of the incomplete beta function."""
-    found = bubble_collapse.collapse(EMPTY, 0, 1e-13)
+    bubble = bubble_collapse.collapse(EMPTY, 0, 1e-13)
     before = np.geomspace(1e-9, 0.9, 30)
     exact = left(before)
-    got = bubble_collapse.wall(-before * UNIT, found).radius / RADIUS
+    radius = bubble_collapse.wall(-before * UNIT, bubble).radius / RADIUS
     return together(
-        off(found.collapse_time / UNIT / COLLAPSE - 1.0, 1e-12, what="time of collapse"),
-        off((got / exact - 1.0)[before > 1e-5], 1e-7, what="radius"),
-        off((got / exact - 1.0), 1e-4, what="radius to 1e-9 before"),
-        holds(found.flag == bubble_collapse.SINGULAR and found.mach == np.inf, found.reason),
+        off(bubble.collapse_time / UNIT / COLLAPSE - 1.0, 1e-12, what="time of collapse"),
+        off((radius / exact - 1.0)[before > 1e-5], 1e-7, what="radius"),
+        off((radius / exact - 1.0), 1e-4, what="radius to 1e-9 before"),
+        holds(bubble.flag == bubble_collapse.SINGULAR and bubble.mach == np.inf, bubble.reason),
     )
 
 
 def _energy() -> CaseResult:
     """Without friction and tension the work of the drive is in the gas where the wall turns."""
-    parts = []
+    results = []
     for gas in (1e-3, 1.0, 1e3, 1e4, 5e4):
         cavity = EMPTY._replace(gas_pressure=gas, exponent=1.4)
-        found = bubble_collapse.collapse(cavity, 1, 1e-11)
+        bubble = bubble_collapse.collapse(cavity, 1, 1e-11)
         least = smallest(cavity)
-        parts.append(off(found.minimum_radius / RADIUS / least - 1.0, 1e-8, what=f"{gas:g} Pa: smallest radius"))
-        parts.append(off(drift(found), 1e-7, what="energy"))
-    return together(*parts)
+        results.append(off(bubble.minimum_radius / RADIUS / least - 1.0, 1e-8, what=f"{gas:g} Pa: smallest radius"))
+        results.append(off(drift(bubble), 1e-7, what="energy"))
+    return together(*results)
 
 
 def _impulse() -> CaseResult:
     """The pressure is the slope of rho R^2 R', through the collapse: its integral, by the wall's own speed."""
-    found = bubble_collapse.collapse(
+    bubble = bubble_collapse.collapse(
         EMPTY._replace(gas_pressure=10.0, vapour_pressure=0.0, compressible=True), 0, 1e-11
     )
-    s = np.linspace(found.steps[0], found.steps[-1], 200_001)
-    moving = bubble_collapse.moving(s, found)
+    s = np.linspace(bubble.steps[0], bubble.steps[-1], 200_001)
+    moving = bubble_collapse.moving(s, bubble)
     total = np.concatenate(
         [[0.0], np.cumsum(0.5 * np.diff(moving.time) * (moving.pressure[1:] + moving.pressure[:-1]))]
     )
-    flow = found.cavity.density * moving.wall.radius**2 * moving.wall.speed
+    flow = bubble.cavity.density * moving.wall.radius**2 * moving.wall.speed
     size = np.abs(flow).max()
     return together(
         holds(bool(np.isfinite(moving.pressure).all()), f"finite, {np.abs(moving.pressure).max():.3g} Pa at most"),
@@ -67,13 +67,15 @@ def _gas_free() -> CaseResult:
 
 def _any_size() -> CaseResult:
     """Times and radii scale with the radius where friction and tension are nothing."""
-    base, parts = EMPTY._replace(gas_pressure=1e3), []
-    one = bubble_collapse.collapse(base)
+    base, results = EMPTY._replace(gas_pressure=1e3), []
+    reference = bubble_collapse.collapse(base)
     for size in (1e-6, 1.0, 1e3):
-        found = bubble_collapse.collapse(base._replace(radius=size))
-        parts.append(off(found.collapse_time / size / (one.collapse_time / RADIUS) - 1.0, 1e-9, what=f"{size:g} m:"))
-        parts.append(off(found.minimum_radius / size / (one.minimum_radius / RADIUS) - 1.0, 1e-8))
-    return together(*parts)
+        bubble = bubble_collapse.collapse(base._replace(radius=size))
+        results.append(
+            off(bubble.collapse_time / size / (reference.collapse_time / RADIUS) - 1.0, 1e-9, what=f"{size:g} m:")
+        )
+        results.append(off(bubble.minimum_radius / size / (reference.minimum_radius / RADIUS) - 1.0, 1e-8))
+    return together(*results)
 
 
 CASES = (

@@ -45,8 +45,8 @@ def recipe(
     )
     shrimp = (SnappingShrimp(position=snap),)
     processing = more.pop("processing", Processing())
-    parts: dict[str, Any] = {"array": LATTICE, "beams": BEAMS}
-    sonar = Sonar(**(parts | more))
+    settings: dict[str, Any] = {"array": LATTICE, "beams": BEAMS}
+    sonar = Sonar(**(settings | more))
     world = World(environment=Environment(depth=depth, sound_speed=speed), targets=placed, sources=shrimp)
     return Recipe(scene=Scene(world=world, sonar=sonar, processing=processing))
 
@@ -131,16 +131,16 @@ def _wall() -> CaseResult:
 
 def _beside_view() -> CaseResult:
     """Its edge at the last beam, a millionth of its distance inside or outside of it."""
-    near, far, parts = 10.0, 10.1, []
+    near, far, results = 10.0, 10.1, []
     for step in (1e-6, -1e-6):
         edge = (near if step < 0 else far) * np.tan(0.5 * SPAN) * (1.0 + step)
         half = 0.5
         tree = frame(recipe(((Box(size=(far - near, 2 * half, 1.0)), (0.5 * (near + far), edge + half, 0.0)),)))
         hit = tree["truth/beams"].target.values == 0
         columns = sorted(set(np.nonzero(hit)[1].tolist()))
-        parts.append(holds(columns == ([] if step > 0 else [20]), f"columns {columns} meet it"))
-        parts.append(reasoned(tree))
-    return together(*parts)
+        results.append(holds(columns == ([] if step > 0 else [20]), f"columns {columns} meet it"))
+        results.append(reasoned(tree))
+    return together(*results)
 
 
 def _behind() -> CaseResult:
@@ -172,10 +172,10 @@ def _on_line() -> CaseResult:
     ahead = np.array([1.0, 0.0, 0.0])
     on = bistatic_range(0.0, ahead, 20.0 * ahead)
     tree = frame(recipe(((Sphere(radius=0.05), (7.0, 0.1, 0.0)),), (14.0, 0.0, -5.0)))
-    said = bool(np.isnan(on.range)) and bool(on.ill_conditioned)
+    flagged = bool(np.isnan(on.range)) and bool(on.ill_conditioned)
     points = np.isfinite(tree["cloud"].range.values)
     return together(
-        holds(said, "exactly on it: NaN, ill-conditioned"),
+        holds(flagged, "exactly on it: NaN, ill-conditioned"),
         holds(not points.any(), f"{points.sum()} points"),
         reasoned(tree),
     )
@@ -202,12 +202,12 @@ def _link_budget() -> CaseResult:
     budget: dict[str, Any] = {str(name): np.asarray(v) for name, v in tree["link_budget"].data_vars.items()}
     source, out, scattering, back, absorption, boundary, received = (budget[term] for term in LINK_BUDGET)
     paths = budget["paths"]
-    left = source - out + scattering - back - absorption - boundary - received
-    there = paths > 0
+    residual = source - out + scattering - back - absorption - boundary - received
+    has_path = paths > 0
     apart = float(received[0, 0, 0] - received[0, 1, 0])
     return together(
-        off(left[there], 1e-9, "dB", "sum"),
-        holds(bool((np.isnan(received) == ~there).all()), "NaN where there is no path, only there"),
+        off(residual[has_path], 1e-9, "dB", "sum"),
+        holds(bool((np.isnan(received) == ~has_path).all()), "NaN where there is no path, only there"),
         holds(bool(paths[0, 1].sum() > 0) and apart > 95.0, f"the faint one, {apart:.0f} dB below, is in it"),
         holds(not paths[0, 2].any(), "the hidden one is not"),
         reasoned(tree),
@@ -215,14 +215,14 @@ def _link_budget() -> CaseResult:
 
 
 def _arrays() -> CaseResult:
-    parts = []
+    results = []
     for positions in (((0.0, 0.0, 0.0),), ((0.0, 0.1, 0.0),) * 2):
         dense = Processing(beamforming=DenseDelayAndSum())
         tree = frame(recipe(array=PositionTable(positions=positions), processing=dense))
         located = np.isfinite(tree["source_estimates"].time.values).any()
-        parts.append(holds(not located and int(tree["cloud"]["count"]) == 0, "no clock, no point"))
-        parts.append(reasoned(tree))
-    return together(*parts)
+        results.append(holds(not located and int(tree["cloud"]["count"]) == 0, "no clock, no point"))
+        results.append(reasoned(tree))
+    return together(*results)
 
 
 CASES = (

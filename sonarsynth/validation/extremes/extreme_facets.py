@@ -32,12 +32,13 @@ def _waves() -> CaseResult:
     area = 0.5 * np.linalg.norm(np.cross(TRIANGLE[1] - TRIANGLE[0], TRIANGLE[2] - TRIANGLE[0]))
     mirror = np.abs(facet_amplitude(TRIANGLE, down, up, k)) / (k * area / (2.0 * np.pi))
     tilted = np.array([np.sin(0.3), 0.0, np.cos(0.3)])
-    side = np.abs(triangle_integral(TRIANGLE, k[:, None] * tilted)) / area
+    off_mirror = np.abs(triangle_integral(TRIANGLE, k[:, None] * tilted)) / area
     return together(
         off(mirror - 1.0, 1e-14, what="mirror, k from 1e-12 to 1e9:"),
         off(np.abs(facet_amplitude(TRIANGLE, along, -along, k)) / k, 1e-16, "m2", "grazing"),
         holds(
-            bool((side <= 1.0 + 1e-14).all() and side[-1] < 1e-12), f"off it from {side[0]:.3g} down to {side[-1]:.2g}"
+            bool((off_mirror <= 1.0 + 1e-14).all() and off_mirror[-1] < 1e-12),
+            f"off it from {off_mirror[0]:.3g} down to {off_mirror[-1]:.2g}",
         ),
     )
 
@@ -45,14 +46,14 @@ def _waves() -> CaseResult:
 def _mirror() -> CaseResult:
     """Through the mirror direction, from 1e-18 to 0.1 rad off it: the sinc of a square, no step anywhere."""
     square = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])[[[0, 1, 2], [0, 2, 3]]]
-    parts, k = [], np.array([300.0])
+    results, k = [], np.array([300.0])
     for tilt in (0.0, *10.0 ** np.arange(-18.0, 0.0)):
         away = np.array([np.sin(tilt), 0.0, np.cos(tilt)])
         change = k * np.sin(tilt)
         exact = k / (4.0 * np.pi) * (1.0 + np.cos(tilt)) * np.sinc(0.5 * change / np.pi)
-        got = mesh_amplitude(square, np.array([0.0, 0.0, -1.0]), away, k)
-        parts.append(off(np.abs(np.abs(got) - np.abs(exact)) / k, 1e-14, "of k A"))
-    return together(parts)
+        amplitude = mesh_amplitude(square, np.array([0.0, 0.0, -1.0]), away, k)
+        results.append(off(np.abs(np.abs(amplitude) - np.abs(exact)) / k, 1e-14, "of k A"))
+    return together(results)
 
 
 def _rough() -> CaseResult:
@@ -77,9 +78,9 @@ def _rough_frame() -> CaseResult:
     """So rough that nothing is coherent: the powers of the facets are the lobe of the slopes, times their area."""
     mesh, at = mesh_of(Box(size=(0.1, 0.2, 0.2), edge=0.02)), 30.0
     law = Kirchhoff(roughness=0.3, slope=0.2)
-    found = traced([snap((0.0, 1e-6, 0.0))], ONE, [body(mesh, (at, 0.0, 0.0))], [law])
-    found = found.select(~found.direct)
-    power = float((found.amplitude[~found.coherent] ** 2 * found.coherent_fraction[~found.coherent]).sum())
+    arrivals = traced([snap((0.0, 1e-6, 0.0))], ONE, [body(mesh, (at, 0.0, 0.0))], [law])
+    arrivals = arrivals.select(~arrivals.direct)
+    power = float((arrivals.amplitude[~arrivals.coherent] ** 2 * arrivals.coherent_fraction[~arrivals.coherent]).sum())
     exact = 0.2 * 0.2 / (8.0 * np.pi * 0.2**2) / (at - 0.05) ** 4
     return off(10.0 * np.log10(power / exact), 0.01, "dB")
 
@@ -87,28 +88,28 @@ def _rough_frame() -> CaseResult:
 def _fock() -> CaseResult:
     """Limits, and spheres of k a 20 to 300 at all angles against the exact series."""
     lit, dark = surface_field(np.array([-1e9, -1e3, -30.0]), "rigid"), surface_field(np.array([11.9]), "rigid")
-    parts = [
+    results = [
         off(np.abs(lit - 1.0), 1e-5, what="far in the light:"),
         off(np.abs(surface_field(np.array([0.0]), "rigid") - 0.5 * 1.39937), 1e-5, what="at the edge, g(0)/2:"),
         holds(bool(np.abs(dark) < 3e-5), f"{abs(dark[0]):.1g} in the dark"),
     ]
-    way = np.array([1.0, 0.0, 0.0])
+    incident = np.array([1.0, 0.0, 0.0])
     for ka in (20.0, 300.0):
         f = ka * C / (2.0 * np.pi * 0.25)
         angle = np.radians([0.0, 90.0, 150.0, 180.0])
         out = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
         exact = sphere_amplitude(f, angle, radius=0.25, sound_speed=C)
-        got = target_strength(Sphere(radius=0.25), f, way, out, C)
-        parts.append(off(got - 20.0 * np.log10(np.abs(exact)), 0.9, "dB", f"k a = {ka:g}:"))
-    return together(*parts)
+        level = target_strength(Sphere(radius=0.25), f, incident, out, C)
+        results.append(off(level - 20.0 * np.log10(np.abs(exact)), 0.9, "dB", f"k a = {ka:g}:"))
+    return together(*results)
 
 
 def _large() -> CaseResult:
     """Facets too long for their echo to be a pulse in a window are refused; and a body of one huge facet a side."""
     plate = mesh_of(Box(size=(1.0, 2e3, 2e3)))
     snaps = [snap((1.0, 900.0, 0.0))]
-    found = traced(snaps, ONE, [body(plate, (3e3, 0.0, 0.0))], [Kirchhoff()])
-    return refused(lambda: synthesised(GriddedSynthesis(), found, snaps, ONE, 3.9, 100), "corners that are not within")
+    paths = traced(snaps, ONE, [body(plate, (3e3, 0.0, 0.0))], [Kirchhoff()])
+    return refused(lambda: synthesised(GriddedSynthesis(), paths, snaps, ONE, 3.9, 100), "corners that are not within")
 
 
 def _icosahedron() -> tuple[Floats, np.ndarray]:
@@ -127,20 +128,20 @@ def _icosahedron() -> tuple[Floats, np.ndarray]:
 
 def _smoothing() -> CaseResult:
     """Twenty facets become a sphere; a cube stays a cube; needles and far places change nothing."""
-    parts = []
+    results = []
     for scale, away in ((1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1.0, 100.0)):
         vertices, faces = _icosahedron()
-        made, _ = curved((scale * vertices + away, faces), 0.1 * scale, np.inf, 1.0)
-        parts.append(
-            off(np.linalg.norm(made - away, axis=1) / scale - 1.0, 1e-9, what=f"{scale:g} m, {away:g} m away:")
+        moved, _ = curved((scale * vertices + away, faces), 0.1 * scale, np.inf, 1.0)
+        results.append(
+            off(np.linalg.norm(moved - away, axis=1) / scale - 1.0, 1e-9, what=f"{scale:g} m, {away:g} m away:")
         )
     cube = mesh_of(Box(size=(1.0, 1.0, 1.0)))
-    kept = curved((cube.vertices, cube.faces.astype(np.int64)), 0.2, 1e-4, 0.7)
-    parts.append(off(volume(kept) - 1.0, 1e-12, "m3", "a cube:"))
+    smoothed = curved((cube.vertices, cube.faces.astype(np.int64)), 0.2, 1e-4, 0.7)
+    results.append(off(volume(smoothed) - 1.0, 1e-12, "m3", "a cube:"))
     thin = mesh_of(Box(size=(1.0, 1e-6, 1.0)))
     needle = curved((thin.vertices, thin.faces.astype(np.int64)), 0.2, 1e-4, 0.7)
-    parts.append(off(volume(needle) / 1e-6 - 1.0, 1e-6, what="a sheet of 1 um:"))
-    return together(*parts)
+    results.append(off(volume(needle) / 1e-6 - 1.0, 1e-6, what="a sheet of 1 um:"))
+    return together(*results)
 
 
 CASES = (

@@ -26,8 +26,8 @@ WHOLE = 0.001, 0.003
 def methods(array: Array = LATTICE) -> Iterator[Any]:
     """All beamformers as they come, and the mean of logarithms over windows, that take the array."""
     kinds: tuple[type[Any], ...] = get_args(get_args(Beamformer)[0])
-    made = [*(kind() for kind in kinds), LpMean(p=0.0, window=1e-4)]
-    return (method for method in made if not method.refusal(elements(array)))
+    beamformers = [*(kind() for kind in kinds), LpMean(p=0.0, window=1e-4)]
+    return (method for method in beamformers if not method.refusal(elements(array)))
 
 
 @cache
@@ -49,14 +49,14 @@ def _sound(image: np.ndarray) -> bool:
 
 def _arrays() -> CaseResult:
     """Numbers for noise, zeros for silence."""
-    parts = []
+    results = []
     for array in (LATTICE, LINE, ALONE, TABLE):
         heard = noise(elements(array).count)
         for method in methods(array):
             silent = energy(method, 0.0 * heard, array)
             fine = _sound(energy(method, heard, array)) and not silent.any()
-            parts.append(holds(fine, f"{method.kind}: numbers of noise, zeros of silence"))
-    return together(parts)
+            results.append(holds(fine, f"{method.kind}: numbers of noise, zeros of silence"))
+    return together(results)
 
 
 def _one_frequency() -> CaseResult:
@@ -73,13 +73,13 @@ def _coherent() -> CaseResult:
 
 def _faint_and_loud() -> CaseResult:
     """Energy goes with the square of the pressure."""
-    parts = []
+    results = []
     for method in methods():
-        one = energy(method, noise())
+        reference = energy(method, noise())
         for factor in (1e-9, 1e9):
-            apart = np.abs(energy(method, factor * noise()) / factor**2 - one).max() / one.max()
-            parts.append(holds(apart < 1e-4, f"{method.kind}: {apart:.1g} apart at {factor:g} times the pressure"))
-    return together(parts)
+            apart = np.abs(energy(method, factor * noise()) / factor**2 - reference).max() / reference.max()
+            results.append(holds(apart < 1e-4, f"{method.kind}: {apart:.1g} apart at {factor:g} times the pressure"))
+    return together(results)
 
 
 def _spoilt() -> CaseResult:

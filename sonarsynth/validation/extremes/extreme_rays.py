@@ -35,27 +35,27 @@ def found(
     return ray_solutions.eigenrays(water, start, end, distance, vertices, hits)
 
 
-def circle(g: float, one: float, other: float, distance: float) -> tuple[float, float]:
+def circle(g: float, start_speed: float, end_speed: float, distance: float) -> tuple[float, float]:
     """Travel time (s) and amplitude (1/m) of the ray that joins two points of sound speeds (m/s), d (m) apart."""
-    mean = np.sqrt(one * other)
+    mean = np.sqrt(start_speed * end_speed)
     half = np.arcsinh(g * distance / (2.0 * mean)) if g else 0.0
     time = 2.0 * half / g if g else distance / mean
     return float(time), float(g / (mean * np.sinh(2.0 * half)) if g else 1.0 / (mean * time))
 
 
 def _gradients() -> CaseResult:
-    parts = []
+    results = []
     for g in (0.0, *(sign * 10.0**k for k in range(-12, 5) for sign in (1.0, -1.0))):
         bottom = min(1e3, 800.0 / abs(g)) if g else 1e3
         for a, b, share in ((0.4, 0.6, 0.1), (0.6, 0.4, 0.3), (0.5, 0.5, 0.2)):
             ends = (a * bottom, b * bottom, share * bottom)
-            got = found((0.0, bottom), (C, C + g * bottom), ends)
+            rays = found((0.0, bottom), (C, C + g * bottom), ends)
             exact = circle(g, C + g * ends[0], C + g * ends[1], float(np.hypot(ends[2], ends[1] - ends[0])))
-            if not len(got.pair):
+            if not len(rays.pair):
                 return CaseResult(f"no ray for {g:g} /s", False)
-            errors = got.travel_time[0] / exact[0] - 1.0, got.amplitude[0] / exact[1] - 1.0
-            parts.append((off(errors[0], 1e-14, what="time"), off(errors[1], 1e-11, what="amplitude")))
-    return together(*(tuple(part[i] for part in parts) for i in (0, 1)))
+            errors = rays.travel_time[0] / exact[0] - 1.0, rays.amplitude[0] / exact[1] - 1.0
+            results.append((off(errors[0], 1e-14, what="time"), off(errors[1], 1e-11, what="amplitude")))
+    return together(*(tuple(result[i] for result in results) for i in (0, 1)))
 
 
 def _snell(heights: Floats, speeds: Floats, distance: float) -> float:
@@ -78,8 +78,8 @@ def _layers() -> CaseResult:
             heights = np.array([50.0, thick, 120.0])
             for share in (1e-3, 0.3, 1.0):
                 distance = share * float(heights.sum())
-                got = found(z, tuple(np.repeat(speeds, 2)), (top - 50.0, top + thick + 120.0, distance))
-                out.append(relative(got.travel_time[:1], [_snell(heights, speeds, distance)], 1e-13))
+                rays = found(z, tuple(np.repeat(speeds, 2)), (top - 50.0, top + thick + 120.0, distance))
+                out.append(relative(rays.travel_time[:1], [_snell(heights, speeds, distance)], 1e-13))
         return out
 
     return together(errors(np.array([C, 1480.0, 1530.0])), errors(np.array([C, 1700.0, 1495.0])))
@@ -91,41 +91,41 @@ def _fermat(z: float, bottom: float, speeds: tuple[float, float, float], ends: t
     start, end = speeds[0] + above * ends[0], speeds[1] + below * (ends[1] - z)
 
     def time(x: float) -> float:
-        one = circle(above, start, speeds[1], float(np.hypot(x, z - ends[0])))[0]
-        return one + circle(below, speeds[1], end, float(np.hypot(ends[2] - x, ends[1] - z)))[0]
+        upper = circle(above, start, speeds[1], float(np.hypot(x, z - ends[0])))[0]
+        return upper + circle(below, speeds[1], end, float(np.hypot(ends[2] - x, ends[1] - z)))[0]
 
     return float(minimize_scalar(time, bounds=(0.0, ends[2]), method="bounded", options={"xatol": 1e-9}).fun)
 
 
 def _kinks() -> CaseResult:
-    parts = []
+    results = []
     for speeds in ((1540.0, 1500.0, 1530.0), (1480.0, 1520.0, 1490.0), (1500.0, 1500.0, 1900.0)):
         for distance in (1.0, 30.0, 90.0):
             ends = (12.0, 71.0, distance)
-            got = found((0.0, 40.0, 100.0), speeds, ends)
-            parts.append(off(np.abs(got.travel_time / _fermat(40.0, 100.0, speeds, ends) - 1.0).min(), 1e-13))
-    return together(parts)
+            rays = found((0.0, 40.0, 100.0), speeds, ends)
+            results.append(off(np.abs(rays.travel_time / _fermat(40.0, 100.0, speeds, ends) - 1.0).min(), 1e-13))
+    return together(results)
 
 
 def _interfaces() -> CaseResult:
-    z, parts = (0.0, 30.0, 30.0, 80.0), []
+    z, results = (0.0, 30.0, 30.0, 80.0), []
     for speeds in ((C, C, 1540.0, 1540.0), (1540.0, 1540.0, C, C)):
         for start, end in ((30.0, 60.0), (60.0, 30.0), (30.0, 10.0), (10.0, 30.0), (0.0, 30.0), (30.0, 80.0)):
             for distance in (0.0, 1e-3, 12.0):
-                got = found(z, speeds, (start, end, distance))
-                mine = speeds[0] if min(start, end) < 30.0 else speeds[2]
-                exact = np.hypot(distance, start - end) / mine
-                parts.append(off(got.travel_time[:1] / exact - 1.0, 1e-14))
-    return together(parts)
+                rays = found(z, speeds, (start, end, distance))
+                speed = speeds[0] if min(start, end) < 30.0 else speeds[2]
+                exact = np.hypot(distance, start - end) / speed
+                results.append(off(rays.travel_time[:1] / exact - 1.0, 1e-14))
+    return together(results)
 
 
 def _vertical() -> CaseResult:
-    got = found((0.0, 100.0, 300.0), (1540.0, C, 1560.0), (10.0, 250.0, 0.0), 3, 3)
-    whole = 90.0 / 40.0 * np.log(1536.0 / C) * 100.0 / 90.0 + 200.0 / 60.0 * np.log(1545.0 / C)
-    straight = np.all(got.slowness == 0.0) and np.all(np.abs(got.start_sine) == 1.0)
+    rays = found((0.0, 100.0, 300.0), (1540.0, C, 1560.0), (10.0, 250.0, 0.0), 3, 3)
+    exact = 90.0 / 40.0 * np.log(1536.0 / C) * 100.0 / 90.0 + 200.0 / 60.0 * np.log(1545.0 / C)
+    straight = np.all(rays.slowness == 0.0) and np.all(np.abs(rays.start_sine) == 1.0)
     return together(
-        relative(got.travel_time[:1], [whole], 1e-14, "time"),
-        holds(straight and np.isfinite(got.amplitude).all(), f"{len(got.pair)} rays, all of sine +-1"),
+        relative(rays.travel_time[:1], [exact], 1e-14, "time"),
+        holds(straight and np.isfinite(rays.amplitude).all(), f"{len(rays.pair)} rays, all of sine +-1"),
     )
 
 
@@ -147,46 +147,46 @@ def _turning() -> CaseResult:
     limit = 2.0 * np.sqrt(z * (2.0 * R - z))
     counts, times = [], []
     for step in (-1e-6, -1e-9, 0.0, 1e-9, 1e-6):
-        got = found((0.0, bottom), (C, C - g * bottom), (z, z, limit * (1.0 + step)), 1, 1)
-        near = got.upper < 1.0
+        rays = found((0.0, bottom), (C, C - g * bottom), (z, z, limit * (1.0 + step)), 1, 1)
+        near = rays.upper < 1.0
         counts.append(int(near.sum()))
         exact = circle(g, C - g * z, C - g * z, limit * (1.0 + step))[0]
-        turned = near & (got.turning == 1)
-        times += [off(got.travel_time[turned] / exact - 1.0, 1e-13)] if turned.any() else []
+        turned = near & (rays.turning == 1)
+        times += [off(rays.travel_time[turned] / exact - 1.0, 1e-13)] if turned.any() else []
     sane = counts[0] == counts[1] == 2 and counts[2] in (0, 1, 2) and counts[3] == counts[4] == 0
     return together(holds(sane, f"{counts} rays by the surface"), times)
 
 
 def _coincident() -> CaseResult:
-    parts = []
+    results = []
     for z in (0.0, 20.0, 50.0):
-        got = found((0.0, 50.0), (C, C), (z, z, 0.0), 2, 2)
-        same = got.flag == ray_solutions.COINCIDENT
-        said = same.sum() == 1 and np.isnan(got.start_sine[same]).all() and np.isinf(got.amplitude[same]).all()
-        parts.append(
+        rays = found((0.0, 50.0), (C, C), (z, z, 0.0), 2, 2)
+        same = rays.flag == ray_solutions.COINCIDENT
+        flagged = same.sum() == 1 and np.isnan(rays.start_sine[same]).all() and np.isinf(rays.amplitude[same]).all()
+        results.append(
             holds(
-                said and ray_solutions.REASONS[ray_solutions.COINCIDENT].startswith("the ends"),
+                flagged and ray_solutions.REASONS[ray_solutions.COINCIDENT].startswith("the ends"),
                 "flagged once, no direction",
             )
         )
         images = sorted(x for x in (2.0 * z, 2.0 * (50.0 - z), 100.0, 100.0) if x > 0)
-        parts.append(relative(got.travel_time[~same] * C, images, 1e-14, "its images"))
-    return together(parts)
+        results.append(relative(rays.travel_time[~same] * C, images, 1e-14, "its images"))
+    return together(results)
 
 
 def _ranges() -> CaseResult:
-    parts = []
+    results = []
     for depth, a, b in ((100.0, 31.0, 62.0), (5000.0, 800.0, 4200.0)):
         for distance in (0.0, 1e-3, 1.0, 1e3, 1e5):
-            got = found((0.0, depth), (C, C), (a, b, distance), 2, 2)
+            rays = found((0.0, depth), (C, C), (a, b, distance), 2, 2)
             climbs = np.array([a - b, a + b, 2 * depth - a - b, 2 * depth + a - b, 2 * depth - a + b])
             exact = np.sort(np.hypot(climbs, distance)) / C
-            parts.append(relative(got.travel_time, exact, 1e-15))
-            parts.append(relative(got.amplitude, 1.0 / (C * exact), 1e-12))
+            results.append(relative(rays.travel_time, exact, 1e-15))
+            results.append(relative(rays.amplitude, 1.0 / (C * exact), 1e-12))
     far = found((0.0, 3000.0), (C, C + 3.0), (1500.0, 2000.0, 1e5))
     arc = circle(1e-3, C + 1.5, C + 2.0, float(np.hypot(1e5, 500.0)))
     bent = relative(far.travel_time, [arc[0]], 1e-14, "bent over 100 km: time")
-    return together(parts, bent, relative(far.amplitude, [arc[1]], 1e-10, "amplitude"))
+    return together(results, bent, relative(far.amplitude, [arc[1]], 1e-10, "amplitude"))
 
 
 FOLD = 30.0, 10.0, 18.0, 0.5
@@ -198,24 +198,24 @@ def _caustic() -> CaseResult:
     foot, a, b, g = FOLD
     H, bend = 2.0 * foot - a - b, 2.0 * C / g
     fold = 2.0 * np.sqrt(H * bend)
-    parts, loud = [], []
+    results, loud = [], []
     for step in (1e-2, 1e-4, 1e-8):
         X = fold * (1.0 + step)
         root = np.sqrt(X * X - fold * fold)
         u = np.array([(X + root) / (2.0 * bend), 2.0 * H / (X + root)])
         times = np.sort(H / C * np.hypot(1.0, u) / u + 2.0 / g * np.arctanh(u / np.hypot(1.0, u)))
-        got = found((0.0, foot, 400.0), (C, C, C + g * (400.0 - foot)), (a, b, X))
-        mine = got.turning == 1
+        rays = found((0.0, foot, 400.0), (C, C, C + g * (400.0 - foot)), (a, b, X))
+        turned = rays.turning == 1
         dark = found((0.0, foot, 400.0), (C, C, C + g * (400.0 - foot)), (a, b, fold * (1.0 - step)))
-        parts.append(relative(np.sort(got.travel_time[mine]), times, 1e-13, "two rays, times"))
-        parts.append(holds(sorted(got.caustics[mine]) == [0, 1], "one has passed the caustic"))
-        parts.append(holds(not (dark.turning == 1).any(), "none on the dark side"))
-        loud.append(got.amplitude[mine].mean())
-        flags = got.flag[mine]
+        results.append(relative(np.sort(rays.travel_time[turned]), times, 1e-13, "two rays, times"))
+        results.append(holds(sorted(rays.caustics[turned]) == [0, 1], "one has passed the caustic"))
+        results.append(holds(not (dark.turning == 1).any(), "none on the dark side"))
+        loud.append(rays.amplitude[turned].mean())
+        flags = rays.flag[turned]
     named = holds(
         bool((flags == ray_solutions.CAUSTIC).all()) and np.isfinite(loud).all(), "finite and flagged beside it"
     )
-    return together(parts, named, off(np.diff(np.log10(loud)) - [0.5, 1.0], 0.03, "decades", "growth as step^-1/4"))
+    return together(results, named, off(np.diff(np.log10(loud)) - [0.5, 1.0], 0.03, "decades", "growth as step^-1/4"))
 
 
 def _shadow() -> CaseResult:
@@ -229,12 +229,12 @@ def _shadow() -> CaseResult:
 
 
 def _deep() -> CaseResult:
-    g, bottom, parts = 0.0163, 11e3, []
+    g, bottom, results = 0.0163, 11e3, []
     for a, b, distance in ((0.0, bottom, 0.0), (0.0, bottom, 100.0), (10.0, 10.9e3, 8e3), (bottom, 0.0, 1e4)):
-        got = found((0.0, bottom), (C, C + g * bottom), (a, b, distance))
+        rays = found((0.0, bottom), (C, C + g * bottom), (a, b, distance))
         arc = circle(g, C + g * a, C + g * b, float(np.hypot(distance, a - b)))
-        parts += [relative(got.travel_time[:1], arc[:1], 1e-14), relative(got.amplitude[:1], arc[1:], 1e-11)]
-    return together(parts)
+        results += [relative(rays.travel_time[:1], arc[:1], 1e-14), relative(rays.amplitude[:1], arc[1:], 1e-11)]
+    return together(results)
 
 
 CIRCLES = "time to 1e-14 and amplitude to 1e-11 of the circle through both ends"

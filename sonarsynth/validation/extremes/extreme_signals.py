@@ -55,22 +55,22 @@ def methods() -> tuple[SignalSynthesis, ...]:
     return GriddedSynthesis(), DirectSum()
 
 
-def _against(got: Signals, exact: Floats, allowed: float = FINE) -> CaseResult:
+def _against(signals: Signals, exact: Floats, allowed: float = FINE) -> CaseResult:
     """Signals against what they must be, of its peak; none may be outside."""
-    error = off(np.abs(got.pressure - exact).max() / np.abs(exact).max(), allowed, "of peak")
-    return CaseResult(error.text, error.ok and got.outside == 0)
+    error = off(np.abs(signals.pressure - exact).max() / np.abs(exact).max(), allowed, "of peak")
+    return CaseResult(error.text, error.ok and signals.outside == 0)
 
 
 def _delays() -> CaseResult:
-    parts = []
+    results = []
     for delay in (1e-6, 1e-3, 1.0, 100.0):
-        place = (delay * C, 0.0, 0.0)
-        snaps = (snap(place),)
+        position = (delay * C, 0.0, 0.0)
+        snaps = (snap(position),)
         start, samples = delay - 4e-4, 200
-        found = traced(snaps, ONE)
-        exact = direct(ONE, place, times(start, samples))
-        parts += [_against(synthesised(m, found, snaps, ONE, start, samples), exact) for m in methods()]
-    return together(parts)
+        arrivals = traced(snaps, ONE)
+        exact = direct(ONE, position, times(start, samples))
+        results += [_against(synthesised(m, arrivals, snaps, ONE, start, samples), exact) for m in methods()]
+    return together(results)
 
 
 def _long() -> CaseResult:
@@ -78,63 +78,63 @@ def _long() -> CaseResult:
     places = (1e-6 * C, 0.0, 0.0), (0.0, 100.0 * C, 0.0)
     snaps = tuple(snap(p, gain=float(np.linalg.norm(p))) for p in places)
     start, samples = -4e-4, round((100.0 + 8e-4) * RATE)
-    got = synthesised(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
-    parts = []
+    signals = synthesised(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
+    results = []
     for delay in (1e-6, 100.0):
         first = max(round((delay - 4e-4 - start) * RATE), 0)
-        part = slice(first, first + 190)
-        exact = ricker(start + np.arange(samples)[part] / RATE - delay)
-        parts.append(off(np.abs(got.pressure[0, part] - exact).max(), FINE, "of peak"))
-        got.pressure[0, part] = 0.0
-    return together(parts, off(np.abs(got.pressure).max(), FINE, "of peak", "elsewhere"))
+        span = slice(first, first + 190)
+        exact = ricker(start + np.arange(samples)[span] / RATE - delay)
+        results.append(off(np.abs(signals.pressure[0, span] - exact).max(), FINE, "of peak"))
+        signals.pressure[0, span] = 0.0
+    return together(results, off(np.abs(signals.pressure).max(), FINE, "of peak", "elsewhere"))
 
 
 def _one_sample() -> CaseResult:
-    place = (9.0, 2.0, -3.0)
-    snaps = (snap(place),)
-    found, parts, peak = traced(snaps, FEW), [], 1.0 / float(np.linalg.norm(place))
+    position = (9.0, 2.0, -3.0)
+    snaps = (snap(position),)
+    arrivals, results, peak = traced(snaps, FEW), [], 1.0 / float(np.linalg.norm(position))
     for late in (-2e-5, 0.0, 1.3e-5, 1e-4):
-        start = float(np.linalg.norm(place)) / C + late
-        exact = direct(FEW, place, times(start, 1))
+        start = float(np.linalg.norm(position)) / C + late
+        exact = direct(FEW, position, times(start, 1))
         for method in methods():
-            got = method.signals(found, snaps, FEW, SONAR, None, start, 1)
-            parts.append(off(np.abs(got.pressure - exact).max() / peak, FINE, "of peak"))
-    short = synthesised(methods()[0], found, snaps, FEW, start, 1)
+            signals = method.signals(arrivals, snaps, FEW, SONAR, None, start, 1)
+            results.append(off(np.abs(signals.pressure - exact).max() / peak, FINE, "of peak"))
+    short = synthesised(methods()[0], arrivals, snaps, FEW, start, 1)
     image = refused(lambda: FocusedDelayAndSum().image(short, FEW, SONAR, start, start), "window")
-    return together(parts, image)
+    return together(results, image)
 
 
 def _bands() -> CaseResult:
-    parts = []
+    results = []
     for frequency, rate, stop in ((50.0, 2e5, 9e4), (5e3, 2e5, 9e4), (2e5, 1e7, 2e6), (1e7, 1e8, 40e6)):
         sonar = Sonar(sampling_frequency=rate, filter=LowPass(cutoff=stop, transition=0.1 * stop))
-        place = (9.0, 2.0, -3.0)
-        snaps = (snap(place, model=Ricker(frequency=frequency)),)
+        position = (9.0, 2.0, -3.0)
+        snaps = (snap(position, model=Ricker(frequency=frequency)),)
         half = 2.0 / frequency + 2.0 * FEW.aperture / C
         samples = round(2.0 * half * rate)
-        start = float(np.linalg.norm(place)) / C - half
-        exact = direct(FEW, place, times(start, samples, rate), frequency)
-        got = synthesised(methods()[0], traced(snaps, FEW), snaps, FEW, start, samples, sonar)
-        parts.append(_against(got, exact))
-    return together(parts)
+        start = float(np.linalg.norm(position)) / C - half
+        exact = direct(FEW, position, times(start, samples, rate), frequency)
+        signals = synthesised(methods()[0], traced(snaps, FEW), snaps, FEW, start, samples, sonar)
+        results.append(_against(signals, exact))
+    return together(results)
 
 
 def _narrow() -> CaseResult:
     """A thousand cycles: the tone in its Gaussian, whose width at half its height is theirs."""
-    f, cycles, place = 50e3, 1000.0, (9.0, 2.0, -3.0)
-    snaps = (snap(place, model=Gabor(frequency=f, cycles=cycles)),)
-    r, samples = float(np.linalg.norm(place)), 60_000
+    f, cycles, position = 50e3, 1000.0, (9.0, 2.0, -3.0)
+    snaps = (snap(position, model=Gabor(frequency=f, cycles=cycles)),)
+    r, samples = float(np.linalg.norm(position)), 60_000
     start = r / C - 0.5 * samples / RATE
-    got = synthesised(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
+    signals = synthesised(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
     t = times(start, samples) - r / C
     exact = np.exp(-4.0 * np.log(2.0) * (t * f / cycles) ** 2) * np.cos(2.0 * np.pi * f * t) / r
-    return _against(got, exact)
+    return _against(signals, exact)
 
 
 def _loud_and_faint() -> CaseResult:
     """100 dB: a strength of 1 and of 1e-5, at places heard apart; each against what is heard of it alone."""
     source = np.array([6.0, -4.0, -3.0])
-    snaps, parts = (snap(source),), []
+    snaps, results = (snap(source),), []
     mesh = mesh_of(Sphere(radius=1e-3))
     bodies = body(mesh, (8.0, 0.0, 0.0)), body(mesh, (15.0, 1.0, 0.0))
     laws = Isotropic(strength=1.0), Isotropic(strength=1e-5)
@@ -142,41 +142,41 @@ def _loud_and_faint() -> CaseResult:
     both, alone = (x.select(~x.direct) for x in (both, alone))
     late = float(alone.delay.mean())
     for method in methods():
-        got, exact = (synthesised(method, x, snaps, FEW, late - 4e-4, 200) for x in (both, alone))
-        error = np.abs(got.pressure - exact.pressure).max() / np.abs(exact.pressure).max()
-        parts.append(off(error, 1e-3, "of peak"))
+        signals, exact = (synthesised(method, x, snaps, FEW, late - 4e-4, 200) for x in (both, alone))
+        error = np.abs(signals.pressure - exact.pressure).max() / np.abs(exact.pressure).max()
+        results.append(off(error, 1e-3, "of peak"))
     counts = [int((both.target == n).sum()) for n in (0, 1)]
-    return together(holds(min(counts) > 0, f"{counts} paths"), parts)
+    return together(holds(min(counts) > 0, f"{counts} paths"), results)
 
 
 def _silence() -> CaseResult:
     quiet = synthesised(methods()[0], traced((), FEW), (), FEW, 0.0, 2000)
     sonar = Sonar(array=PlanarLattice(columns=4, rows=4, pitch=0.1, face=0.0), beams=BeamGrid(azimuths=5, elevations=5))
-    found = SensorDelays().locate(quiet, Receiver(POSE, FEW, sonar), Survey(100.0, PROFILE), 1)
+    estimates = SensorDelays().locate(quiet, Receiver(POSE, FEW, sonar), Survey(100.0, PROFILE), 1)
     image = FocusedDelayAndSum().image(quiet, FEW, sonar, 1e-3, 6e-3)
     beams = FocusedDelayAndSum().beams(snapshots_of(quiet, sonar, 1e-3, 6e-3), FEW, sonar)
-    window = ReceivedWindow(FEW, sonar, image, beams, 0.0, quiet, found)
+    window = ReceivedWindow(FEW, sonar, image, beams, 0.0, quiet, estimates)
     cloud = point_cloud(window, Peaks(), IsovelocityPlacing(), POSE, PROFILE)
     return together(
         holds(not quiet.pressure.any() and quiet.outside == 0, "no pressure"),
         holds(not image.energy.any(), "no energy in any beam"),
-        holds(all(np.isnan(v).all() for v in vars(found).values() if v.dtype.kind == "f"), "no snap found: NaN"),
+        holds(all(np.isnan(v).all() for v in vars(estimates).values() if v.dtype.kind == "f"), "no snap found: NaN"),
         holds(len(cloud) == 0, "no point"),
     )
 
 
 def _few_sensors() -> CaseResult:
-    place, parts = (9.0, 2.0, -3.0), []
-    snaps, start = (snap(place),), 0.004
+    position, results = (9.0, 2.0, -3.0), []
+    snaps, start = (snap(position),), 0.004
     for array, reason in ((ONE, "1 live sensor"), (TWO, "2 live sensors")):
-        got = synthesised(methods()[0], traced(snaps, array), snaps, array, start, 1000)
-        parts.append(_against(got, direct(array, place, times(start, 1000))))
-        found = SensorDelays().locate(got, Receiver(POSE, array, SONAR), Survey(100.0, PROFILE), 1)
-        said = unlocatable(array) or ""
-        parts.append(holds(bool(np.isnan(found.azimuth).all()) and reason in said, f"no bearing: {said}"))
+        signals = synthesised(methods()[0], traced(snaps, array), snaps, array, start, 1000)
+        results.append(_against(signals, direct(array, position, times(start, 1000))))
+        estimates = SensorDelays().locate(signals, Receiver(POSE, array, SONAR), Survey(100.0, PROFILE), 1)
+        refusal = unlocatable(array) or ""
+        results.append(holds(bool(np.isnan(estimates.azimuth).all()) and reason in refusal, f"no bearing: {refusal}"))
         if array is TWO:
-            parts.append(holds(bool((got.pressure[0] == got.pressure[1]).all()), "both the same"))
-    return together(*parts)
+            results.append(holds(bool((signals.pressure[0] == signals.pressure[1]).all()), "both the same"))
+    return together(*results)
 
 
 def _ten_thousand() -> CaseResult:
@@ -189,21 +189,21 @@ def _ten_thousand() -> CaseResult:
         array=array, sampling_frequency=RATE, filter=LowPass(cutoff=110e3), band=band, assumed_sound_speed=C,
         beams=BeamGrid(azimuths=21, elevations=21, azimuth_span=0.5, elevation_span=0.5),
     )  # fmt: skip
-    many, place = elements(array), (15.0, 0.0, 0.0)
-    snaps, start, samples = (snap(place),), 15.0 / C - 1e-3, 500
-    got = synthesised(methods()[0], traced(snaps, many), snaps, many, start, samples, sonar)
-    exact = _against(got, direct(many, place, times(start, samples)))
-    image = FocusedDelayAndSum(focus=15.0).image(got, many, sonar, start, start + (samples - 1) / RATE)
+    many, position = elements(array), (15.0, 0.0, 0.0)
+    snaps, start, samples = (snap(position),), 15.0 / C - 1e-3, 500
+    signals = synthesised(methods()[0], traced(snaps, many), snaps, many, start, samples, sonar)
+    exact = _against(signals, direct(many, position, times(start, samples)))
+    image = FocusedDelayAndSum(focus=15.0).image(signals, many, sonar, start, start + (samples - 1) / RATE)
     f0 = PULSE.frequency
 
     def power(f: float) -> float:
         return float((2.0 / np.sqrt(np.pi) * f**2 / f0**3 * np.exp(-((f / f0) ** 2))) ** 2)
 
     energy = 2.0 * quad(power, band.low, band.high)[0] / 15.0**2
-    where = int(np.argmax(image.energy))
+    loudest = int(np.argmax(image.energy))
     return together(
         exact,
-        holds(where == 10 * 21 + 10, "the loudest beam is the one ahead"),
+        holds(loudest == 10 * 21 + 10, "the loudest beam is the one ahead"),
         off(image.energy[10, 10] / energy - 1.0, 0.02, what="its energy"),
     )
 
@@ -214,11 +214,11 @@ def _strengths() -> CaseResult:
     angles = Angles(*(a.ravel() for a in np.meshgrid(edges, edges, [-1.0, 0.0, 1.0])))
     k = 2.0 * np.pi * 50e3 / C
     sites = [BoundarySite(50e3, k, np.ones_like, wind, rms_height=0.1) for wind in (0.0, 0.69, 1.0, 11.0, 60.0)]
-    found = [sediment(angles, k, name) for name in GRAIN_SIZE]
-    found += [WindySurface().strength(angles, site) for site in sites]
-    along = np.array([x[(angles.sine_in == 0.0) & (angles.sine_out == 0.0) & (angles.forward < 0.0)] for x in found])
+    values = [sediment(angles, k, name) for name in GRAIN_SIZE]
+    values += [WindySurface().strength(angles, site) for site in sites]
+    along = np.array([x[(angles.sine_in == 0.0) & (angles.sine_out == 0.0) & (angles.forward < 0.0)] for x in values])
     return together(
-        holds(all(np.isfinite(x).all() and (x >= 0.0).all() for x in found), "finite and not negative"),
+        holds(all(np.isfinite(x).all() and (x >= 0.0).all() for x in values), "finite and not negative"),
         holds(float(along.max()) < 1e-5, f"at most {along.max():.1g} along the boundary"),
     )
 

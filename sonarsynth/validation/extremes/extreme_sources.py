@@ -31,7 +31,7 @@ def _noisy_signals(
     away = np.linalg.norm(places, axis=1)
     start = float(away.min()) / C - 2e-3
     time = start + np.arange(int((float(np.ptp(away)) / C + 4e-3) * RATE)) / RATE
-    total = sum(g * direct(array, place.tolist(), time, TONE) for g, place in zip(gains, places, strict=True))
+    total = sum(g * direct(array, position.tolist(), time, TONE) for g, position in zip(gains, places, strict=True))
     total = total + noise * np.random.default_rng(seed).standard_normal(np.shape(total))
     return Signals(total.astype(np.float32), start, RATE, 0.0, 0, 0)
 
@@ -45,22 +45,22 @@ def _located(
     )
 
 
-def _honest(found: SourceEstimates, places: Sequence[Floats]) -> CaseResult:
+def _honest(estimates: SourceEstimates, places: Sequence[Floats]) -> CaseResult:
     """Each row that says something is right within four errors about one of the places; others have a reason."""
-    good, located = True, np.flatnonzero(np.isfinite(found.time))
+    good, located = True, np.flatnonzero(np.isfinite(estimates.time))
     for row in located:
         azimuth, elevation = azimuth_elevation(np.array(places))
         off = np.hypot(
-            (found.azimuth[row] - azimuth) / found.azimuth_error[row],
-            (found.elevation[row] - elevation) / found.elevation_error[row],
+            (estimates.azimuth[row] - azimuth) / estimates.azimuth_error[row],
+            (estimates.elevation[row] - elevation) / estimates.elevation_error[row],
         )
         good &= bool(off.min() < 4 * np.sqrt(2))
-        if np.isfinite(found.position[row]).all():
-            error = found.position[row] - places[int(off.argmin())]
-            good &= bool(error @ np.linalg.solve(found.position_covariance[row], error) < 22.1)
-    good &= bool((found.reason[np.isnan(found.time)] > 0).all())
-    count = int(np.isfinite(found.position).all(axis=1).sum())
-    reasons = sorted({REASONS[n] for n in found.reason if n})
+        if np.isfinite(estimates.position[row]).all():
+            error = estimates.position[row] - places[int(off.argmin())]
+            good &= bool(error @ np.linalg.solve(estimates.position_covariance[row], error) < 22.1)
+    good &= bool((estimates.reason[np.isnan(estimates.time)] > 0).all())
+    count = int(np.isfinite(estimates.position).all(axis=1).sum())
+    reasons = sorted({REASONS[n] for n in estimates.reason if n})
     return holds(
         good, f"{len(located)} of {len(places)} heard, {count} placed" + (f" ({', '.join(reasons)})" * any(reasons))
     )
@@ -68,51 +68,51 @@ def _honest(found: SourceEstimates, places: Sequence[Floats]) -> CaseResult:
 
 def _middle() -> CaseResult:
     """Half way between surface and bottom, 10 m to 5 km away, by straight and by bent rays; quiet, and with noise."""
-    array, parts = elements(LATTICE), []
+    array, results = elements(LATTICE), []
     for distance in (10.0, 30.0, 100.0, 300.0, 1e3, 5e3):
-        place = distance * direction(0.3, -0.2)
+        position = distance * direction(0.3, -0.2)
         for noise in (0.0, 1e-2 / distance):
-            signals = _noisy_signals(array, [place], [1.0], noise, 1)
+            signals = _noisy_signals(array, [position], [1.0], noise, 1)
             for refraction in (False, True):
-                found = _located(signals, array, 1, refraction=refraction)
-                near = holds(bool(np.isfinite(found.time[0])), f"heard at {distance:g} m")
-                parts.append(near if not near.ok else _honest(found, [place]))
-    return together(parts)
+                estimates = _located(signals, array, 1, refraction=refraction)
+                near = holds(bool(np.isfinite(estimates.time[0])), f"heard at {distance:g} m")
+                results.append(near if not near.ok else _honest(estimates, [position]))
+    return together(results)
 
 
 def _bands() -> CaseResult:
     """100 Hz to 60 kHz about 40 kHz, or above 25 kHz: a place within its errors, or none with a reason."""
-    array, place, parts = elements(LATTICE), 20.0 * direction(0.3, -0.2), []
-    signals = _noisy_signals(array, [place], [1.0], 1e-5, 2)
+    array, position, results = elements(LATTICE), 20.0 * direction(0.3, -0.2), []
+    signals = _noisy_signals(array, [position], [1.0], 1e-5, 2)
     for width in (100.0, 300.0, 1e3, 3e3, 10e3, 30e3, 60e3):
         low = TONE - 0.5 * width if width <= 30e3 else 25e3
-        found = _located(signals, array, 1, Band(low=low, high=low + width))
-        parts.append(_honest(found, [place]))
-        parts.append(holds(not found.time_error[0] > 1 / width, "time within the pulse"))
-    return together(parts)
+        estimates = _located(signals, array, 1, Band(low=low, high=low + width))
+        results.append(_honest(estimates, [position]))
+        results.append(holds(not estimates.time_error[0] > 1 / width, "time within the pulse"))
+    return together(results)
 
 
 def _crowd() -> CaseResult:
     """1, 2, 5, 10 and 20 snaps at one instant: none that is accepted is anything but one of them."""
-    array, parts = elements(LATTICE), []
+    array, results = elements(LATTICE), []
     for count in (1, 2, 5, 10, 20):
         random = np.random.default_rng(count)
         angles = random.uniform([-0.6, -0.5], [0.6, 0.3], (count, 2))
-        places = [r * direction(*each) for r, each in zip(np.linspace(8.0, 40.0, count), angles, strict=True)]
-        found = _located(_noisy_signals(array, places, [1.0] * count, 1e-5, count), array, count)
-        parts.append(_honest(found, places))
-    return together(parts)
+        places = [r * direction(*bearing) for r, bearing in zip(np.linspace(8.0, 40.0, count), angles, strict=True)]
+        estimates = _located(_noisy_signals(array, places, [1.0] * count, 1e-5, count), array, count)
+        results.append(_honest(estimates, places))
+    return together(results)
 
 
 def _stranger() -> CaseResult:
     """20 dB louder than the other, before it and after it: the clock is the louder one's."""
-    array, parts = elements(LATTICE), []
+    array, results = elements(LATTICE), []
     for far in (14.0, 30.0):
         places = [20.0 * direction(-0.3, -0.2), far * direction(0.4, -0.1)]
-        found = _located(_noisy_signals(array, places, [1.0, 10.0], 1e-5, 3), array, 2)
-        off = float(np.abs(found.azimuth[0] - azimuth_elevation(places[1])[0]))
-        parts += [holds(off < 4 * found.azimuth_error[0], "the louder one first"), _honest(found, places)]
-    return together(parts)
+        estimates = _located(_noisy_signals(array, places, [1.0, 10.0], 1e-5, 3), array, 2)
+        off = float(np.abs(estimates.azimuth[0] - azimuth_elevation(places[1])[0]))
+        results += [holds(off < 4 * estimates.azimuth_error[0], "the louder one first"), _honest(estimates, places)]
+    return together(results)
 
 
 CHORUS = """\
@@ -129,37 +129,37 @@ scene:
 
 
 def _chorus(density: float, height: float) -> tuple[Plan, xr.DataTree]:
-    made = plan(reading.loads(CHORUS.format(density=density, height=height)), ("signals",))
-    return made, render(made, 0)
+    resolved = plan(reading.loads(CHORUS.format(density=density, height=height)), ("signals",))
+    return resolved, render(resolved, 0)
 
 
 def _dense() -> CaseResult:
     """Of 1e5 snaps a second within 400 m, in water of 40 m: the mean square is Campbell's, within and beyond."""
-    made, tree = _chorus(0.2, -5.0)
-    near, distant = made.chorus, made.distant_chorus
+    resolved, tree = _chorus(0.2, -5.0)
+    near, distant = resolved.chorus, resolved.distant_chorus
     snaps = int(tree["truth/soundscape"].dataset["snaps"])
     square = float(np.mean(tree["signals"].dataset["pressure"].values ** 2))
     if near is None or distant is None:
         return holds(False, "a chorus")
-    whole = near.level - 10.0 * np.log10(1.0 - distant.share)
+    total = near.level - 10.0 * np.log10(1.0 - distant.share)
     return together(
         holds(snaps > 300, f"{snaps} snaps in the record"),
-        off(10.0 * np.log10(square) + 120.0 - whole, 1.0, "dB", "level"),
+        off(10.0 * np.log10(square) + 120.0 - total, 1.0, "dB", "level"),
     )
 
 
 def _bounded() -> CaseResult:
     """Hydrophones at the surface, on the bottom, and where nothing snaps."""
-    parts = []
+    results = []
     for density, height in ((1e-2, 0.0), (1e-2, -40.0), (0.0, -5.0)):
         _, tree = _chorus(density, height)
         level = tree["truth/soundscape"].dataset["level"].values
         loudest = float(np.nanmax(level)) if density else -np.inf
-        parts.append(
+        results.append(
             holds(bool(np.isfinite(tree["signals"].dataset["pressure"].values).all()), f"pressure at {-height:g} m")
         )
-        parts.append(holds(loudest < 185.0 + 5 * 2.0 + 49.2, f"no snap louder than at its bubble, {loudest:.4g} dB"))
-    return together(parts)
+        results.append(holds(loudest < 185.0 + 5 * 2.0 + 49.2, f"no snap louder than at its bubble, {loudest:.4g} dB"))
+    return together(results)
 
 
 CASES = (

@@ -41,8 +41,8 @@ def echo(shape: Shape, far: float, band: tuple[float, float]) -> Floats:
     """The coherent echo (frequency,) at the ends of a band of a body whose middle is so far ahead (m)."""
     law = Kirchhoff()
     mesh = base_mesh(shape, law, C / band[1])
-    found = traced([snap(BESIDE)], ONE, [body(mesh, (far, 0.0, 0.0))], [law], band)
-    return transfer(found.select(~found.direct), np.array(band))
+    arrivals = traced([snap(BESIDE)], ONE, [body(mesh, (far, 0.0, 0.0))], [law], band)
+    return transfer(arrivals.select(~arrivals.direct), np.array(band))
 
 
 def mirrored(radius: float, distance: float, band: tuple[float, float]) -> Floats:
@@ -61,8 +61,8 @@ def mirrored(radius: float, distance: float, band: tuple[float, float]) -> Float
 
 
 def _sphere(radius: float, distance: float, band: tuple[float, float], allowed: float) -> CaseResult:
-    got, exact = echo(Sphere(radius=radius), distance, band), mirrored(radius, distance, band)
-    return off(np.abs(got / exact - 1.0), allowed, what=f"{2 * radius:g} m at {distance:g} m:")
+    computed, exact = echo(Sphere(radius=radius), distance, band), mirrored(radius, distance, band)
+    return off(np.abs(computed / exact - 1.0), allowed, what=f"{2 * radius:g} m at {distance:g} m:")
 
 
 def _distances() -> CaseResult:
@@ -71,18 +71,18 @@ def _distances() -> CaseResult:
 
 def _sizes() -> CaseResult:
     """In a frame, in bands that suit them; and far away, where all sizes are alike at one k a."""
-    parts = [
+    results = [
         _sphere(0.5e-6, 1.0, (40e3, 80e3), 0.03),
         _sphere(0.5e-3, 1.0, (40e3, 80e3), 0.03),
         _sphere(500.0, 2e3, (60.0, 120.0), 0.05),
     ]
-    way, strengths = np.array([1.0, 0.0, 0.0]), []
+    direction, strengths = np.array([1.0, 0.0, 0.0]), []
     for radius in (0.5e-6, 0.5e-3, 0.5, 500.0):
         f = 30.0 * C / (2.0 * np.pi * radius)
         exact = 20.0 * np.log10(abs(complex(sphere_amplitude(f, np.pi, radius=radius, sound_speed=C))))
-        strengths.append(float(target_strength(Sphere(radius=radius), f, way, -way, C)) - exact)
+        strengths.append(float(target_strength(Sphere(radius=radius), f, direction, -direction, C)) - exact)
     spread = off(np.ptp(strengths), 1e-6, "dB", "1 um to 1 km at k a = 30, one from another:")
-    return together(*parts, spread, off(strengths, 0.25, "dB", "from the exact series:"))
+    return together(*results, spread, off(strengths, 0.25, "dB", "from the exact series:"))
 
 
 def needles(count: int) -> Floats:
@@ -97,15 +97,15 @@ def needles(count: int) -> Floats:
 
 def _needles() -> CaseResult:
     corners = needles(400)
-    parts = []
+    results = []
     for tilt, turn in ((0.0, 0.0), (0.01, 0.3), (0.7, 0.0), (1.2, 2.0)):
         away = np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)])
         k = np.array([0.0, 1e-6, 1.0, 30.0, 300.0])
         half = k[:, None] * away  # half the change of the wave: sinc of the sides
         exact = 0.5j * k / np.pi * away[2] * np.sinc(half[:, 0] / np.pi) * np.sinc(half[:, 1] / np.pi)
-        got = mesh_amplitude(corners, -away, away, k)
-        parts.append(off(np.abs(got - exact) / np.maximum(k, 1e-300), 1e-13, "of its area"))
-    return together(parts)
+        amplitude = mesh_amplitude(corners, -away, away, k)
+        results.append(off(np.abs(amplitude - exact) / np.maximum(k, 1e-300), 1e-13, "of its area"))
+    return together(results)
 
 
 def _degenerate() -> CaseResult:
@@ -132,28 +132,28 @@ def _many(facets: int, *, framed: bool) -> CaseResult:
     radius = 0.5
     n = round(np.sqrt(facets / 20.0))
     mesh = refined_mesh(Sphere(radius=radius, edge=1.32 * radius / n))
-    area, band, way = 4.0 * np.pi * radius**2, (40e3, 80e3), np.array([1.0, 0.0, 0.0])
+    area, band, direction = 4.0 * np.pi * radius**2, (40e3, 80e3), np.array([1.0, 0.0, 0.0])
     count, closed = len(mesh.faces), np.abs(mesh.area @ mesh.normal).max()
     k = 2.0 * np.pi * np.array(band) / C
     lit = np.array_split(np.flatnonzero(mesh.normal[:, 0] > 0), count // 200_000)
-    got = sum(mesh_amplitude(mesh.corners[some], -way, way, k) for some in lit)
+    amplitude = sum(mesh_amplitude(mesh.corners[batch], -direction, direction, k) for batch in lit)
     x = k * radius
     exact = 0.5j * x * radius * np.exp(1j * x) * (spherical_jn(0, x) + 1j * spherical_jn(1, x))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    parts = [
+    results = [
         holds(count > 0.97 * facets, f"{count} facets"),
         off(closed / area, 1e-13, "of the area", "sum of the normals"),
         off(mesh.area.sum() / area - 1.0, 12.0 / count, what="area"),
-        off(np.abs(got / exact - 1.0), 20.0 / np.sqrt(count), what="Kirchhoff's integral"),
+        off(np.abs(amplitude / exact - 1.0), 20.0 / np.sqrt(count), what="Kirchhoff's integral"),
     ]
     if framed:
-        found = traced([snap(BESIDE)], ONE, [body(mesh, (8.0, 0.0, 0.0))], [Kirchhoff()], band)
-        echoed = transfer(found.select(~found.direct), np.array(band))
-        parts.append(off(np.abs(echoed / mirrored(radius, 8.0, band) - 1.0), 0.01, what="echo in a frame"))
+        arrivals = traced([snap(BESIDE)], ONE, [body(mesh, (8.0, 0.0, 0.0))], [Kirchhoff()], band)
+        echoed = transfer(arrivals.select(~arrivals.direct), np.array(band))
+        results.append(off(np.abs(echoed / mirrored(radius, 8.0, band) - 1.0), 0.01, what="echo in a frame"))
         lobe = traced([snap(BESIDE)], ONE, [body(mesh, (8.0, 0.0, 0.0))], [MirrorLobe(width=0.1)], band)
         power = float((lobe.amplitude[~lobe.direct] ** 2).sum()) / (radius / (2.0 * 7.5 * 8.0)) ** 2
-        parts.append(off(10.0 * np.log10(power), 0.3, "dB", "power of lobes"))
-    return together(*parts, holds(peak < 6.0, f"at most {peak:.2g} GB"))
+        results.append(off(10.0 * np.log10(power), 0.3, "dB", "power of lobes"))
+    return together(*results, holds(peak < 6.0, f"at most {peak:.2g} GB"))
 
 
 def _between() -> CaseResult:
@@ -161,33 +161,33 @@ def _between() -> CaseResult:
     plate, half, f = Box(size=(0.01, 0.6, 0.6), edge=0.02), 0.3, np.linspace(40e3, 80e3, 5)
     mesh, source = mesh_of(plate), (20.0, 0.0, 0.0)
     blocked = traced([snap(source)], ONE, [body(mesh, (10.0, 0.0, 0.0))], [Kirchhoff()])
-    parts = [holds(len(blocked.delay) == 0, "blocked: no path")]
+    results = [holds(len(blocked.delay) == 0, "blocked: no path")]
     for aside in (0.0, 0.1, 0.25, 0.4, 0.8):
         law = Kirchhoff(forward="scattered", edges="sharp")
-        found = traced([snap(source)], ONE, [body(mesh, (10.0, aside, 0.0))], [law])
-        got = transfer(found, f) * 20.0 * np.exp(2j * np.pi * f * 20.0 / C)
+        arrivals = traced([snap(source)], ONE, [body(mesh, (10.0, aside, 0.0))], [law])
+        pressure = transfer(arrivals, f) * 20.0 * np.exp(2j * np.pi * f * 20.0 / C)
         w = np.sqrt(2.0 * 20.0 * f / C / 100.0)
         spans = []
         for low, high in ((aside - half, aside + half), (-half, half)):
             (s0, c0), (s1, c1) = fresnel(low * w), fresnel(high * w)
             spans.append((c1 - c0) - 1j * (s1 - s0))
         exact = 1.0 - 0.5j * spans[0] * spans[1]
-        parts.append(off(np.abs(got - exact), 0.05, "of the direct", f"{aside:g} m off the line:"))
-    return together(*parts)
+        results.append(off(np.abs(pressure - exact), 0.05, "of the direct", f"{aside:g} m off the line:"))
+    return together(*results)
 
 
 def _isotropic() -> CaseResult:
     """Ranges of an echo: a ball of a millimetre from 1 m to 10 km, its delay and power as of a point."""
-    parts, ball = [], mesh_of(Sphere(radius=1e-3))
+    results, ball = [], mesh_of(Sphere(radius=1e-3))
     for far in (1.0, 30.0, 1e3, 1e4):
         source = np.array([0.3 * far, 0.4 * far, 0.0])
-        found = traced([snap(source)], ONE, [body(ball, (far, 0.0, 0.0))], [Isotropic(strength=0.01)])
-        found = found.select(~found.direct)
+        arrivals = traced([snap(source)], ONE, [body(ball, (far, 0.0, 0.0))], [Isotropic(strength=0.01)])
+        arrivals = arrivals.select(~arrivals.direct)
         out = float(np.linalg.norm(source - [far, 0.0, 0.0]))
-        parts.append(off(found.delay * C - out - far, 2.1e-3, "m", f"{far:g} m: path"))
-        loud = found.amplitude / found.scattering * out * far
-        parts.append(off(loud - 1.0, 3e-3, what="spreading"))
-    return together(parts)
+        results.append(off(arrivals.delay * C - out - far, 2.1e-3, "m", f"{far:g} m: path"))
+        loud = arrivals.amplitude / arrivals.scattering * out * far
+        results.append(off(loud - 1.0, 3e-3, what="spreading"))
+    return together(results)
 
 
 BALLS = (BodyModel(shape=Sphere(radius=0.1, edge=0.1)),)
@@ -228,10 +228,10 @@ def _no_room() -> CaseResult:
 def _broken() -> CaseResult:
     """Of a folder of meshes one is empty, one is no mesh, one is missing; and a table that is none."""
     yaml = reading.dump(_with(Population(name="ball", models=BALLS, most=1, region=SEA)))
-    head, _, rest = yaml.partition("models:")
+    head, _, tail = yaml.partition("models:")
     indent = head.rpartition("\n")[2]
-    text = f"{head}models: {{table: hulls/all.csv}}\n{indent}least:{rest.partition('least:')[2]}"
-    parts = []
+    text = f"{head}models: {{table: hulls/all.csv}}\n{indent}least:{tail.partition('least:')[2]}"
+    results = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "hulls").mkdir()
@@ -248,8 +248,8 @@ def _broken() -> CaseResult:
             ("\x00\xff", "is no column"),
         ):
             (folder / "hulls/all.csv").write_text(row)
-            parts.append(refused(lambda: plan(reading.load(folder / "r.yaml")), words))
-    return together(parts)
+            results.append(refused(lambda: plan(reading.load(folder / "r.yaml")), words))
+    return together(results)
 
 
 ECHO = "geometry's a/(2R(R+a)) and 2R/c, within the mesh's 5 %"

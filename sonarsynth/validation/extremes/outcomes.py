@@ -55,12 +55,12 @@ def off(error: npt.ArrayLike, allowed: float, unit: str = "", what: str = "") ->
     return CaseResult(f"{head}{largest:.2g}{unit and ' '}{unit} off ({allowed:g} allowed)", largest <= allowed)
 
 
-def relative(got: npt.ArrayLike, exact: npt.ArrayLike, allowed: float, what: str = "") -> CaseResult:
+def relative(computed: npt.ArrayLike, exact: npt.ArrayLike, allowed: float, what: str = "") -> CaseResult:
     """The largest relative error; of arrays that differ in shape none is right."""
-    one, other = np.asarray(got, float), np.asarray(exact, float)
-    if one.shape != other.shape:
-        return CaseResult(f"{what or 'values'}: shape {one.shape} where {other.shape} belongs", False)
-    return off(one / other - 1.0, allowed, what=what)
+    values, expected = np.asarray(computed, float), np.asarray(exact, float)
+    if values.shape != expected.shape:
+        return CaseResult(f"{what or 'values'}: shape {values.shape} where {expected.shape} belongs", False)
+    return off(values / expected - 1.0, allowed, what=what)
 
 
 def holds(ok: bool | np.bool_, text: str) -> CaseResult:
@@ -73,22 +73,22 @@ def refused(call: Callable[[], object], words: str) -> CaseResult:
     try:
         call()
     except ValueError as error:
-        said = str(error)
-        return CaseResult(f"refused: {said}", words in said and "\n" not in said)
+        message = str(error)
+        return CaseResult(f"refused: {message}", words in message and "\n" not in message)
     return CaseResult("not refused", False)
 
 
-def together(*parts: CaseResult | Iterable[CaseResult]) -> CaseResult:
+def together(*results: CaseResult | Iterable[CaseResult]) -> CaseResult:
     """All of several; of an iterable the first that fails, or how many there are and the last."""
-    every = [part if isinstance(part, CaseResult) else _all_of(list(part)) for part in parts]
-    return CaseResult("; ".join(part.text for part in every), all(part.ok for part in every))
+    every = [result if isinstance(result, CaseResult) else _all_of(list(result)) for result in results]
+    return CaseResult("; ".join(result.text for result in every), all(result.ok for result in every))
 
 
-def _all_of(some: list[CaseResult]) -> CaseResult:
-    wrong = [one for one in some if not one.ok]
-    if wrong or not some:
+def _all_of(results: list[CaseResult]) -> CaseResult:
+    wrong = [result for result in results if not result.ok]
+    if wrong or not results:
         return wrong[0] if wrong else CaseResult("nothing was checked", False)
-    return CaseResult(f"{len(some)} of {len(some)} right, the last {some[-1].text}", True)
+    return CaseResult(f"{len(results)} of {len(results)} right, the last {results[-1].text}", True)
 
 
 def outcome(group: str, case: Case) -> Extreme:
@@ -97,10 +97,10 @@ def outcome(group: str, case: Case) -> Extreme:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            got = case.check()
+            result = case.check()
     except Exception as error:
-        got = CaseResult(f"{type(error).__name__}: {' '.join(str(error).split())}", False)
-    return Extreme(group, case.name, case.expected, got.text, got.ok, time.process_time() - began)
+        result = CaseResult(f"{type(error).__name__}: {' '.join(str(error).split())}", False)
+    return Extreme(group, case.name, case.expected, result.text, result.ok, time.process_time() - began)
 
 
 def outcomes(groups: dict[str, tuple[Case, ...]], *, quick: bool) -> Iterator[Extreme]:

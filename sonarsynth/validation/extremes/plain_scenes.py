@@ -36,14 +36,16 @@ WATER = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), absorp
 PROFILE = Profile(np.array([0.0]), np.array([C]))
 
 
-def snap(place: Sequence[float] | Floats, time: float = 0.0, model: SnapModel = PULSE, gain: float = 1.0) -> Emission:
-    """A test pulse at a place (xyz) in the sonar frame."""
-    return Emission(ARRAY + np.asarray(place, float), time, model, None, gain)
+def snap(
+    position: Sequence[float] | Floats, time: float = 0.0, model: SnapModel = PULSE, gain: float = 1.0
+) -> Emission:
+    """A test pulse at a position (xyz) in the sonar frame."""
+    return Emission(ARRAY + np.asarray(position, float), time, model, None, gain)
 
 
-def body(mesh: Mesh, place: Sequence[float] | Floats, turned: float = 0.5 * np.pi) -> PlacedTarget:
-    """A body at rest at a place (xyz) in the sonar frame, its heading as the sonar's unless turned."""
-    return PlacedTarget("body", mesh, Pose(ARRAY + np.asarray(place, float), quaternion(turned)), np.zeros(3))
+def body(mesh: Mesh, position: Sequence[float] | Floats, turned: float = 0.5 * np.pi) -> PlacedTarget:
+    """A body at rest at a position (xyz) in the sonar frame, its heading as the sonar's unless turned."""
+    return PlacedTarget("body", mesh, Pose(ARRAY + np.asarray(position, float), quaternion(turned)), np.zeros(3))
 
 
 def traced(
@@ -56,16 +58,16 @@ def traced(
     """Every path, none of which has a number that is none."""
     receiver = Receiver(POSE, elements, replace(SONAR, band=Band(low=band[0], high=band[1])))
     context = FrameContext(0.0, tuple(bodies), tuple(snaps), Medium(WATER, PROFILE), receiver, tuple(laws))
-    found = trace(context, AutoTracing())
-    for name, value in vars(found).items():
+    arrivals = trace(context, AutoTracing())
+    for name, value in vars(arrivals).items():
         if isinstance(value, np.ndarray) and not np.isfinite(value).all():
             raise ArithmeticError(f"{name} of a path is not finite")
-    return found
+    return arrivals
 
 
 def synthesised(
     method: SignalSynthesis,
-    found: Arrivals,
+    arrivals: Arrivals,
     snaps: Sequence[Emission],
     elements: Elements,
     start: float,
@@ -73,7 +75,7 @@ def synthesised(
     sonar: Sonar = SONAR,
 ) -> Signals:
     """Signals of paths."""
-    return method.signals(found, tuple(snaps), elements, sonar, None, start, samples)
+    return method.signals(arrivals, tuple(snaps), elements, sonar, None, start, samples)
 
 
 def ricker(time: Floats, frequency: float = PULSE.frequency) -> Floats:
@@ -87,20 +89,20 @@ def times(start: float, samples: int, rate: float = RATE) -> Floats:
     return start + np.arange(samples) / rate
 
 
-def direct(elements: Elements, place: Sequence[float], time: Floats, frequency: float = PULSE.frequency) -> Floats:
-    """What each hydrophone hears of a snap at a place (xyz) in the sonar frame: (sensor, sample)."""
-    r = np.linalg.norm(elements.position - np.asarray(place, float), axis=1)[:, None]
+def direct(elements: Elements, position: Sequence[float], time: Floats, frequency: float = PULSE.frequency) -> Floats:
+    """What each hydrophone hears of a snap at a position (xyz) in the sonar frame: (sensor, sample)."""
+    r = np.linalg.norm(elements.position - np.asarray(position, float), axis=1)[:, None]
     return np.asarray(ricker(time - r / C, frequency) / r)
 
 
-def transfer(found: Arrivals, frequency: Floats) -> Floats:
+def transfer(arrivals: Arrivals, frequency: Floats) -> Floats:
     """Pressure (frequency,) at the array centre for a snap of unit spectrum at 1 m: complex, of all paths."""
     total = np.zeros(len(frequency), complex)
-    for some in np.array_split(np.arange(len(found.delay)), len(found.delay) // 100_000 + 1):
-        part = found.select(some)
+    for batch in np.array_split(np.arange(len(arrivals.delay)), len(arrivals.delay) // 100_000 + 1):
+        rows = arrivals.select(batch)
         shape = facet_response(
-            frequency, part.coherent, part.corner_delays, part.coherent_fraction, part.height_delay_std, part.centre
+            frequency, rows.coherent, rows.corner_delays, rows.coherent_fraction, rows.height_delay_std, rows.centre
         )  # fmt: skip
-        phase = part.phase[:, None] - 2.0 * np.pi * part.delay[:, None] * frequency
-        total += (part.amplitude[:, None] * shape * np.exp(1j * phase)).sum(axis=0)
+        phase = rows.phase[:, None] - 2.0 * np.pi * rows.delay[:, None] * frequency
+        total += (rows.amplitude[:, None] * shape * np.exp(1j * phase)).sum(axis=0)
     return np.asarray(total)

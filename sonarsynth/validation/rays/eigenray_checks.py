@@ -60,21 +60,21 @@ def search(case: Case) -> tuple[Eigenrays, float]:
     def run(copies: int) -> tuple[Eigenrays, float]:
         start, end, distance = (np.tile(v, copies) for v in (case.start, case.end, case.distance))
         began = time.process_time()
-        found = ray_solutions.eigenrays(water, start, end, distance, case.vertices, case.reflections)
-        return found, time.process_time() - began
+        eigenrays = ray_solutions.eigenrays(water, start, end, distance, case.vertices, case.reflections)
+        return eigenrays, time.process_time() - began
 
-    found, _ = run(1)  # compiles
+    eigenrays, _ = run(1)  # compiles
     _, once = run(1)
     copies = max(1, min(10_000, round(BATCH / max(once, 1e-6))))
     seconds = float(np.median([run(copies)[1] for _ in range(REPEATS)]))
-    return found, 1e6 * seconds / (copies * max(1, len(found.pair)))
+    return eigenrays, 1e6 * seconds / (copies * max(1, len(eigenrays.pair)))
 
 
-def _rows(case: Case, reference: str, cost: float, found: Rays, exact: Rays, trusted: Bools) -> Iterator[Row]:
+def _rows(case: Case, reference: str, cost: float, computed: Rays, exact: Rays, trusted: Bools) -> Iterator[Row]:
     """One row a quantity of matched rays."""
-    counts = _counts(case, len(found.pair))
-    for quantity, (unit, got, bound) in errors(found, exact, trusted, case.bounds).items():
-        yield Row(case.name, reference, quantity, unit, bound, got, cost, COST, counts)
+    counts = _counts(case, len(computed.pair))
+    for quantity, (unit, error, bound) in errors(computed, exact, trusted, case.bounds).items():
+        yield Row(case.name, reference, quantity, unit, bound, error, cost, COST, counts)
 
 
 def _counts(case: Case, rays: int) -> dict[str, int]:
@@ -82,32 +82,32 @@ def _counts(case: Case, rays: int) -> dict[str, int]:
     return {"pairs": len(case.start), "rays": rays}
 
 
-def _trusted(found: Eigenrays) -> Bools:
-    return np.asarray(found.flag != CAUSTIC)
+def _trusted(eigenrays: Eigenrays) -> Bools:
+    return np.asarray(eigenrays.flag != CAUSTIC)
 
 
-def _complete(case: Case, reference: str, cost: float, found: Rays, exact: Rays, trusted: Bools) -> Iterator[Row]:
+def _complete(case: Case, reference: str, cost: float, computed: Rays, exact: Rays, trusted: Bools) -> Iterator[Row]:
     """Rows of a reference that gives every ray."""
-    wrong = miscounted(found, Counter(exact.families))
-    yield Row(case.name, reference, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(found.pair)))
-    i, j = matched(found, exact)
-    yield from _rows(case, reference, cost, found.select(i), exact.select(j), trusted[i])
+    wrong = miscounted(computed, Counter(exact.families))
+    yield Row(case.name, reference, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(computed.pair)))
+    i, j = matched(computed, exact)
+    yield from _rows(case, reference, cost, computed.select(i), exact.select(j), trusted[i])
 
 
 def _isovelocity(quick: bool) -> Iterator[Row]:
     for case in ray_cases.isovelocity(quick):
-        found, cost = search(case)
+        eigenrays, cost = search(case)
         exact = image_rays(float(case.speed[0]), case.bottom, case.start, case.end, case.distance, case.vertices)
-        yield from _complete(case, IMAGES, cost, rays_of(found), exact, _trusted(found))
+        yield from _complete(case, IMAGES, cost, rays_of(eigenrays), exact, _trusted(eigenrays))
 
 
 def _gradients(quick: bool) -> Iterator[Row]:
     for case, water in ray_cases.gradients(quick):
-        found, cost = search(case)
-        rays = rays_of(found)
+        eigenrays, cost = search(case)
+        rays = rays_of(eigenrays)
         keep = (rays.bottom if water.slope > 0 else rays.surface) == 0
         exact = gradient_rays(water, case.start, case.end, case.distance, case.vertices)
-        yield from _complete(case, CIRCLES, cost, rays.select(keep), exact, _trusted(found)[keep])
+        yield from _complete(case, CIRCLES, cost, rays.select(keep), exact, _trusted(eigenrays)[keep])
 
 
 def _thinned(case: Case, rays: Rays) -> np.ndarray:
@@ -117,32 +117,32 @@ def _thinned(case: Case, rays: Rays) -> np.ndarray:
 
 def _counted(case: Case, reference: str, refine: Callable[[Case, Eigenrays, Rays, np.ndarray], Rays]) -> Iterator[Row]:
     """Rows of a reference that makes the rays found exact, and of the fan that counts them."""
-    found, cost = search(case)
-    rays = rays_of(found)
+    eigenrays, cost = search(case)
+    rays = rays_of(eigenrays)
     ends = (case.start, case.end, case.distance)
     counts = count_rays(case.depth, case.speed, *ends, case.vertices, case.reflections)
     wrong = miscounted(rays, counts)
     yield Row(case.name, FAN, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(rays.pair)))
     keep = _thinned(case, rays)
-    some, trusted = rays.select(keep), _trusted(found)[keep]
-    exact = refine(case, found, some, keep)
-    other = sum(a != b for a, b in zip(some.families, exact.families, strict=True))
-    yield Row(case.name, reference, "family", "wrong", 0.0, float(other), cost, COST, _counts(case, len(keep)))
-    yield from _rows(case, reference, cost, some, exact, trusted)
+    selected, trusted = rays.select(keep), _trusted(eigenrays)[keep]
+    exact = refine(case, eigenrays, selected, keep)
+    differing = sum(a != b for a, b in zip(selected.families, exact.families, strict=True))
+    yield Row(case.name, reference, "family", "wrong", 0.0, float(differing), cost, COST, _counts(case, len(keep)))
+    yield from _rows(case, reference, cost, selected, exact, trusted)
 
 
 def _layered(quick: bool) -> Iterator[Row]:
-    def refine(case: Case, found: Eigenrays, some: Rays, keep: np.ndarray) -> Rays:
+    def refine(case: Case, eigenrays: Eigenrays, selected: Rays, keep: np.ndarray) -> Rays:
         ends = (case.start, case.end, case.distance)
-        return exact_rays(Layers(case.depth, case.speed), some, found.slowness[keep], *ends)
+        return exact_rays(Layers(case.depth, case.speed), selected, eigenrays.slowness[keep], *ends)
 
     for case in ray_cases.layered(quick):
         yield from _counted(case, MANY_DIGITS, refine)
 
 
 def _integrated(quick: bool) -> Iterator[Row]:
-    def refine(case: Case, found: Eigenrays, some: Rays, keep: np.ndarray) -> Rays:
-        return followed_rays(case.depth, case.speed, some, case.start, case.end, case.distance)
+    def refine(case: Case, eigenrays: Eigenrays, selected: Rays, keep: np.ndarray) -> Rays:
+        return followed_rays(case.depth, case.speed, selected, case.start, case.end, case.distance)
 
     for case in ray_cases.shot(quick):
         yield from _counted(case, INTEGRATED, refine)
@@ -158,11 +158,11 @@ def _smooth(quick: bool) -> Iterator[Row]:
     exact = shooting_rays(munk(), approach.start, approach.ends, approach.distance, approach.vertices)
     for tolerance in approach.tolerances:
         case = approach.case(tolerance)
-        found, cost = search(case)
-        i, j = nearest(rays_of(found), exact)
+        eigenrays, cost = search(case)
+        i, j = nearest(rays_of(eigenrays), exact)
         counts = _counts(case, len(exact.pair))
         missed = float(len(exact.pair) - len(j))
         yield Row(case.name, SMOOTH, "missed", "rays", 0.0, missed, cost, COST, counts, approach.name)
-        error = np.abs(found.travel_time[i] - exact.travel_time[j])
-        got, bound = worst(error, tolerance * np.maximum(1, exact.turning[j]))
-        yield Row(case.name, SMOOTH, "time", "s", bound, got, cost, COST, counts, approach.name)
+        error = np.abs(eigenrays.travel_time[i] - exact.travel_time[j])
+        largest, bound = worst(error, tolerance * np.maximum(1, exact.turning[j]))
+        yield Row(case.name, SMOOTH, "time", "s", bound, largest, cost, COST, counts, approach.name)

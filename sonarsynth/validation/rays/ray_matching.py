@@ -49,53 +49,53 @@ class Rays:
         return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
-def rays_of(found: Eigenrays) -> Rays:
+def rays_of(eigenrays: Eigenrays) -> Rays:
     """Eigenrays as they are compared: angles from sine and cosine, so that none is ill-conditioned."""
     return Rays(
-        pair=found.pair,
-        travel_time=found.travel_time,
-        start_angle=np.arctan2(found.start_sine, found.slowness * found.start_speed),
-        end_angle=np.arctan2(found.end_sine, found.slowness * found.end_speed),
-        amplitude=found.amplitude,
-        surface=found.surface,
-        bottom=found.bottom,
-        turning=found.turning,
-        caustics=found.caustics,
+        pair=eigenrays.pair,
+        travel_time=eigenrays.travel_time,
+        start_angle=np.arctan2(eigenrays.start_sine, eigenrays.slowness * eigenrays.start_speed),
+        end_angle=np.arctan2(eigenrays.end_sine, eigenrays.slowness * eigenrays.end_speed),
+        amplitude=eigenrays.amplitude,
+        surface=eigenrays.surface,
+        bottom=eigenrays.bottom,
+        turning=eigenrays.turning,
+        caustics=eigenrays.caustics,
     )
 
 
-def miscounted(found: Rays, exact: Counter[Family]) -> int:
+def miscounted(computed: Rays, exact: Counter[Family]) -> int:
     """Rays missed and rays invented, over all families."""
-    got = Counter(found.families)
-    return (exact - got).total() + (got - exact).total()
+    families = Counter(computed.families)
+    return (exact - families).total() + (families - exact).total()
 
 
-def matched(found: Rays, exact: Rays) -> tuple[Ints, Ints]:
+def matched(computed: Rays, exact: Rays) -> tuple[Ints, Ints]:
     """Indices of the rays of both that belong together: of one family, in the order of their travel times there."""
-    if len(found.pair) == 0 or len(exact.pair) == 0:
+    if len(computed.pair) == 0 or len(exact.pair) == 0:
         return np.empty(0, np.int64), np.empty(0, np.int64)
     places: list[dict[tuple[Family, int], int]] = []
-    for rays in (found, exact):
-        seen: Counter[Family] = Counter()
-        place: dict[tuple[Family, int], int] = {}
+    for rays in (computed, exact):
+        count: Counter[Family] = Counter()
+        rows: dict[tuple[Family, int], int] = {}
         families = rays.families
         for i in np.argsort(rays.travel_time, kind="stable").tolist():
-            place[families[i], seen[families[i]]] = i
-            seen[families[i]] += 1
-        places.append(place)
+            rows[families[i], count[families[i]]] = i
+            count[families[i]] += 1
+        places.append(rows)
     both = [key for key in places[0] if key in places[1]]
     return np.array([places[0][key] for key in both], int), np.array([places[1][key] for key in both], int)
 
 
-def nearest(found: Rays, exact: Rays) -> tuple[Ints, Ints]:
-    """Indices (found, exact) of each exact ray that has one of its family, and of the nearest of them in time."""
+def nearest(computed: Rays, exact: Rays) -> tuple[Ints, Ints]:
+    """Indices (computed, exact) of each exact ray that has one of its family, and of the nearest of them in time."""
     both = []
     of_family: dict[Family, list[int]] = {}
-    for i, family in enumerate(found.families):
+    for i, family in enumerate(computed.families):
         of_family.setdefault(family, []).append(i)
     for j, family in enumerate(exact.families):
         if family in of_family:
-            late = np.abs(found.travel_time[of_family[family]] - exact.travel_time[j])
+            late = np.abs(computed.travel_time[of_family[family]] - exact.travel_time[j])
             both.append((of_family[family][int(np.argmin(late))], j))
     columns = np.array(both, int).reshape(-1, 2)
     return columns[:, 0], columns[:, 1]
@@ -123,12 +123,12 @@ def worst(error: Floats, bound: Floats) -> tuple[float, float]:
     return float(error[i]), float(bound[i])
 
 
-def errors(found: Rays, exact: Rays, trusted: Bools, bounds: Bounds) -> dict[str, tuple[str, float, float]]:
+def errors(computed: Rays, exact: Rays, trusted: Bools, bounds: Bounds) -> dict[str, tuple[str, float, float]]:
     """Unit, worst error and its bound of each quantity of matched rays; trusted (ray,): not near a caustic."""
-    count = len(found.pair)
-    time = np.abs(found.travel_time - exact.travel_time)
-    angle = np.maximum(np.abs(found.start_angle - exact.start_angle), np.abs(found.end_angle - exact.end_angle))
-    amplitude = np.abs(found.amplitude / exact.amplitude - 1.0)[trusted]
+    count = len(computed.pair)
+    time = np.abs(computed.travel_time - exact.travel_time)
+    angle = np.maximum(np.abs(computed.start_angle - exact.start_angle), np.abs(computed.end_angle - exact.end_angle))
+    amplitude = np.abs(computed.amplitude / exact.amplitude - 1.0)[trusted]
     of_time = np.maximum(bounds.time, bounds.relative_time * exact.travel_time)
     rows = {
         "time": ("s", *worst(time, of_time)),
@@ -137,6 +137,6 @@ def errors(found: Rays, exact: Rays, trusted: Bools, bounds: Bounds) -> dict[str
     }
     counted = exact.caustics >= 0
     if counted.any():
-        wrong = int(np.sum(found.caustics[counted] != exact.caustics[counted]))
+        wrong = int(np.sum(computed.caustics[counted] != exact.caustics[counted]))
         rows["caustics"] = ("wrong", float(wrong), 0.0)
     return rows

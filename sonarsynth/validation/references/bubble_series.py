@@ -92,11 +92,11 @@ def _turn(speed: list[Any], x: Any) -> Any:
 
 def _series(R: Any, v: Any, c: Cavity, slowness: Any) -> list[Any]:
     """Coefficients (order + 2,) of R(t + h) in powers of h."""
-    made = _Parts(R, v, c, slowness)
+    series = _Parts(R, v, c, slowness)
     for k in range(ORDER):
-        made.swell(k + 1)
-        made.r.append(made.bending(k) / ((k + 1) * (k + 2)))
-    return made.r
+        series.swell(k + 1)
+        series.r.append(series.bending(k) / ((k + 1) * (k + 2)))
+    return series.r
 
 
 class _Parts:
@@ -139,8 +139,8 @@ class _Parts:
         self.speed.append(j * self.r[j])
         self.relative.append(_product(self.speed, self.inverse, k))
         self.energy.append(_product(self.speed, self.speed, k))
-        rest = c.vapour_pressure - c.ambient_pressure if k == 0 else 0
-        self.push.append(self.gas[k] - tension * self.inverse[k] - friction * self.relative[k] + rest)
+        static_pressure = c.vapour_pressure - c.ambient_pressure if k == 0 else 0
+        self.push.append(self.gas[k] - tension * self.inverse[k] - friction * self.relative[k] + static_pressure)
         losing = friction * _product(self.relative, self.relative, k)
         self.rate.append(j * (self.gas[j] - tension * self.inverse[j]) + losing)
         sound = _product(self.speed, self.push, k) + _product(self.r, self.rate, k)
@@ -176,5 +176,5 @@ def _as_floats(
         weights.append(np.tile(0.5 * weight * h / panels, panels))
         fastest = max(fastest, float(np.abs(R1).max()))
     times_of, radii, pressures_of = (tuple(map(float, column)) for column in zip(*turns, strict=True))
-    node_of, pressure, weight_of = (np.concatenate(part) for part in (times, pressures, weights))
+    node_of, pressure, weight_of = (np.concatenate(blocks) for blocks in (times, pressures, weights))
     return ExactCollapse(times_of, radii, pressures_of, node_of, pressure, weight_of, fastest, len(pieces))

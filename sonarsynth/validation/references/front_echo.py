@@ -31,6 +31,6 @@ def front_echo(frequency: Floats, away: float, radius: float, fluid: Fluid, soun
     delay = np.arange(count) * (WINDOW / count)
     delay -= np.where(delay > 0.5 * WINDOW, WINDOW, 0.0)
     mirror = -2.0 * radius / sound_speed * np.cos(0.5 * away)
-    kept = np.abs(delay - mirror) < 0.6 * radius / sound_speed
-    front = np.fft.rfft(np.fft.irfft(spectrum, count) * kept)[1 : len(f) + 1] / pulse
+    near = np.abs(delay - mirror) < 0.6 * radius / sound_speed
+    front = np.fft.rfft(np.fft.irfft(spectrum, count) * near)[1 : len(f) + 1] / pulse
     return np.asarray(np.interp(frequency, f, front.real) + 1j * np.interp(frequency, f, front.imag))

@@ -31,4 +31,4 @@ def exact_triangle(corners: Floats, wave: Floats) -> tuple[complex, float]:
 
 
 def _dot(a: list[Any], b: list[Any]) -> Any:
-    return sum(one * other for one, other in zip(a, b, strict=True))
+    return sum(x * y for x, y in zip(a, b, strict=True))

@@ -31,13 +31,13 @@ def amplitudes(law: Scattering, incident: Floats, scattered: Floats, normal: Flo
     Lambert's part of the rest.
     """
     inward, outward = -np.einsum("nx,nx->n", incident, normal), np.einsum("nx,nx->n", scattered, normal)
-    seen = (inward > 0.0) & (outward > 0.0)
+    visible = (inward > 0.0) & (outward > 0.0)
     if isinstance(law, Isotropic):
-        return np.where(seen, law.strength, 0.0)
+        return np.where(visible, law.strength, 0.0)
     assert isinstance(law, MirrorLobe)
     half = scattered - incident
     cosine = np.maximum((inward + outward) / np.maximum(np.linalg.norm(half, axis=1), 1e-300), 1e-9)
     square, slope = cosine**2, law.width / np.sqrt(8.0)
     lobe = np.exp(-(1.0 / square - 1.0) / (2.0 * slope**2)) / (8.0 * np.pi * slope**2 * square**2)
     power = law.reflectivity**2 * lobe + law.diffuse / np.pi * inward * outward
-    return np.where(seen, np.sqrt(area * np.where(seen, power, 0.0)), 0.0)
+    return np.where(visible, np.sqrt(area * np.where(visible, power, 0.0)), 0.0)

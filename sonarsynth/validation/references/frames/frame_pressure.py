@@ -81,12 +81,12 @@ class FramePressure:
         of the frame."""
         out = np.zeros((2, len(sensors), samples))
         for snap in self.frame.moment.snaps:
-            lit = [part for body in self.bodies for part in self._lit(snap, body) if snap.illuminates]
+            lit = [facets for body in self.bodies for facets in self._lit(snap, body) if snap.illuminates]
             for n, sensor in enumerate(sensors):
                 if elements(self.scene.sonar.array).gain[sensor]:
-                    place = elements(self.scene.sonar.array).position[sensor]
-                    out[0, n] += self._signal(snap, self._echoes(lit, place), start, samples)
-                    out[1, n] += self._signal(snap, self._direct(snap, place), start, samples)
+                    position = elements(self.scene.sonar.array).position[sensor]
+                    out[0, n] += self._signal(snap, self._echoes(lit, position), start, samples)
+                    out[1, n] += self._signal(snap, self._direct(snap, position), start, samples)
         return out[0], out[1]
 
     @cached_property
@@ -102,7 +102,7 @@ class FramePressure:
     @cached_property
     def bodies(self) -> tuple[Body, ...]:
         """The targets."""
-        found = []
+        bodies = []
         for number, target in enumerate(self.scene.world.targets):
             mesh = self.scene.mesh_of(number)
             corners = mesh.vertices[mesh.faces]
@@ -112,8 +112,8 @@ class FramePressure:
             size = float(np.linalg.norm(mesh.vertices, axis=1).max())
             solid = Solid(Mover(target.motion, self.frame.time, self.scene.physics.doppler), Surface.of(corners))
             sign = signs(self.scene.laws[number], mesh)
-            found.append(Body(solid, centre, centre + OFF * size * normal, normal, 0.5 * twice, sign, number))
-        return tuple(found)
+            bodies.append(Body(solid, centre, centre + OFF * size * normal, normal, 0.5 * twice, sign, number))
+        return tuple(bodies)
 
     @property
     def solids(self) -> list[Solid]:
@@ -127,7 +127,7 @@ class FramePressure:
 
     def _lit(self, snap: Emission, body: Body) -> list[_LitFacets]:
         """The facets of a body that a snap lights, by each family."""
-        found = []
+        groups = []
         for family in families(self.bounces):
             rows = self._towards(
                 body, np.arange(len(body.centre)), np.full(len(body.centre), snap.time), snap.position, family
@@ -142,66 +142,70 @@ class FramePressure:
             end = np.broadcast_to(snap.position, clear.shape)
             free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, back, time))
             counted = family.bounces - family.ends_at(-snap.position[2], self.water.bottom)
-            found.append(_LitFacets(body, rows[free], time[free], back.select(free), normal[free], family, counted))
-        return found
+            groups.append(_LitFacets(body, rows[free], time[free], back.select(free), normal[free], family, counted))
+        return groups
 
-    def _towards(self, body: Body, rows: np.ndarray, time: Floats, place: Floats, family: Family) -> np.ndarray:
-        """Facets whose outer side may face the image of a place (xyz)."""
+    def _towards(self, body: Body, rows: np.ndarray, time: Floats, position: Floats, family: Family) -> np.ndarray:
+        """Facets whose outer side may face the image of a position (xyz)."""
         point = body.solid.mover.points(body.centre[rows], time)
         normal = body.solid.mover.turned(body.normal[rows], time)
-        image = family.image(np.array([-place[2]]), self.water.bottom)[0]
-        away = np.array([place[0], place[1], -image]) - point
+        image = family.image(np.array([-position[2]]), self.water.bottom)[0]
+        away = np.array([position[0], position[1], -image]) - point
         margin = SLANT if np.ptp(self.water.speed) > 0.0 else 0.05
         return np.asarray(rows[np.einsum("nx,nx->n", normal, away) > -margin * np.linalg.norm(away, axis=1)])
 
-    def _echoes(self, lit: list[_LitFacets], place: Floats) -> list[Contributions]:
+    def _echoes(self, lit: list[_LitFacets], position: Floats) -> list[Contributions]:
         """What one hydrophone hears of the facets."""
-        found = []
-        for part in lit:
-            for family in families(self.bounces - part.counted):
-                found += self._echo(part, place, family)
-        return found
+        contributions = []
+        for facets in lit:
+            for family in families(self.bounces - facets.counted):
+                contributions += self._echo(facets, position, family)
+        return contributions
 
-    def _echo(self, part: _LitFacets, place: Floats, family: Family) -> list[Contributions]:
-        body, mover = part.body, part.body.solid.mover
-        centre = self.sonar.points(place[None], np.zeros(1))[0]
-        some = np.isin(part.row, self._towards(body, part.row, part.time, centre, family))
-        one = part.select(np.flatnonzero(some))
-        point = mover.points(body.centre[one.row], one.time)
-        late, way = arrival_times(self.water, point, one.time, self.sonar, place, family)
-        seen = np.flatnonzero(np.einsum("nx,nx->n", one.normal, way.departure) > 0.0)
-        if not len(seen):
+    def _echo(self, lit: _LitFacets, position: Floats, family: Family) -> list[Contributions]:
+        body, mover = lit.body, lit.body.solid.mover
+        centre = self.sonar.points(position[None], np.zeros(1))[0]
+        facing = np.isin(lit.row, self._towards(body, lit.row, lit.time, centre, family))
+        facets = lit.select(np.flatnonzero(facing))
+        point = mover.points(body.centre[facets.row], facets.time)
+        late, ray = arrival_times(self.water, point, facets.time, self.sonar, position, family)
+        visible = np.flatnonzero(np.einsum("nx,nx->n", facets.normal, ray.departure) > 0.0)
+        if not len(visible):
             return []
-        one, way, late = one.select(seen), way.select(seen), late[seen]
-        end = self.sonar.points(np.broadcast_to(place, (len(seen), 3)), late)
-        clear = mover.points(body.clear[one.row], one.time)
-        free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, way, one.time))
-        one, way, late = one.select(free), way.select(free), late[free]
+        facets, ray, late = facets.select(visible), ray.select(visible), late[visible]
+        end = self.sonar.points(np.broadcast_to(position, (len(visible), 3)), late)
+        clear = mover.points(body.clear[facets.row], facets.time)
+        free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, ray, facets.time))
+        facets, ray, late = facets.select(free), ray.select(free), late[free]
         law = self.scene.laws[body.number]
-        size = amplitudes(law, -one.back.departure, way.departure, one.normal, body.area[one.row])
-        velocity = mover.velocity(body.centre[one.row], one.time)
-        c = self.water.at(-mover.points(body.centre[one.row], one.time)[:, 2])
-        out, away = (np.einsum("nx,nx->n", velocity, x) / c for x in (-one.back.departure, way.departure))
-        size = size * body.sign[one.row] * one.back.spreading * way.spreading
-        return [self._arriving(place, late, size, (1.0 - away) / (1.0 - out), (one.back, one.family), (way, family))]
+        size = amplitudes(law, -facets.back.departure, ray.departure, facets.normal, body.area[facets.row])
+        velocity = mover.velocity(body.centre[facets.row], facets.time)
+        c = self.water.at(-mover.points(body.centre[facets.row], facets.time)[:, 2])
+        out, away = (np.einsum("nx,nx->n", velocity, x) / c for x in (-facets.back.departure, ray.departure))
+        size = size * body.sign[facets.row] * facets.back.spreading * ray.spreading
+        return [
+            self._arriving(
+                position, late, size, (1.0 - away) / (1.0 - out), (facets.back, facets.family), (ray, family)
+            )
+        ]
 
-    def _direct(self, snap: Emission, place: Floats) -> list[Contributions]:
+    def _direct(self, snap: Emission, position: Floats) -> list[Contributions]:
         """What one hydrophone hears without a target."""
-        found, sent = [], np.array([snap.time])
+        contributions, sent = [], np.array([snap.time])
         for family in families(self.bounces):
-            late, way = arrival_times(self.water, snap.position[None], sent, self.sonar, place, family)
-            end = self.sonar.points(place[None], late)
-            if not hidden(self.solids, self.water, snap.position[None], end, way, sent)[0]:
-                found.append(self._arriving(place, late, way.spreading, np.ones(1), (way, family)))
-        return found
+            late, ray = arrival_times(self.water, snap.position[None], sent, self.sonar, position, family)
+            end = self.sonar.points(position[None], late)
+            if not hidden(self.solids, self.water, snap.position[None], end, ray, sent)[0]:
+                contributions.append(self._arriving(position, late, ray.spreading, np.ones(1), (ray, family)))
+        return contributions
 
     def _arriving(
-        self, place: Floats, late: Floats, size: Floats, longer: Floats, *ways: tuple[Rays, Family]
+        self, position: Floats, late: Floats, size: Floats, longer: Floats, *ways: tuple[Rays, Family]
     ) -> Contributions:
         """Rows of paths; longer (path,): of a pulse that leaves the last facet."""
         environment, centre = self.scene.world.environment, self.scene.sonar.band.centre
-        bounced = [reflected(environment, self.water, family, way.cosine, centre) for way, family in ways]
-        last, own = ways[-1][0], np.broadcast_to(place, (len(late), 3))
+        bounced = [reflected(environment, self.water, family, ray.cosine, centre) for ray, family in ways]
+        last, own = ways[-1][0], np.broadcast_to(position, (len(late), 3))
         end = self.sonar.points(own, late)
         slow = last.arrival / self.water.at(-end[:, 2])[:, None]
         along = np.einsum("nx,nx->n", self.sonar.velocity(own, late), slow)
@@ -210,19 +214,19 @@ class FramePressure:
             time=late,
             size=np.prod([v for v, _ in bounced], axis=0) * size,
             longer=longer / (1.0 - along) - 1.0,
-            length=sum(depths(self.water, way) for way, _ in ways),  # type: ignore[arg-type]
+            length=sum(depths(self.water, ray) for ray, _ in ways),  # type: ignore[arg-type]
             delay_std=np.asarray(sum(b for _, b in bounced)),
             face=elements(self.scene.sonar.array).face * face,
         )
 
-    def _signal(self, snap: Emission, found: list[Contributions], start: float, samples: int) -> Floats:
+    def _signal(self, snap: Emission, contributions: list[Contributions], start: float, samples: int) -> Floats:
         """Pressure (sample,) of what arrives."""
         rate, chosen = self.scene.sonar.sampling_frequency, self.scene.sonar.antialias
         pad = int(np.ceil(1.2 * duration(snap, chosen) * rate))
         signal = np.zeros(samples)
-        if not found:
+        if not contributions:
             return signal
-        every = Contributions.join(found)
+        every = Contributions.join(contributions)
         sample = (every.time - start) * rate
         every = every.select(np.flatnonzero((sample > -pad) & (sample < samples + pad)))
         if not len(every.time):
@@ -236,8 +240,8 @@ class FramePressure:
         node, weight = stretches(every.longer)
         total = transfer(every, weight, start + first / rate, step, int(low), self._loss(frequency[low : high + 1]))
         out = np.zeros(len(frequency), complex)
-        for one, of_node in zip(node, total, strict=True):
-            out[low : high + 1] += of_node * spectrum(snap, step, len(frequency), float(one))[low : high + 1]
+        for stretch, of_node in zip(node, total, strict=True):
+            out[low : high + 1] += of_node * spectrum(snap, step, len(frequency), float(stretch))[low : high + 1]
         within = slice(max(first, 0), min(first + length, samples))
         signal[within] = np.fft.irfft(out * passed, length)[within.start - first : within.stop - first] * rate
         return signal

@@ -26,16 +26,16 @@ class Surface:
     def of(corners: Floats) -> Surface:
         """Of triangles (triangle, 3, xyz), sorted along their longest extent."""
         centre = corners.mean(axis=1)
-        parts = [np.arange(len(corners))]
-        while len(parts[0]) > TOGETHER:
+        groups = [np.arange(len(corners))]
+        while len(groups[0]) > TOGETHER:
             halves = []
-            for part in parts:
-                along = np.ptp(centre[part], axis=0).argmax()
-                order = part[np.argsort(centre[part, along], kind="stable")]
+            for group in groups:
+                along = np.ptp(centre[group], axis=0).argmax()
+                order = group[np.argsort(centre[group, along], kind="stable")]
                 halves += [order[: (len(order) + 1) // 2], order[(len(order) + 1) // 2 :]]
-            parts = halves
-        size = len(parts[0])  # shorter ones repeat a triangle
-        rows = np.array([np.resize(part, size) for part in parts if len(part)])
+            groups = halves
+        size = len(groups[0])  # shorter ones repeat a triangle
+        rows = np.array([np.resize(group, size) for group in groups if len(group)])
         grouped = corners[rows]
         middle = 0.5 * (grouped.min(axis=(1, 2)) + grouped.max(axis=(1, 2)))
         radius = np.linalg.norm(grouped - middle[:, None, None], axis=3).max(axis=(1, 2)) * (1.0 + 1e-9)
@@ -47,15 +47,15 @@ class Surface:
         out = np.zeros(len(start), bool)
         along = end - start
         square = np.maximum(np.einsum("nx,nx->n", along, along), 1e-300)
-        part = np.clip(-np.einsum("nx,nx->n", start, along) / square, 0.0, 1.0)
-        nearest = start + part[:, None] * along
+        fraction = np.clip(-np.einsum("nx,nx->n", start, along) / square, 0.0, 1.0)
+        nearest = start + fraction[:, None] * along
         near = np.flatnonzero(np.einsum("nx,nx->n", nearest, nearest) <= self.reach**2)
         if len(near):
-            found = np.zeros(len(near), bool)
+            blocked = np.zeros(len(near), bool)
             size = len(self.corners) // len(self.middle)
             ends = np.ascontiguousarray(start[near]), np.ascontiguousarray(along[near])
-            _meets(*ends, self.corners, self.middle, self.radius, size, found)
-            out[near] = found
+            _meets(*ends, self.corners, self.middle, self.radius, size, blocked)
+            out[near] = blocked
         return out
 
 

@@ -28,7 +28,7 @@ class Mover:
         if self._straight:
             position, rotation, speed = self._line
             return position + (t if self.moves else 0.0 * t)[:, None] * speed, np.broadcast_to(rotation, (len(t), 3, 3))
-        poses = [pose(self.motion, self.instant + float(one)) for one in t]
+        poses = [pose(self.motion, self.instant + float(elapsed)) for elapsed in t]
         return np.array([p.position for p in poses]), np.array([p.rotation for p in poses])
 
     def points(self, body: Floats, time: Floats) -> Floats:

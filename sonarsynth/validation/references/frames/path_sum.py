@@ -32,9 +32,11 @@ class Contributions:
     face: Floats  # (path, 2) s: side of the face times the slowness along either side
 
     @staticmethod
-    def join(some: list[Contributions]) -> Contributions:
+    def join(paths: list[Contributions]) -> Contributions:
         """All rows."""
-        return Contributions(*(np.concatenate([getattr(one, f.name) for one in some]) for f in fields(Contributions)))
+        return Contributions(
+            *(np.concatenate([getattr(block, f.name) for block in paths]) for f in fields(Contributions))
+        )
 
     def select(self, rows: np.ndarray) -> Contributions:
         """Some rows."""
@@ -55,14 +57,14 @@ def stretches(longer: Floats) -> tuple[Floats, Floats]:
     return node, weight
 
 
-def transfer(some: Contributions, weight: Floats, origin: float, step: float, first: int, loss: Floats) -> np.ndarray:
+def transfer(paths: Contributions, weight: Floats, origin: float, step: float, first: int, loss: Floats) -> np.ndarray:
     """Sum (node, bin) at frequencies (first + bin) * step (Hz), delays from `origin` (s) on; loss (bin, 3): absorption
     in dB/m and its first two powers of depth there."""
     out = np.zeros((weight.shape[1], len(loss), 2))
-    delay, bins = np.ascontiguousarray(some.time - origin), np.ascontiguousarray(loss * NEPER)
+    delay, bins = np.ascontiguousarray(paths.time - origin), np.ascontiguousarray(loss * NEPER)
     with np.errstate(divide="ignore"):
         inverse = 1.0 / (np.pi * step * (first + np.arange(len(loss))))
-    _sum(delay, some.size, weight, some.length, some.delay_std, some.face, step, first, bins, inverse, out)
+    _sum(delay, paths.size, weight, paths.length, paths.delay_std, paths.face, step, first, bins, inverse, out)
     return out[..., 0] + 1j * out[..., 1]
 
 
@@ -87,10 +89,10 @@ def _points(time, strength, step, out):  # type: ignore[no-untyped-def] # pragma
 def _sum(delay, size, weight, length, delay_std, face, step, first, loss, inverse, out):  # type: ignore[no-untyped-def] # pragma: no cover
     nodes, bins = out.shape[:2]
     for n in range(len(delay)):
-        one, other = np.pi * step * face[n, 0], np.pi * step * face[n, 1]
-        turn, turn_y, turn_z = np.exp(-2j * np.pi * step * delay[n]), np.exp(1j * one), np.exp(1j * other)
+        phase_y, phase_z = np.pi * step * face[n, 0], np.pi * step * face[n, 1]
+        turn, turn_y, turn_z = np.exp(-2j * np.pi * step * delay[n]), np.exp(1j * phase_y), np.exp(1j * phase_z)
         phasor = size[n] * np.exp(-2j * np.pi * step * first * delay[n])
-        y, z = np.exp(1j * one * first), np.exp(1j * other * first)
+        y, z = np.exp(1j * phase_y * first), np.exp(1j * phase_z * first)
         spread = 0.5 * (2.0 * np.pi * step) ** 2 * delay_std[n]
         flat_y, flat_z = abs(face[n, 0]) < FLAT, abs(face[n, 1]) < FLAT
         for block in range(0, bins, BLOCK):

@@ -18,10 +18,10 @@ MICROPASCAL = 1e-6
 def spectrum(snap: Emission, step: float, bins: int, longer: float = 0.0) -> np.ndarray:
     """Spectrum (bin,) in Pa s, at frequencies bin * step (Hz), of a snap at 1 m that lasts 1 + longer times as long:
     of gain p(t/width), its collapse at 0."""
-    made = snap.model.pulse(0.0, step * bins * snap.width * (1.0 + max(longer, 0.1)))
-    level = 1.0 if snap.source_level is None else MICROPASCAL * 10.0 ** (snap.source_level / 20.0) / made.peak
+    pulse = snap.model.pulse(0.0, step * bins * snap.width * (1.0 + max(longer, 0.1)))
+    level = 1.0 if snap.source_level is None else MICROPASCAL * 10.0 ** (snap.source_level / 20.0) / pulse.peak
     times = snap.width * (1.0 + longer)
-    return snap.gain * level * times * point_spectrum(times * made.time, made.strength, step, bins)
+    return snap.gain * level * times * point_spectrum(times * pulse.time, pulse.strength, step, bins)
 
 
 @lru_cache(maxsize=8)
@@ -36,24 +36,24 @@ def _passed(chosen: Filter) -> tuple[Floats, Floats, float, float]:
     window = 2.0 * half * np.real(np.sinc(argument / (1j * np.pi)))  # sinh x/x
     step = f[1]
     # Simpson's rule at every other sample
-    whole = np.concatenate([[0.0], np.cumsum((window[:-2:2] + 4.0 * window[1:-1:2] + window[2::2]) * step / 3.0)])
-    return f[::2][: len(whole)], whole, low, high
+    integral = np.concatenate([[0.0], np.cumsum((window[:-2:2] + 4.0 * window[1:-1:2] + window[2::2]) * step / 3.0)])
+    return f[::2][: len(integral)], integral, low, high
 
 
 def duration(snap: Emission, chosen: Filter) -> float:
     """How long (s) either side of its collapse a filtered snap lasts at most."""
-    made = snap.model.pulse(0.0, 0.0 if isinstance(chosen, LowPass) else chosen.high)
+    pulse = snap.model.pulse(0.0, 0.0 if isinstance(chosen, LowPass) else chosen.high)
     ringing = (chosen.attenuation - 7.95) / (2.285 * 4.0 * np.pi * chosen.transition)
-    return float(ringing + snap.width * max(-made.start, made.end))
+    return float(ringing + snap.width * max(-pulse.start, pulse.end))
 
 
 def filter_response(chosen: Filter, frequency: Floats) -> Floats:
     """Response (frequency,) of the anti-alias filter: an ideal band through the transform of a Kaiser window, over that
     in the middle of the band."""
-    f, whole, low, high = _passed(chosen)
+    f, integral, low, high = _passed(chosen)
 
     def up_to(x: Floats) -> Floats:
-        return np.asarray(np.sign(x) * np.interp(np.abs(x), f, whole))
+        return np.asarray(np.sign(x) * np.interp(np.abs(x), f, integral))
 
     def band(x: Floats) -> Floats:
         return up_to(x + high) - up_to(x + low) + up_to(x - low) - up_to(x - high)

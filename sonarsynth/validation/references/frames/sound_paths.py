@@ -43,14 +43,14 @@ class Solid:
 def met(water: Water, snap: Floats, sent: float, mover: Mover, body: Floats, family: Family) -> tuple[Floats, Rays]:
     """When (point,) s sound that a snap at a place (xyz) sends at a time meets points of a body (point, xyz), its
     frame, and the rays from there back to the snap; family: as from the points."""
-    there = np.broadcast_to(snap, body.shape)
+    source = np.broadcast_to(snap, body.shape)
     time = np.full(len(body), sent)
     for _ in range(ROUNDS):
-        found = rays(water, mover.points(body, time), there, family)
-        before, time = time, sent + found.time
+        ray = rays(water, mover.points(body, time), source, family)
+        before, time = time, sent + ray.time
         if not mover.velocity(body[:1], time[:1]).any() or not (np.abs(time - before) > SETTLED).any():
             break
-    return time, found
+    return time, ray
 
 
 def arrival_times(
@@ -60,17 +60,17 @@ def arrival_times(
     a place of the sonar (xyz), its frame, and the rays."""
     body, late = np.broadcast_to(hydrophone, point.shape), time.copy()
     for _ in range(ROUNDS):
-        found = rays(water, point, sonar.points(body, late), family)
-        before, late = late, time + found.time
+        ray = rays(water, point, sonar.points(body, late), family)
+        before, late = late, time + ray.time
         if not sonar.velocity(body[:1], late[:1]).any() or not (np.abs(late - before) > SETTLED).any():
             break
-    return late, found
+    return late, ray
 
 
-def hidden(solids: list[Solid], water: Water, start: Floats, end: Floats, way: Rays, time: Floats) -> Bools:
+def hidden(solids: list[Solid], water: Water, start: Floats, end: Floats, ray: Rays, time: Floats) -> Bools:
     """Whether bodies stand in rays from start to end (ray, xyz), at times (ray,); `start` may be moved off a facet."""
     out = np.zeros(len(start), bool)
-    points = _unfolded(water, start, end, way)
+    points = _unfolded(water, start, end, ray)
     for k in range(points.shape[1] - 1):
         a, b = points[:, k], points[:, k + 1]
         low, high = (np.floor(f(a[:, 2], b[:, 2]) / water.bottom).astype(int) for f in (np.minimum, np.maximum))
@@ -91,33 +91,33 @@ def _folded(point: Floats, copy: int, bottom: float) -> Floats:
     return np.column_stack([point[:, :2], -z])
 
 
-def _unfolded(water: Water, start: Floats, end: Floats, way: Rays) -> Floats:
+def _unfolded(water: Water, start: Floats, end: Floats, ray: Rays) -> Floats:
     """Points (ray, point, xyu) along rays, in the unfolded water."""
     level = end[:, :2] - start[:, :2]
     first = np.column_stack([start[:, :2], -start[:, 2]])
-    last = np.column_stack([end[:, :2], way.level[:, 1]])
+    last = np.column_stack([end[:, :2], ray.level[:, 1]])
     if np.ptp(water.speed) == 0.0:
         return np.stack([first, last], axis=1)
     r = np.hypot(level[:, 0], level[:, 1])
-    copies = range(int(np.floor(way.level.min() / water.bottom)) - 1, int(np.floor(way.level.max() / water.bottom)) + 2)
+    copies = range(int(np.floor(ray.level.min() / water.bottom)) - 1, int(np.floor(ray.level.max() / water.bottom)) + 2)
     at, speed = water.unfolded(copies)
     thick = np.diff(at)
     slope = np.where(thick > 0.0, np.diff(speed) / np.where(thick > 0.0, thick, 1.0), 0.0)
-    found, u, sine = [first], way.level[:, 0], way.sine
+    points, u, sine = [first], ray.level[:, 0], ray.sine
     for k in range(CHORDS - 1):
         dx = r * ((k + 1) ** 2 - k**2) / CHORDS**2
         g = slope[np.clip(np.searchsorted(at, u, side="right") - 1, 0, len(slope) - 1)]
-        after = np.clip(sine - way.cosine * g * dx, -1.0, 1.0)
+        after = np.clip(sine - ray.cosine * g * dx, -1.0, 1.0)
         cosines = [np.sqrt(np.maximum(1.0 - s**2, 1e-12)) for s in (sine, after)]
         u, sine = u + dx * (sine + after) / sum(cosines), after
-        found.append(np.column_stack([start[:, :2] + level * ((k + 1) / CHORDS) ** 2, u]))
-    return np.stack([*found, last], axis=1)
+        points.append(np.column_stack([start[:, :2] + level * ((k + 1) / CHORDS) ** 2, u]))
+    return np.stack([*points, last], axis=1)
 
 
-def depths(water: Water, way: Rays) -> Floats:
+def depths(water: Water, ray: Rays) -> Floats:
     """Integrals (ray, 3) of 1, depth and depth squared along rays, in m, m2 and m3, as if they were straight in the
     unfolded water."""
-    a, b = np.minimum(way.level[:, 0], way.level[:, 1]), np.maximum(way.level[:, 0], way.level[:, 1])
+    a, b = np.minimum(ray.level[:, 0], ray.level[:, 1]), np.maximum(ray.level[:, 0], ray.level[:, 1])
     h, total = water.bottom, np.zeros((len(a), 2))
     for copy in range(int(np.floor(a.min(initial=0.0) / h)), int(np.floor(b.max(initial=0.0) / h)) + 1):
         ends = [np.clip(u, copy * h, (copy + 1) * h) for u in (a, b)]
@@ -127,4 +127,4 @@ def depths(water: Water, way: Rays) -> Floats:
     level = np.mod(a, 2.0 * h)
     level = np.where(level > h, 2.0 * h - level, level)
     total = np.where((b > a)[:, None], total, np.column_stack([level, level**2]))
-    return way.length[:, None] * np.column_stack([np.ones(len(a)), total])
+    return ray.length[:, None] * np.column_stack([np.ones(len(a)), total])

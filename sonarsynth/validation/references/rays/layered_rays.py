@@ -86,10 +86,10 @@ def rays(water: Water, start: Floats, end: Floats, family: Family) -> Rays:
     first = -start[:, 2]
     last = family.image(-end[:, 2], water.bottom)
     if np.ptp(water.speed) == 0.0:
-        p, slope, found = _straight(water, r, first, last)
+        p, slope, sums = _straight(water, r, first, last)
     else:
-        p, slope, found = _bent(water, r, first, last)
-    time, length, spreading = found
+        p, slope, sums = _bent(water, r, first, last)
+    time, length, spreading = sums
     c1, c2 = water.at(first), water.at(-end[:, 2])
     level = away / r[:, None]
     fold = -1.0 if family.bounces % 2 else 1.0

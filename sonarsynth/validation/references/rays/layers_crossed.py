@@ -107,9 +107,9 @@ def crossed(water: Water, first: Floats, last: Floats) -> Crossed:
     level, speed = water.unfolded(copies)
     thick = np.diff(level)
     slope = np.where(thick > 0.0, np.diff(speed) / np.where(thick > 0.0, thick, 1.0), 0.0)
-    some = np.flatnonzero((thick > 0.0) & (level[1:] > low.min()) & (level[:-1] < high.max()))
-    top, under = (np.clip(level[None, some + n], low[:, None], high[:, None]) for n in (0, 1))
-    c_top, c_under = (speed[some] + slope[some] * (z - level[some]) for z in (top, under))
+    layers = np.flatnonzero((thick > 0.0) & (level[1:] > low.min()) & (level[:-1] < high.max()))
+    top, under = (np.clip(level[None, layers + n], low[:, None], high[:, None]) for n in (0, 1))
+    c_top, c_under = (speed[layers] + slope[layers] * (z - level[layers]) for z in (top, under))
     in_it = under > top
     c_low, c_high = (np.interp(z, level, speed) for z in (low, high))
     inner = np.where(in_it, np.maximum(c_top, c_under), 0.0).max(axis=1, initial=0.0)

@@ -40,18 +40,18 @@ class Layers:
 
     def down(self, top: Any, bottom: Any) -> list[tuple[Any, Any, Any]]:
         """(thickness, speed above, speed below) of what lies between two depths, jumps inside as layers of none."""
-        made = []
+        layers = []
         for i in range(len(self.nodes) - 1):
             (za, ca), (zb, cb) = self.nodes[i], self.nodes[i + 1]
             if za == zb:
                 if top < za < bottom:
-                    made.append((za - za, ca, cb))
+                    layers.append((za - za, ca, cb))
                 continue
             low, high = max(za, top), min(zb, bottom)
             if low < high:
                 gradient = (cb - ca) / (zb - za)
-                made.append((high - low, ca + gradient * (low - za), ca + gradient * (high - za)))
-        return made
+                layers.append((high - low, ca + gradient * (low - za), ca + gradient * (high - za)))
+        return layers
 
 
 @dataclass(frozen=True)
@@ -120,8 +120,8 @@ class Course:
         return total, upper * (not turns_above), lower * (not turns_below), turning
 
 
-def exact_rays(water: Layers, found: Rays, slowness: Floats, start: Floats, end: Floats, distance: Floats) -> Rays:
-    """The rays near those found, to more digits than float64 has; NaN where there is none near by.
+def exact_rays(water: Layers, computed: Rays, slowness: Floats, start: Floats, end: Floats, distance: Floats) -> Rays:
+    """The rays near those computed, to more digits than float64 has; NaN where there is none near by.
 
     Newton's iteration of X(p) = R from the slowness (ray,) s/m of each ray, its launch direction and its number of
     vertices; ends start, end (pair,) m at distances (pair,) m.
@@ -130,18 +130,18 @@ def exact_rays(water: Layers, found: Rays, slowness: Floats, start: Floats, end:
 
     rows = []
     with mp.workdps(DIGITS):
-        for i, pair in enumerate(found.pair):
+        for i, pair in enumerate(computed.pair):
             a, b, far = (mp.mpf(float(v[pair])) for v in (start, end, distance))
             top, bottom, bottom_depth = min(a, b), max(a, b), water.nodes[-1][0]
             above = [(dz, below, over) for dz, over, below in reversed(water.down(mp.mpf(0), top))]
             course = Course(above, water.down(top, bottom), water.down(bottom, bottom_depth))
-            ways = (a > b, a <= b, bool(found.start_angle[i] < 0), int(found.vertices[i]))
+            ways = (a > b, a <= b, bool(computed.start_angle[i] < 0), int(computed.vertices[i]))
             c = [_speed(course, low, water) for low in ways[:2]]
             rows.append(_ray(course, mp.mpf(float(slowness[i])), far, ways, c))
     columns = np.array(rows, float).reshape(-1, 7).T
     surface, bottom, turning = (np.nan_to_num(columns[k], nan=-1.0).astype(int) for k in (4, 5, 6))
     time, first, last, amplitude = columns[:4]
-    return Rays(found.pair, time, first, last, amplitude, surface, bottom, turning, np.full(len(found.pair), -1))
+    return Rays(computed.pair, time, first, last, amplitude, surface, bottom, turning, np.full(len(computed.pair), -1))
 
 
 def _speed(course: Course, low: bool, water: Layers) -> Any:
@@ -170,5 +170,5 @@ def _ray(course: Course, p: Any, far: Any, ways: tuple[bool, bool, bool, int], c
     amplitude = mp.sqrt(p * c[0] * c[1] / (far * abs(total.slope) * sines[0] * sines[1]))
     first = -1 if ways[2] else 1
     last = first * (-1) ** ways[3]
-    angles = [way * mp.atan2(sine, cosine) for way, sine, cosine in zip((first, last), sines, cosines, strict=True)]
+    angles = [sign * mp.atan2(sine, cosine) for sign, sine, cosine in zip((first, last), sines, cosines, strict=True)]
     return [float(v) for v in (total.time, *angles, amplitude, surface, bottom, turning)]

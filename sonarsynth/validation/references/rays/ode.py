@@ -97,12 +97,12 @@ def _cross(depth: Floats, speed: Floats, layer: int, state: Floats, distance: fl
     bend = slopes(0.0, state)[2]
     longest = 100.0 * (distance - state[0] + base - top)
     level = abs(state[2] / bend) if state[2] * bend < 0.0 else np.inf  # p c' is the same all along an arc
-    way = solve_ivp(
+    solution = solve_ivp(
         slopes, (0.0, min(longest, level)), state, events=stops, method="DOP853", rtol=TOLERANCE, atol=1e-14
     )
-    met = [(times[0], i) for i, times in enumerate(way.t_events) if len(times)]
+    met = [(times[0], i) for i, times in enumerate(solution.t_events) if len(times)]
     if not met:
-        exact = way.y[:, -1].copy()
+        exact = solution.y[:, -1].copy()
         exact[2] = 0.0
         return exact, TURN
     length, which = min(met)
@@ -119,20 +119,20 @@ def _stop(function: Callable[[float, Floats], float], direction: int) -> Callabl
     return function
 
 
-def followed_rays(depth: Floats, speed: Floats, found: Rays, start: Floats, end: Floats, distance: Floats) -> Rays:
-    """The rays near those found, with the vertices that they meet; NaN where there is none near by.
+def followed_rays(depth: Floats, speed: Floats, computed: Rays, start: Floats, end: Floats, distance: Floats) -> Rays:
+    """The rays near those computed, with the vertices that they meet; NaN where there is none near by.
 
     Newton's iteration of the miss in depth from the launch angle of each ray (ray,); ends start, end (pair,) m at
     distances (pair,) m, not within one layer's rounding of a node.
     """
     rows = []
-    for pair, angle in zip(found.pair, -found.start_angle, strict=True):
+    for pair, angle in zip(computed.pair, -computed.start_angle, strict=True):
         ends = (float(start[pair]), float(end[pair]), float(distance[pair]))
         rows.append(_shoot(depth, speed, float(angle), *ends))
     columns = np.array(rows, float).reshape(-1, 7).T
     time, first, last, amplitude = columns[:4]
     surface, bottom, turning = (columns[k].astype(int) for k in (4, 5, 6))
-    return Rays(found.pair, time, first, last, amplitude, surface, bottom, turning, np.full(len(found.pair), -1))
+    return Rays(computed.pair, time, first, last, amplitude, surface, bottom, turning, np.full(len(computed.pair), -1))
 
 
 def _shoot(depth: Floats, speed: Floats, angle: float, start: float, end: float, distance: float) -> list[float]:

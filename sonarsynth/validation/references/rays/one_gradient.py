@@ -45,8 +45,8 @@ def gradient_rays(water: Gradient, start: Floats, end: Floats, distance: Floats,
             r = mp.mpf(float(far))
             rows += [(pair, 0, *ray) for ray in _unreflected(mp, g, y1, y2, r, fastest)]
             for count in range(1, (vertices + 1) // 2 + 1):
-                found = _reflected(mp, g, y1, y2, r, slowest, fastest, count)
-                rows += [(pair, count, *ray) for ray in found]
+                reflected = _reflected(mp, g, y1, y2, r, slowest, fastest, count)
+                rows += [(pair, count, *ray) for ray in reflected]
     columns = np.array(rows, float).reshape(-1, 8).T
     pair, bounces, turning = (columns[i].astype(int) for i in (0, 1, 2))
     up = 1.0 if water.slope > 0 else -1.0  # towards the boundary of slower water
@@ -64,10 +64,10 @@ def _unreflected(mp: Any, g: Any, y1: Any, y2: Any, r: Any, fastest: Any) -> lis
     turning = int(0 < centre < r)
     if turning and radius > fastest:
         return []
-    legs = [(mp.hypot(r, y2 - y1), y1, y2)]
+    arcs = [(mp.hypot(r, y2 - y1), y1, y2)]
     arrival = r - centre
     spread = 1 / centre + 1 / arrival  # dX/dradius over the radius
-    return [_ray(mp, g, radius, turning, legs, (-centre, arrival), y=(y1, y2), r=r, spread=spread)]
+    return [_ray(mp, g, radius, turning, arcs, (-centre, arrival), y=(y1, y2), r=r, spread=spread)]
 
 
 def _reflected(
@@ -96,11 +96,11 @@ def _reflected(
                 turning = n - 1 + (e1 > 0) + (e2 > 0)
                 if turning and radius > fastest:
                     continue
-                legs = [(mp.hypot(x1, y1 - slowest), y1, slowest), (mp.hypot(x2, y2 - slowest), y2, slowest)]
-                legs += [(2 * h, slowest, slowest)] * (n - 1)
+                arcs = [(mp.hypot(x1, y1 - slowest), y1, slowest), (mp.hypot(x2, y2 - slowest), y2, slowest)]
+                arcs += [(2 * h, slowest, slowest)] * (n - 1)
                 spread = 2 * n / h + e1 / roots[0] + e2 / roots[1]
                 offsets = (-e1 * roots[0], e2 * roots[1])
-                rays.append(_ray(mp, g, radius, turning, legs, offsets, y=(y1, y2), r=r, spread=spread))
+                rays.append(_ray(mp, g, radius, turning, arcs, offsets, y=(y1, y2), r=r, spread=spread))
     return rays
 
 
@@ -124,13 +124,13 @@ def _roots(mp: Any, coefficients: list[Any], scale: Any) -> list[Any]:
 
 
 def _ray(
-    mp: Any, g: Any, radius: Any, turning: int, legs: list[Any], offsets: Any, *, y: Any, r: Any, spread: Any
+    mp: Any, g: Any, radius: Any, turning: int, arcs: list[Any], offsets: Any, *, y: Any, r: Any, spread: Any
 ) -> tuple[Any, ...]:
     """(turning, time, start angle, end angle, amplitude, radius); offsets: of the ends from their circle's centre.
 
     Angles of travel towards slower water. X depends on the radius as dX/dradius = radius * spread, p = 1/(g radius).
     """
-    time = sum(2 / g * mp.asinh(s / (2 * mp.sqrt(ya * yb))) for s, ya, yb in legs)
+    time = sum(2 / g * mp.asinh(s / (2 * mp.sqrt(ya * yb))) for s, ya, yb in arcs)
     first, last = mp.atan2(offsets[0], y[0]), mp.atan2(offsets[1], y[1])
     over_p = radius * abs(spread) * g * radius**2  # |dX/dp|
     sines = abs(offsets[0] * offsets[1]) / radius**2

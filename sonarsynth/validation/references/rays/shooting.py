@@ -79,8 +79,8 @@ def fly(water: Smooth, start: float, launch: Floats, distance: float, tolerance:
 
     first = np.concatenate([np.full(count, start), launch, np.zeros(2 * count), np.ones(count)])
     scale = np.repeat([1.0, 1e-2, distance / 1500.0, distance, 1.0], count)
-    way = solve_ivp(slopes, (0.0, distance), first, method="DOP853", rtol=tolerance, atol=tolerance * scale)
-    z, t, time, stretch, _ = way.y.reshape(5, count, -1)
+    solution = solve_ivp(slopes, (0.0, distance), first, method="DOP853", rtol=tolerance, atol=tolerance * scale)
+    z, t, time, stretch, _ = solution.y.reshape(5, count, -1)
     lost = (z <= 0.0).any(axis=1) | (z >= water.bottom_depth).any(axis=1)
     turning = np.sum(np.signbit(t[:, 1:]) != np.signbit(t[:, :-1]), axis=1)
     caustics = np.sum(np.signbit(stretch[:, 2:]) != np.signbit(stretch[:, 1:-1]), axis=1)
@@ -102,8 +102,8 @@ def shooting_rays(
         miss = fan.depth - end
         with np.errstate(invalid="ignore"):
             crossed = np.flatnonzero(miss[1:] * miss[:-1] < 0)
-        part = miss[crossed] / (miss[crossed] - miss[crossed + 1])
-        roots.append(launch[crossed] + part * (launch[crossed + 1] - launch[crossed]))
+        fraction = miss[crossed] / (miss[crossed] - miss[crossed + 1])
+        roots.append(launch[crossed] + fraction * (launch[crossed + 1] - launch[crossed]))
         pairs.append(np.full(len(crossed), i))
     pair, angle = np.concatenate(pairs), np.concatenate(roots)
     flight = fly(water, start, angle, distance, TOLERANCE)

@@ -54,7 +54,7 @@ def _pair(
         def legs(share: Floats, slow: float = slow, fast: float = fast) -> tuple[Floats, ...]:
             """Range (p,) of the three parts of a course at slownesses 1/slow - share (1/slow - 1/fast)."""
             off = share * (1.0 - slow / fast)  # p = (1 - off)/slow
-            return tuple(_range(off, slow, fast, *part) for part in (up, middle, down))
+            return tuple(_range(off, slow, fast, *layers) for layers in (up, middle, down))
 
         above, between, below = legs(FAN)
         turns = bool((up[1] >= fast).any()), bool((down[1] >= fast).any())
@@ -93,8 +93,8 @@ def _range(off: Floats, slow: float, fast: float, depth: Floats, speed: Floats) 
     pace = (1.0 - off) / slow
 
     def sine(c: float) -> Floats:
-        left = (slow - c) / slow + off * (c / slow)  # 1 - p c
-        return np.asarray(np.sqrt(np.maximum(left * (1.0 + pace * c), 1e-300)))
+        complement = (slow - c) / slow + off * (c / slow)  # 1 - p c
+        return np.asarray(np.sqrt(np.maximum(complement * (1.0 + pace * c), 1e-300)))
 
     s1 = sine(float(speed[0]))
     for dz, c1, c2 in zip(np.abs(np.diff(depth)), speed[:-1], speed[1:], strict=True):
@@ -106,8 +106,8 @@ def _range(off: Floats, slow: float, fast: float, depth: Floats, speed: Floats) 
     return total
 
 
-def _total(weight: tuple[int, int, int], legs: tuple[Floats, ...]) -> Floats:
-    return np.asarray(sum(w * leg for w, leg in zip(weight, legs, strict=True) if w))
+def _total(weight: tuple[int, int, int], ranges: tuple[Floats, ...]) -> Floats:
+    return np.asarray(sum(w * distance for w, distance in zip(weight, ranges, strict=True) if w))
 
 
 def _changes(miss: Floats) -> int:
