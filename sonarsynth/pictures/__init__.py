@@ -91,8 +91,10 @@ def show(
             say(f"film: {len(filmed)} of {len(frames)} frames")
         in_order = [read[i] for i in filmed]
         common = _reference(in_order) if scale == "common" else None
-        each = zip(in_order, earlier_points(in_order), strict=True)
-        views = [replace(_view(tree, one, common or _reference([one])), earlier=before) for one, before in each]
+        histories = zip(in_order, earlier_points(in_order), strict=True)
+        views = [
+            replace(_view(tree, stored, common or _reference([stored])), earlier=before) for stored, before in histories
+        ]
         of = "all frames" if common else "each frame"
         picture = FramePicture(
             *beam_grid(tree), window(views), f"beams and points: energy re the brightest beam of {of} (dB)"
@@ -104,14 +106,14 @@ def show(
 def earlier_points(frames: list[StoredFrame]) -> Iterator[Floats]:
     """For each frame the points (point, xyz) of those before it on targets, carried along with these, in
     its sonar frame."""
-    found: dict[int, list[Floats]] = {}
+    earlier: dict[int, list[Floats]] = {}
     for frame in frames:
         poses = {t: pose for t, pose in enumerate(frame.poses) if np.isfinite(pose.position).all()}
-        carried = [frame.sonar.to_body(poses[t].to_world(np.concatenate(found[t]))) for t in found if t in poses]
+        carried = [frame.sonar.to_body(poses[t].to_world(np.concatenate(earlier[t]))) for t in earlier if t in poses]
         yield np.concatenate([np.zeros((0, 3)), *carried])
         for t, pose in poses.items():
             if (own := (frame.point_target == t) & np.isfinite(frame.range_error)).any():
-                found.setdefault(t, []).append(pose.to_body(frame.sonar.to_world(frame.points[own])))
+                earlier.setdefault(t, []).append(pose.to_body(frame.sonar.to_world(frame.points[own])))
 
 
 def _interest(frame: StoredFrame) -> tuple[int, int]:
@@ -150,10 +152,10 @@ def _view(tree: xr.DataTree, frame: StoredFrame, reference: float) -> View:
 
 def _snr(tree: xr.DataTree, frame: StoredFrame) -> str:
     """The signal-to-noise ratios of the targets of a frame, for its title: of the loudest three."""
-    found = read(tree, "truth/targets/snr")
-    if found is None:
+    stored = read(tree, "truth/targets/snr")
+    if stored is None:
         return ""
-    snr, names = found[frame.index], needed(tree, "truth/targets/target")
+    snr, names = stored[frame.index], needed(tree, "truth/targets/target")
     loud = [n for n in np.argsort(-np.nan_to_num(snr, nan=-np.inf))[:3] if np.isfinite(snr[n])]
     return "   snr " + ", ".join(f"{names[n]} {round(float(snr[n]))} dB" for n in loud) if loud else ""
 
@@ -172,7 +174,7 @@ def _write_sheet(
         say("sheet: without beam signals, for no beam of the frame points at a target")
     errors = Errors(points=frame.points, error=frame.range_error)
     view = frame_view(tree, frame)
-    made = sheet(*beam_grid(tree), view, errors, loudest_of_beams, window([view]), "energy re the brightest beam (dB)")
+    fig = sheet(*beam_grid(tree), view, errors, loudest_of_beams, window([view]), "energy re the brightest beam (dB)")
     path = folder / "sheet.png"
-    made.savefig(path)
+    fig.savefig(path)
     return path

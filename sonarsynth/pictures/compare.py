@@ -135,11 +135,11 @@ def moment(trees: Sequence[xr.DataTree], references: Sequence[float | None], fra
     return Moment("\n".join([f"frame {frame}", *clock, *([why] if why else [])]), tuple(panels))
 
 
-def _alike(some: tuple[Hull, ...], others: tuple[Hull, ...]) -> bool:
+def _alike(hulls: tuple[Hull, ...], others: tuple[Hull, ...]) -> bool:
     """Whether hulls are the same bodies in the same places."""
-    return len(some) == len(others) and all(
+    return len(hulls) == len(others) and all(
         np.array_equal(a.faces, b.faces) and np.array_equal(a.vertices, b.vertices)
-        for a, b in zip(some, others, strict=True)
+        for a, b in zip(hulls, others, strict=True)
     )
 
 
@@ -161,15 +161,15 @@ def _common(
                 f"{path}: its beams ({_grid(tree)}) are not those of {paths[0]} ({_grid(trees[0])}), "
                 "so they cannot be compared"
             )
-    each = [built(tree) for tree in trees]
-    common: list[int] = reduce(np.intersect1d, each).tolist()
+    available = [built(tree) for tree in trees]
+    common: list[int] = reduce(np.intersect1d, available).tolist()
     if not common:
         raise NothingToDraw(f"{' and '.join(map(str, paths))}: no frame has been built in all of them")
     if frame is not None and frame not in common:
         raise NothingToDraw(
             f"frame {frame} has not been built in all stores; {len(common)} are, {common[0]} to {common[-1]}"
         )
-    if any(len(some) > len(common) for some in each):
+    if any(len(frames) > len(common) for frames in available):
         say(f"only the {len(common)} frames that all stores have")
     return common
 

@@ -121,6 +121,6 @@ def _palette() -> Image:
     blend = np.linspace(0.0, 1.0, 8)[:, None]
     mixed = [(1 - blend) * to_rgb(BACKDROP) + blend * to_rgb(colour) for colour in OUTLINES]
     table = np.round(255 * np.concatenate([energy, greys, *mixed, [to_rgb(BACKDROP)]])).astype(np.uint8)
-    made = Image.new("P", (1, 1))
-    made.putpalette(table.tobytes())
-    return made
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(table.tobytes())
+    return palette

@@ -75,7 +75,7 @@ class RayLine:
         lists = {n: getattr(self, n).tolist() for n in ("position", "time", "length")}
         angles = [_number(a) for a in self.elevation]
         single = {n: _number(getattr(self, n)) for n in ("transmission_loss", "level", "coefficient")}
-        counts = {what: sum(e == what for e in self.event) for what in ("surface", "bottom", "turning point", "facet")}
+        counts = {kind: sum(e == kind for e in self.event) for kind in ("surface", "bottom", "turning point", "facet")}
         return {
             "name": self.name,
             "family": self.family,
@@ -100,16 +100,16 @@ def fan_lines(rays: RayFan) -> list[RayLine]:
     """The rays of a fan."""
     lines = []
     for n in range(int(rays.ray.max()) + 1):
-        mine = rays.ray == n
+        own = rays.ray == n
         lines.append(
             RayLine(
                 name=f"ray {n} of the fan",
                 family=FAN,
-                position=rays.position[mine],
-                direction=rays.direction[mine],
-                time=rays.time[mine],
-                length=rays.length[mine],
-                event=tuple(EVENTS[e] for e in rays.event[mine]),
+                position=rays.position[own],
+                direction=rays.direction[own],
+                time=rays.time[own],
+                length=rays.length[own],
+                event=tuple(EVENTS[e] for e in rays.event[own]),
                 caustics=0,
                 transmission_loss=np.nan,
                 level=np.nan,
@@ -142,16 +142,16 @@ def eigenray_lines(plan: Plan, frame: Frame, request: EigenrayRequest) -> list[R
     targets = _aims(frame, request)
     pairs = [(s, array) for s in snaps.values()]
     pairs += [pair for _, aim in targets for pair in [(aim, array), *((s, aim) for s in snaps.values())]]
-    legs = dict(zip(pairs, _legs(plan, frame.moment.bodies, request.vertices, pairs), strict=True))
+    eigenrays = dict(zip(pairs, _legs(plan, frame.moment.bodies, request.vertices, pairs), strict=True))
     lines = []
     for n, snap in snaps.items():
-        ways = {f"snap {n} to array": legs[snap, array]}
+        ways = {f"snap {n} to array": eigenrays[snap, array]}
         for name, aim in targets:
-            both = [(a, b) for a in legs[snap, aim] for b in legs[aim, array]]
+            both = [(a, b) for a in eigenrays[snap, aim] for b in eigenrays[aim, array]]
             echoes = [_joined(a, b) for a, b in both if _bends(a) + _bends(b) <= request.vertices]
             ways[f"snap {n} to {name} to array"] = sorted(echoes, key=lambda e: float(e.time[-1]))
-        for name, found in ways.items():
-            lines += [replace(ray, name=name, level=float(levels[n]) - ray.transmission_loss) for ray in found]
+        for name, rays in ways.items():
+            lines += [replace(ray, name=name, level=float(levels[n]) - ray.transmission_loss) for ray in rays]
     return lines
 
 
@@ -162,10 +162,10 @@ def _aims(frame: Frame, request: EigenrayRequest) -> list[tuple[str, _End]]:
         if request.targets == "centre":
             aims.append((body.name, _End(body.pose.to_world(body.mesh.box.mean(axis=0)), body)))
             continue
-        place = body.pose.to_world(body.mesh.centroid)
-        facet = int(np.linalg.norm(place - frame.sonar_pose.position, axis=1).argmin())
+        points = body.pose.to_world(body.mesh.centroid)
+        facet = int(np.linalg.norm(points - frame.sonar_pose.position, axis=1).argmin())
         clear = OFFSET * body.mesh.radius * body.pose.turn_to_world(body.mesh.normal[facet])
-        aims.append((body.name, _End(place[facet] + clear)))
+        aims.append((body.name, _End(points[facet] + clear)))
     return aims
 
 
@@ -175,17 +175,17 @@ def _legs(
     """The eigenrays of each pair, as lines that have no name yet."""
     environment = plan.scene.world.environment
     layers = water(plan.profile.depth, plan.profile.speed, environment.depth)
-    start, end = (np.array([pair[side].position for pair in pairs]) for side in (0, 1))
+    start, end = (np.array([pair[index].position for pair in pairs]) for index in (0, 1))
     distance = np.hypot(*(end - start)[:, :2].T)
     rays = eigenrays(layers, depth(start), depth(end), distance, vertices, vertices)
     lines = polylines(layers, start, end, rays, sagitta=1e-4 * environment.depth)
     loss = _transmission_loss(plan, layers, rays, depth(start), depth(end))
     row = np.searchsorted(lines.ray, np.arange(len(rays.pair) + 1))
-    made: list[list[RayLine]] = [[] for _ in pairs]
+    by_pair: list[list[RayLine]] = [[] for _ in pairs]
     for i, pair in enumerate(rays.pair):
         others = tuple(b for b in bodies if all(b is not e.inside for e in pairs[pair]))
-        made[pair].append(_leg(lines, slice(row[i], row[i + 1]), rays, i, float(loss[i]), others))
-    return made
+        by_pair[pair].append(_leg(lines, slice(row[i], row[i + 1]), rays, i, float(loss[i]), others))
+    return by_pair
 
 
 def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays, start: Floats, end: Floats) -> Floats:
@@ -209,21 +209,21 @@ def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays, start: Floats
 
 
 def _leg(
-    lines: Polylines, mine: slice, rays: Eigenrays, i: int, loss: float, others: tuple[PlacedTarget, ...]
+    lines: Polylines, span: slice, rays: Eigenrays, i: int, loss: float, others: tuple[PlacedTarget, ...]
 ) -> RayLine:
     """Eigenray i as a line; others: the bodies that may hide it."""
-    position = lines.position[mine]
+    position = lines.position[span]
     hidden = bool(occluded(others, position[:-1], position[1:]).any())
-    length = lines.length[mine]
+    length = lines.length[span]
     at_end = len(length) > 2 and (length[1] == 0.0 or length[-1] == length[-2])
     return RayLine(
         name="",
         family=_family(bool(rays.surface[i]), bool(rays.bottom[i])),
         position=position,
-        direction=lines.direction[mine],
-        time=lines.time[mine],
+        direction=lines.direction[span],
+        time=lines.time[span],
         length=length,
-        event=tuple(EVENTS[e] for e in lines.event[mine]),
+        event=tuple(EVENTS[e] for e in lines.event[span]),
         caustics=int(rays.caustics[i]),
         transmission_loss=loss,
         level=np.nan,

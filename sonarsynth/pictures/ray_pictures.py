@@ -88,8 +88,8 @@ def show_rays(plan: Plan, index: int, out: Path) -> tuple[list[Path], str]:
     section_figure(f"{title}: {every}", rays, looks, depth, speed, geometry).savefig(files[0])
     met = [i for i, look in enumerate(looks) if look.family != FAN or np.isfinite(look.coefficient)]
     shown = met if any(look.family == FAN for look in (looks[i] for i in met)) else range(len(looks))
-    some = every if len(shown) == len(rays) else f"{len(shown)} of {every}, sent on from a target"
-    space = space_figure(f"{title}: {some}", [rays[i] for i in shown], [looks[i] for i in shown], geometry)
+    described = every if len(shown) == len(rays) else f"{len(shown)} of {every}, sent on from a target"
+    space = space_figure(f"{title}: {described}", [rays[i] for i in shown], [looks[i] for i in shown], geometry)
     space.savefig(files[1], bbox_inches="tight", pad_inches=0.1)
     files[2].write_text(page(value, looks, geometry), encoding="utf-8")
     files[3].write_text(json.dumps(value, allow_nan=False) + "\n", encoding="ascii")
@@ -118,7 +118,7 @@ def as_json(plan: Plan, frame: Frame, lines: Sequence[RayLine], geometry: SceneG
         "units": UNITS,
         "bottom": bottom,
         "profile": {"depth": layers.depth.tolist(), "speed": layers.speed.tolist()},
-        "places": {name: place.tolist() for name, place in places.items()},
+        "places": {name: position.tolist() for name, position in places.items()},
         "bearing": geometry.bearing,
         "hydrophones": geometry.sensors.tolist(),
         "tracks": {name: track.tolist() for name, track in geometry.tracks.items()},
@@ -129,10 +129,10 @@ def as_json(plan: Plan, frame: Frame, lines: Sequence[RayLine], geometry: SceneG
 
 def table(lines: Sequence[RayLine]) -> str:
     """The eigenrays, a line each, and a line about the fan."""
-    found = [line for line in lines if line.family != FAN]
+    eigenrays = [line for line in lines if line.family != FAN]
     fan = [line for line in lines if line.family == FAN]
-    rows: list[tuple[str, ...]] = [HEADINGS] if found else []
-    for line in found[:LONGEST_TABLE]:
+    rows: list[tuple[str, ...]] = [HEADINGS] if eigenrays else []
+    for line in eigenrays[:LONGEST_TABLE]:
         ends = np.rad2deg(line.elevation[[0, -1]])
         numbers = [1e3 * line.time[-1], *ends, line.length[-1], line.transmission_loss]
         texts = [f"{number:.{digits}f}" for number, digits in zip(numbers, (4, 3, 3, 3, 1), strict=True)]
@@ -140,9 +140,9 @@ def table(lines: Sequence[RayLine]) -> str:
         rows.append((line.name, line.family, line.vertices, *texts, str(line.caustics), flags))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     texts = ["  ".join(_aligned(row, widths)).rstrip() for row in rows]
-    if len(found) > LONGEST_TABLE:
-        texts.append(f"... and {len(found) - LONGEST_TABLE} more, in rays.json")
-    if found:
+    if len(eigenrays) > LONGEST_TABLE:
+        texts.append(f"... and {len(eigenrays) - LONGEST_TABLE} more, in rays.json")
+    if eigenrays:
         texts.append("vertices: S surface, B bottom, T turning point, X target; angles of the ray, up positive")
         texts.append("set rays.eigenrays.vertices to change the maximum number of vertices")
         texts.append("TL at the centre of the band; for an echo: two-way, with a target strength of 0 dB")

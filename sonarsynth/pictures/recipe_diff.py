@@ -43,13 +43,13 @@ def names_of(recipes: Sequence[str], otherwise: Sequence[str]) -> list[str]:
     do not differ, and behind names that two stores share.
     """
     plain = [_plain(text) for text in recipes]
-    found = _differences(dict(enumerate(plain)), (), [_loaded(text) for text in recipes])
-    told = [d for d in found if d.path[0] not in WORDLESS] or [d for d in found if d.path[0] == "title"]
-    said = [_said(told, store) for store in range(len(recipes))]
-    shared = Counter(said)
+    differences = _differences(dict(enumerate(plain)), (), [_loaded(text) for text in recipes])
+    told = [d for d in differences if d.path[0] not in WORDLESS] or [d for d in differences if d.path[0] == "title"]
+    descriptions = [_said(told, store) for store in range(len(recipes))]
+    shared = Counter(descriptions)
     return [
-        other if not words else f"{words} ({other})" if shared[words] > 1 else words
-        for words, other in zip(said, otherwise, strict=True)
+        fallback if not words else f"{words} ({fallback})" if shared[words] > 1 else words
+        for words, fallback in zip(descriptions, otherwise, strict=True)
     ]
 
 
@@ -77,19 +77,19 @@ def _field(path: tuple[str, ...], others: Sequence[tuple[str, ...]], kinds: Sequ
 def _differences(values: Mapping[int, Any], path: tuple[str, ...], recipes: Sequence[Any]) -> list[Difference]:
     """Differences of values (by store) at a path; stores that differ in form are told apart by it, and no further."""
     forms = {store: _form(value) for store, value in values.items()}
-    found = []
+    differences = []
     if len(set(forms.values())) > 1:
-        said = {store: _value(value, path, recipes[store]) for store, value in values.items()}
+        texts = {store: _value(value, path, recipes[store]) for store, value in values.items()}
         kinds = any(form[0] == "fields" for form in forms.values())
-        found.append(Difference(path or ("recipe",), kinds, said))
+        differences.append(Difference(path or ("recipe",), kinds, texts))
     for form in dict.fromkeys(forms.values()):
         alike = {store: value for store, value in values.items() if forms[store] == form}
         if len(alike) > 1 and form[0] != "value":
             inner = {store: _items(value) for store, value in alike.items()}
             for key in dict.fromkeys(key for items in inner.values() for key in items):
                 below = {store: items.get(key) for store, items in inner.items()}
-                found += _differences(below, (*path, key), recipes)
-    return found
+                differences += _differences(below, (*path, key), recipes)
+    return differences
 
 
 def _form(value: Any) -> tuple[str, Any]:
@@ -163,18 +163,18 @@ def _loaded(text: str) -> Any:
 
 def _unit(recipe: Any, path: Sequence[str]) -> str:
     """SI unit of the field at a path; "" where it has none, or the recipe cannot be read."""
-    here, hint = recipe, None
+    value, hint = recipe, None
     for key in path:
-        if isinstance(here, tuple):
-            here = next((item for i, item in enumerate(here) if key in (str(i), getattr(item, "name", None))), None)
+        if isinstance(value, tuple):
+            value = next((item for i, item in enumerate(value) if key in (str(i), getattr(item, "name", None))), None)
         else:
-            hint = get_type_hints(type(here), include_extras=True).get(key) if here is not None else None
-            here = getattr(here, key, None)
+            hint = get_type_hints(type(value), include_extras=True).get(key) if value is not None else None
+            value = getattr(value, key, None)
     return _unit_in(hint)
 
 
 def _unit_in(hint: Any) -> str:
-    for part in getattr(hint, "__metadata__", ()):
-        if isinstance(part, Unit):
-            return part.symbol
-    return next((found for part in get_args(hint) if (found := _unit_in(part))), "")
+    for annotation in getattr(hint, "__metadata__", ()):
+        if isinstance(annotation, Unit):
+            return annotation.symbol
+    return next((symbol for annotation in get_args(hint) if (symbol := _unit_in(annotation))), "")

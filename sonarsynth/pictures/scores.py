@@ -90,11 +90,11 @@ def _ranges(tree: xr.DataTree, frames: np.ndarray) -> dict[str, str]:
 def _echoes(tree: xr.DataTree, frames: np.ndarray, sound: EchoEnergies) -> dict[str, str]:
     """Whether the brightest beam hits, and levels of the beams that point at a target."""
     hits = brightest_beam_on_target(tree, frames).numbers
-    each = sound.on_target[np.isfinite(sound.on_target)]
+    echoes = sound.on_target[np.isfinite(sound.on_target)]
     return {
         "brightest beam on target": f"{hits['hits']} of {hits['frames']} frames" if hits else UNKNOWN,
-        "mean echo on target": _level(float(each.mean())) if len(each) else UNKNOWN,
-        "its median over frames": _level(float(np.median(each))) if len(each) else UNKNOWN,
+        "mean echo on target": _level(float(echoes.mean())) if len(echoes) else UNKNOWN,
+        "its median over frames": _level(float(np.median(echoes))) if len(echoes) else UNKNOWN,
         "brightest beam, drawn as 0 dB": _level(sound.peak),
     }
 
@@ -105,19 +105,19 @@ def _level(energy: float) -> str:
 
 def _costs(file: Path, frames: frozenset[int]) -> dict[str, str]:
     """Median processor time of each stage and of all, from the file of run times; the last time a frame was built."""
-    found = [row for row in _rows(file) if row.get("frame") in frames]
-    tasks = max((set(row["cpu"]) for row in found), key=len, default=set())  # a frame that failed lacks some
-    rows = {row["frame"]: row["cpu"] for row in found if set(row["cpu"]) == tasks}
+    entries = [row for row in _rows(file) if row.get("frame") in frames]
+    tasks = max((set(row["cpu"]) for row in entries), key=len, default=set())  # a frame that failed lacks some
+    rows = {row["frame"]: row["cpu"] for row in entries if set(row["cpu"]) == tasks}
     called = [f"CPU per frame: {name}" for name in (*STAGES.values(), "all")]
     if not rows:
         return dict.fromkeys([*called, SPEED], UNKNOWN)
     spent = np.array([[cpu.get(stage, 0.0) for stage in STAGES] for cpu in rows.values()])
     medians = [*np.median(spent, axis=0), np.median(spent.sum(axis=1))]
-    said = {
+    costs = {
         name: f"{1e3 * cost:.3g} ms" if cost < 1.0 else f"{cost:.3g} s"
         for name, cost in zip(called, medians, strict=True)
     }
-    return said | {SPEED: f"{1 / medians[-1]:.3g}" if medians[-1] > 0 else UNKNOWN}
+    return costs | {SPEED: f"{1 / medians[-1]:.3g}" if medians[-1] > 0 else UNKNOWN}
 
 
 def _rows(file: Path) -> list[dict[str, Any]]:

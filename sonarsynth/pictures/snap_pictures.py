@@ -45,18 +45,18 @@ def draw_snap(recipe: Recipe, out: Path, compare: Path | str | None = None) -> t
     if not sources:
         raise FieldError(("scene", "world", "sources"), "is empty: there is no snap to draw")
     band = recipe.scene.sonar.band
-    found = None
+    comparison = None
     try:
         model = sources[0].model(recipe.scene.world.environment.depth)
         chosen = fir(recipe.scene.sonar.antialias)
         if compare is not None:
-            found = _compared(compare, lambda highest: model.pulse(0.0, highest), (band.low, band.high))
-        figure = snap_figure(lambda highest: model.pulse(0.0, highest), chosen, sources[0].level, found)
+            comparison = _compared(compare, lambda highest: model.pulse(0.0, highest), (band.low, band.high))
+        figure = snap_figure(lambda highest: model.pulse(0.0, highest), chosen, sources[0].level, comparison)
     except RecordingError:
         raise
     except ValueError as error:
         raise FieldError(("scene", "world", "sources", 0, sources[0].pulse_field), str(error)) from None
-    return save(figure, out), found
+    return save(figure, out), comparison
 
 
 def _compared(file: Path | str, model: Callable[[float], Pulse], band: tuple[float, float]) -> SnapComparison:

@@ -33,17 +33,17 @@ def beams(tree: xr.DataTree, frame: StoredFrame) -> list[Beam]:
     chosen = choose(frame, azimuth, elevation, float(np.rad2deg(beam_width(tree))))
     if not chosen:
         return []
-    where = np.array(list(chosen.values()))
-    along = direction(np.deg2rad(azimuth[where[:, 1]]), np.deg2rad(elevation[where[:, 0]]))
+    cells = np.array(list(chosen.values()))
+    along = direction(np.deg2rad(azimuth[cells[:, 1]]), np.deg2rad(elevation[cells[:, 0]]))
     clock = direct_arrival(tree, frame)
-    time, found = steer(tree, frame, pressure.astype(float), float(start), along)
+    time, pressures = steer(tree, frame, pressure.astype(float), float(start), along)
     return [
         Beam(
             name=name,
             azimuth=float(azimuth[column]),
             elevation=float(elevation[row]),
             time=time - clock,
-            pressure=found[i],
+            pressure=pressures[i],
             expected=_expected(tree, frame, along[i] * frame.true_range[row, column]),
             measured=_measured(frame, azimuth[column], elevation[row], _step(azimuth)),
         )
@@ -96,9 +96,9 @@ def _step(centres: Floats) -> float:
 
 def direct_arrival(tree: xr.DataTree, frame: StoredFrame) -> float:
     """When the snap was heard at the array centre (s): as located; without source estimates as it truly was."""
-    found = read(tree, "source_estimates/time", frame.index)
-    if found is not None and np.isfinite(found).any():
-        return float(found[np.isfinite(found)][0])
+    times = read(tree, "source_estimates/time", frame.index)
+    if times is not None and np.isfinite(times).any():
+        return float(times[np.isfinite(times)][0])
     snap_time = needed(tree, "truth/emissions/time", frame.index)
     return float(snap_time[0] + np.linalg.norm(frame.snap[0]) / assumed_speed(tree, frame.index))
 
@@ -141,11 +141,11 @@ def steer(
     gain, position = needed(tree, "signals/gain"), needed(tree, "signals/position")
     focus = float(np.median(frame.true_range[frame.target >= 0]))
     speed = assumed_speed(tree, frame.index)
-    found = beam_spectra(spectra, frequency, position, gain, along, speed, focus)
+    steered = beam_spectra(spectra, frequency, position, gain, along, speed, focus)
     samples = round(rate / float(frequency[1] - frequency[0]))
     every = np.zeros((len(along), samples // 2 + 1), complex)
     lowest = round(float(frequency[0]) * samples / rate)
-    every[:, lowest : lowest + len(frequency)] = found
+    every[:, lowest : lowest + len(frequency)] = steered
     return start + (first + np.arange(count)) / rate, np.fft.irfft(every, samples, axis=1)[:, :count]
 
 

@@ -52,16 +52,16 @@ def error_and_time_figure(marks: Sequence[Mark], lines: Sequence[Line]) -> Figur
 
     marks: cases that are exact to rounding, their colour telling the group; lines: knobs, from coarse to fine.
     """
-    made = figure(10.5, 6.2, dpi=110)
-    axes = made.add_subplot()
+    fig = figure(10.5, 6.2, dpi=110)
+    axes = fig.add_subplot()
     grid(axes)
     axes.set_xscale("log")
     axes.set_yscale("log")
     groups = list(dict.fromkeys(mark.group for mark in marks))
-    seen: dict[str, int] = dict.fromkeys(groups, 0)
+    counts: dict[str, int] = dict.fromkeys(groups, 0)
     for mark in marks:
-        shape = SHAPES[seen[mark.group] % len(SHAPES)]
-        seen[mark.group] += 1
+        shape = SHAPES[counts[mark.group] % len(SHAPES)]
+        counts[mark.group] += 1
         colour = RAYS[groups.index(mark.group) % len(RAYS)]
         name = f"{mark.name} ({mark.group})"
         axes.plot(
@@ -82,13 +82,13 @@ def error_and_time_figure(marks: Sequence[Mark], lines: Sequence[Line]) -> Figur
     label(axes, "CPU time of one core an eigenray (us)", "largest error of the travel time (s)")
     axes.set_title("Eigenrays: error against run time", fontsize=10, color=INK, loc="left")
     axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
-    made.supxlabel(
+    fig.supxlabel(
         "Bellhop's points are from earlier measurements in waters of their own (4001 beams; default step, a sixteenth "
         f"of it), not from this run. Errors below {FLOOR:g} s are drawn there.",
         fontsize=7,
         color=PALE,
     )
-    return made
+    return fig
 
 
 def _bellhop(axes: Axes) -> None:

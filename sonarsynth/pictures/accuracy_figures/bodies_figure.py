@@ -63,17 +63,17 @@ def bodies_figure(title: str, trades: Mapping[str, Sequence[RefinementCurve]], p
     trades: a row for each kind of error, under its name and unit.
     """
     rows = len(trades) + (len(panels) + 1) // 2
-    made = figure(12.0, 4.3 * rows, dpi=110)
-    axes = made.subplots(rows, 2, squeeze=False)
-    for place, (error, of) in zip(axes, trades.items(), strict=False):
-        _trades(place[0], of, [trade.facets for trade in of], "facets", error)
-        _trades(place[1], of, [trade.milliseconds for trade in of], "CPU time of one core an aspect (ms)", error)
-        place[0].set_title("error against number of facets; dotted: bound", fontsize=10, color=INK, loc="left")
-        place[1].set_title("error against run time, 18 frequencies", fontsize=10, color=INK, loc="left")
-    for place, panel in zip(axes[len(trades) :].ravel(), panels, strict=False):
-        _levels(place, panel)
-    made.suptitle(title, fontsize=11, color=INK, x=0.01, ha="left")
-    return made
+    fig = figure(12.0, 4.3 * rows, dpi=110)
+    axes = fig.subplots(rows, 2, squeeze=False)
+    for slot, (error, of) in zip(axes, trades.items(), strict=False):
+        _trades(slot[0], of, [trade.facets for trade in of], "facets", error)
+        _trades(slot[1], of, [trade.milliseconds for trade in of], "CPU time of one core an aspect (ms)", error)
+        slot[0].set_title("error against number of facets; dotted: bound", fontsize=10, color=INK, loc="left")
+        slot[1].set_title("error against run time, 18 frequencies", fontsize=10, color=INK, loc="left")
+    for slot, panel in zip(axes[len(trades) :].ravel(), panels, strict=False):
+        _levels(slot, panel)
+    fig.suptitle(title, fontsize=11, color=INK, x=0.01, ha="left")
+    return fig
 
 
 def _trades(

@@ -41,8 +41,8 @@ def solver_figure(lines: Sequence[SolverLine], default: SolverLine | None) -> Fi
 
     Colours tell the solvers, strokes the forms: whole for the first. default: one point, what is used.
     """
-    made = figure(11.5, 5.4, dpi=110)
-    left, right = made.subplots(1, 2, sharey=True)
+    fig = figure(11.5, 5.4, dpi=110)
+    left, right = fig.subplots(1, 2, sharey=True)
     methods = list(dict.fromkeys(line.method for line in lines))
     forms = list(dict.fromkeys(line.form for line in lines))
     for axes, over in ((left, "milliseconds"), (right, "evaluations")):
@@ -59,9 +59,9 @@ def solver_figure(lines: Sequence[SolverLine], default: SolverLine | None) -> Fi
     label(left, "CPU time of one core a bubble (ms)", "larger relative error of collapse and rebound radius")
     label(right, "evaluations of the equation", "")
     _legend(right, methods, forms, default)
-    made.supxlabel("A point is missing where a solver gave up.", fontsize=7, color=PALE)
-    made.suptitle(TITLE, fontsize=10, color=INK, x=0.01, ha="left")
-    return made
+    fig.supxlabel("A point is missing where a solver gave up.", fontsize=7, color=PALE)
+    fig.suptitle(TITLE, fontsize=10, color=INK, x=0.01, ha="left")
+    return fig
 
 
 def _mark(axes: Axes, x: float, y: float) -> None:

@@ -47,12 +47,12 @@ class Panel:
 def frontier_figure(title: str, panels: Sequence[Panel], note: str) -> Figure:
     """One panel a stage, two in a row: error over CPU time, both logarithmic."""
     rows = -(-len(panels) // 2)
-    made = figure(13.0, 0.7 + 4.3 * rows, dpi=100)
-    made.suptitle(title, x=0.01, ha="left", fontsize=12, color=INK)
+    fig = figure(13.0, 0.7 + 4.3 * rows, dpi=100)
+    fig.suptitle(title, x=0.01, ha="left", fontsize=12, color=INK)
     for n, panel in enumerate(panels):
-        _draw(made.add_subplot(rows, 2, n + 1), panel)
-    made.supxlabel(note, fontsize=8, color=PALE)
-    return made
+        _draw(fig.add_subplot(rows, 2, n + 1), panel)
+    fig.supxlabel(note, fontsize=8, color=PALE)
+    return fig
 
 
 def _draw(axes: Axes, panel: Panel) -> None:

@@ -49,11 +49,11 @@ class Blitting:
         """The figure (row, column, rgba) with its images as they are now, and artists on them, the rearmost first."""
         self._canvas.restore_region(self._behind)
         buffer = np.asarray(self._canvas.buffer_rgba()).view(np.uint32)[..., 0]  # four bytes at once
-        for image, (there, rows, columns) in self._images:
+        for image, (area, rows, columns) in self._images:
             shown = image.get_array()
             assert shown is not None
             colours = image.to_rgba(shown, bytes=True).view(np.uint32)[..., 0]
-            buffer[there] = colours[rows[:, None], columns]
+            buffer[area] = colours[rows[:, None], columns]
         for artist in changing:
             self._figure.draw_artist(artist)
         drawn = self._shot()

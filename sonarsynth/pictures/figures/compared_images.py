@@ -157,8 +157,8 @@ class BesidePicture:
     def _bar(self, top: float, below: float, of: str) -> None:
         """One scale of colours for all panels."""
         w, h = self._size
-        place = self.figure.add_axes(((w - RIGHT) / w, below / h, 0.14 / w, (top - below) / h))
-        bar = self.figure.colorbar(self._images[0][0], cax=place, extend="min")
+        bar_axes = self.figure.add_axes(((w - RIGHT) / w, below / h, 0.14 / w, (top - below) / h))
+        bar = self.figure.colorbar(self._images[0][0], cax=bar_axes, extend="min")
         long = f"energy re the brightest beam of {of} (dB)"
         bar.set_label(long if top - below > 3.2 else "energy (dB)", fontsize=8.5, color=INK)
         bar.ax.tick_params(labelsize=8)
@@ -168,9 +168,9 @@ def _outline(artists: Sequence[PolyCollection], hulls: Sequence[tuple[Hull, ...]
     """Draw outlines in each panel, and return them; those of hulls that are one object are found once."""
     first: dict[int, int] = {}
     lines: list[list[Floats]] = []
-    for i, (artist, some) in enumerate(zip(artists, hulls, strict=True)):
-        like = first.setdefault(id(some), i)
-        lines.append(set_outlines(artist, some) if like == i else lines[like])
+    for i, (artist, bodies) in enumerate(zip(artists, hulls, strict=True)):
+        like = first.setdefault(id(bodies), i)
+        lines.append(set_outlines(artist, bodies) if like == i else lines[like])
         if like != i:
             artist.set_verts(lines[like])
             artist.set_edgecolor(artists[like].get_edgecolor())

@@ -222,8 +222,8 @@ def image_axes(axes: Axes, azimuth: Floats, elevation: Floats) -> AxesImage:
 
 def colour_bar(axes: Axes, image: AxesImage, unit: str) -> None:
     """The scale of an image beside it, as high as the image."""
-    place = axes.inset_axes((1.02, 0.0, 0.035, 1.0))
-    bar = axes.figure.colorbar(image, cax=place, extend="min")
+    bar_axes = axes.inset_axes((1.02, 0.0, 0.035, 1.0))
+    bar = axes.figure.colorbar(image, cax=bar_axes, extend="min")
     bar.set_label(unit, fontsize=9, color=INK)
     bar.ax.tick_params(labelsize=8)
 
@@ -248,9 +248,9 @@ def set_outlines(artist: PolyCollection, hulls: tuple[Hull, ...]) -> list[Floats
     lines: list[Floats] = []
     colours: list[str] = []
     for i, hull in enumerate(hulls):
-        seen = view_outline(hull.vertices, hull.faces, FILM_CELLS)
-        lines += [np.asarray(np.rad2deg(line)) for line in seen]
-        colours += [OUTLINES[i % len(OUTLINES)]] * len(seen)
+        outline = view_outline(hull.vertices, hull.faces, FILM_CELLS)
+        lines += [np.asarray(np.rad2deg(line)) for line in outline]
+        colours += [OUTLINES[i % len(OUTLINES)]] * len(outline)
     artist.set_verts(lines)
     artist.set_edgecolor(colours)
     return lines
@@ -262,9 +262,9 @@ def fill_hulls(artist: PolyCollection, bodies: list[Floats], faces: list[Ints]) 
 
     lines, colours = [], []
     for i, (points, facets) in enumerate(zip(bodies, faces, strict=True)):
-        seen = union_outline(points, facets, FILM_CELLS)
-        lines += seen
-        colours += [OUTLINES[i % len(OUTLINES)]] * len(seen)
+        outline = union_outline(points, facets, FILM_CELLS)
+        lines += outline
+        colours += [OUTLINES[i % len(OUTLINES)]] * len(outline)
     artist.set_verts(lines)
     artist.set_edgecolor(colours)
     artist.set_facecolor([to_rgba(colour, 0.18) for colour in colours])

@@ -120,14 +120,14 @@ def legend(axes: Axes, ghosts: bool = True, lobes: bool = True) -> None:
     handles = [Line2D([], [], color=OUTLINES[0], label="true outline")]
     handles += [Line2D([], [], label="ghost by surface or bottom", **ring)] if ghosts else []
     handles += [Line2D([], [], label="grating lobe", **LOBE)] if lobes else []
-    where: dict[str, Any] = {
+    location: dict[str, Any] = {
         "loc": "lower left",
         "bbox_to_anchor": (0.0, 1.0),
         "ncols": 3,
         "borderaxespad": 0.9,
         "columnspacing": 1.2,
     }
-    axes.legend(handles=handles, fontsize=7.5, labelcolor="white", facecolor=BACKDROP, framealpha=1.0, **where)
+    axes.legend(handles=handles, fontsize=7.5, labelcolor="white", facecolor=BACKDROP, framealpha=1.0, **location)
 
 
 def box_of(points: Floats, margin: float) -> Floats:
@@ -141,8 +141,8 @@ def _marker(at: Floats, frame: Floats) -> str:
     axis = int(np.argmax(over))
     if over[axis] <= 0.0:
         return "o"
-    side = 1 if at[axis] > frame[axis] else -1
-    return ARROWS[(side, 0) if axis == 0 else (0, side)]
+    sign = 1 if at[axis] > frame[axis] else -1
+    return ARROWS[(sign, 0) if axis == 0 else (0, sign)]
 
 
 def place(at: Floats, size: Floats, gap: float, frame: Floats, taken: list[Floats]) -> Floats:

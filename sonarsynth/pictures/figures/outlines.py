@@ -24,8 +24,8 @@ def view_outline(vertices: npt.ArrayLike, faces: npt.ArrayLike, cells: int = CEL
     with np.errstate(divide="ignore", invalid="ignore"):
         plane = np.where(points[:, :1] > 0.0, points[:, 1:] / points[:, :1], np.nan)
     lines = union_outline(plane, faces, cells)
-    seen = [np.stack(azimuth_elevation(np.insert(line, 0, 1.0, axis=1)), axis=1) for line in lines]
-    return [np.asarray(line) for line in seen]
+    angles = [np.stack(azimuth_elevation(np.insert(line, 0, 1.0, axis=1)), axis=1) for line in lines]
+    return [np.asarray(line) for line in angles]
 
 
 def union_outline(points: npt.ArrayLike, faces: npt.ArrayLike, cells: int = CELLS) -> list[Floats]:

@@ -63,19 +63,19 @@ def sheet(
 ) -> Figure:
     """The sheet as a figure. azimuth, elevation: the beam grid (deg). Without beams the last row is left out."""
     top = 8.6 if beams else 5.4
-    made = figure(12.0, top, "none", dpi=110)
-    made.suptitle(f"{view.title}   {view.moment}", x=0.01, y=0.99, ha="left", fontsize=12, color=INK)
-    sky = placed(made, 0.65, top - 4.85, 4.25, 4.25)
+    fig = figure(12.0, top, "none", dpi=110)
+    fig.suptitle(f"{view.title}   {view.moment}", x=0.01, y=0.99, ha="left", fontsize=12, color=INK)
+    sky = placed(fig, 0.65, top - 4.85, 4.25, 4.25)
     outlines = draw_image(sky, azimuth, elevation, view, unit)
-    bar = placed(made, 11.3, top - 3.9, 0.14, 2.4)
-    draw_cloud(placed(made, 6.2, top - 4.85, 4.8, 4.2, projection="3d"), made, view, errors, space, bar)
+    bar = placed(fig, 11.3, top - 3.9, 0.14, 2.4)
+    draw_cloud(placed(fig, 6.2, top - 4.85, 4.8, 4.2, projection="3d"), fig, view, errors, space, bar)
     if beams:
         width = 11.1 / len(beams)
-        draw_beams([placed(made, 0.75 + i * width, 0.85, width - 0.55, 2.1) for i in range(len(beams))], beams)
-    settle(made)
+        draw_beams([placed(fig, 0.75 + i * width, 0.85, width - 0.55, 2.1) for i in range(len(beams))], beams)
+    settle(fig)
     GhostMarks(sky).show(view.ghosts, view.lobes, outlines, BADGES if beams else 0.0)
     mark_beams(sky, beams, outlines)
-    return made
+    return fig
 
 
 def draw_image(axes: Axes, azimuth: Floats, elevation: Floats, view: View, unit: str) -> list[Floats]:
@@ -164,12 +164,12 @@ def draw_beams(panels: list[Axes], beams: list[Beam]) -> None:
             axes.axvline(1e3 * beam.measured, color=PALE, linewidth=0.9, linestyle=":", label="point of the cloud")
         axes.set_xlim(1e3 * first, 1e3 * last)
         axes.set_ylim(-1.08 * factor * peak, 1.08 * factor * peak)
-        where = f"azimuth {beam.azimuth:+.1f}, elevation {beam.elevation:+.1f} deg"
+        steering = f"azimuth {beam.azimuth:+.1f}, elevation {beam.elevation:+.1f} deg"
         label(
             axes,
             "time after the direct snap (ms)",
             f"beam pressure ({unit})" if number == "1" else "",
-            f"{number}  {beam.name}: {where}",
+            f"{number}  {beam.name}: {steering}",
         )
     _beam_legend(panels)
 

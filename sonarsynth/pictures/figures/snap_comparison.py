@@ -97,20 +97,23 @@ def _levels(waves: Floats, rate: float) -> tuple[Floats, Floats]:
         return np.asarray(np.fft.rfftfreq(size, 1.0 / rate)), np.asarray(10.0 * np.log10(power / power[0].max()))
 
 
-def draw_comparison(panels: tuple[Axes, Axes], found: SnapComparison, highest: float) -> None:
+def draw_comparison(panels: tuple[Axes, Axes], comparison: SnapComparison, highest: float) -> None:
     """The waveforms and the spectra up to `highest` (Hz) on two axes."""
     waveform, levels = panels
     for axes, x, measured, modelled in (
-        (waveform, 1e6 * found.time, found.measured, found.modelled),
-        (levels, 1e-3 * found.frequency, found.measured_level, found.modelled_level),
+        (waveform, 1e6 * comparison.time, comparison.measured, comparison.modelled),
+        (levels, 1e-3 * comparison.frequency, comparison.measured_level, comparison.modelled_level),
     ):
         grid(axes)
-        axes.plot(x, measured, color=INK, linewidth=1.0, label="measured" + " (inverted)" * found.inverted)
+        axes.plot(x, measured, color=INK, linewidth=1.0, label="measured" + " (inverted)" * comparison.inverted)
         axes.plot(x, modelled, color=MARKS[1], linewidth=1.0, label="modelled, fitted")
         axes.legend(fontsize=8, frameon=False)
-    misfit = f"rms misfit {100.0 * found.misfit:.3g} % of the measured"
+    misfit = f"rms misfit {100.0 * comparison.misfit:.3g} % of the measured"
     label(waveform, "time after the peak of the recording (us)", "pressure, normalised", misfit)
     levels.set(xlim=(0.0, 1e-3 * highest), ylim=(FAINTEST, 5.0))
     label(
-        levels, "frequency (kHz)", "energy density, normalised (dB)", f"rms misfit {found.level_misfit:.2g} dB in band"
+        levels,
+        "frequency (kHz)",
+        "energy density, normalised (dB)",
+        f"rms misfit {comparison.level_misfit:.2g} dB in band",
     )

@@ -47,18 +47,18 @@ def snap_figure(
     passed = response(frequency, fir)
     density = gain * spectrum(frequency, received)
     rows = 1 if comparison is None else 2
-    made = figure(12.0, 4.2 * rows, dpi=110)
-    parts = made.add_gridspec(rows, 3)
-    panels = [made.add_subplot(parts[0, i]) for i in range(3)]
+    fig = figure(12.0, 4.2 * rows, dpi=110)
+    layout = fig.add_gridspec(rows, 3)
+    panels = [fig.add_subplot(layout[0, i]) for i in range(3)]
     snaps = {"snap": (fine, AS_MADE), "filtered": (received, fir)}
-    waves = {name: gain * filtered(time, *one) for name, one in snaps.items()}
-    decibels = {name: 20.0 * np.log10(gain) + np.array(levels(*one)) for name, one in snaps.items()}
+    waves = {name: gain * filtered(time, *snap) for name, snap in snaps.items()}
+    decibels = {name: 20.0 * np.log10(gain) + np.array(levels(*snap)) for name, snap in snaps.items()}
     _waveforms(panels[0], time, waves, decibels)
     _levels(panels[1], frequency, {"snap": _energy_level(density), "filtered": _energy_level(density * passed)})
     _response(panels[2], frequency, passed)
     if comparison is not None:
-        draw_comparison((made.add_subplot(parts[1, 0]), made.add_subplot(parts[1, 1])), comparison, highest)
-    return made
+        draw_comparison((fig.add_subplot(layout[1, 0]), fig.add_subplot(layout[1, 1])), comparison, highest)
+    return fig
 
 
 def half_width(time: Floats, pressure: Floats) -> float:
@@ -91,8 +91,8 @@ def _waveforms(axes: Axes, time: Floats, waves: dict[str, Floats], decibels: dic
     grid(axes)
     for (name, wave), colour in zip(waves.items(), (INK, MARKS[0]), strict=True):
         (peak, both), width = decibels[name], half_width(time, wave)
-        said = f"{name}: peak {peak:.1f} dB, peak to peak {both:.1f} dB,\n{1e6 * width:.3g} us wide at half the peak"
-        axes.plot(1e6 * time, 1e-3 * wave, color=colour, linewidth=1.0, label=said)
+        text = f"{name}: peak {peak:.1f} dB, peak to peak {both:.1f} dB,\n{1e6 * width:.3g} us wide at half the peak"
+        axes.plot(1e6 * time, 1e-3 * wave, color=colour, linewidth=1.0, label=text)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.4 * (high - low))  # room for the legend
     axes.legend(fontsize=7.5, frameon=False, loc="upper left")
@@ -103,8 +103,8 @@ def _levels(axes: Axes, frequency: Floats, densities: dict[str, Floats]) -> None
     grid(axes)
     for (name, level), colour in zip(densities.items(), (INK, MARKS[0]), strict=True):
         low, high = bandwidth(frequency, level)
-        said = f"{name}: {1e-3 * low:.3g} to {1e-3 * high:.3g} kHz within 10 dB"
-        axes.plot(1e-3 * frequency, level, color=colour, linewidth=1.0, label=said)
+        text = f"{name}: {1e-3 * low:.3g} to {1e-3 * high:.3g} kHz within 10 dB"
+        axes.plot(1e-3 * frequency, level, color=colour, linewidth=1.0, label=text)
     top = float(densities["snap"].max())
     axes.set_ylim(top - 70.0, top + 18.0)
     axes.legend(fontsize=7.5, frameon=False, loc="upper right")

@@ -25,15 +25,15 @@ def strength_figure(title: str, aspect: Floats, frequency: Floats, strength: Flo
     all of it over frequency where there are several. Levels more than 50 dB below the highest are drawn there.
     """
     several = len(frequency) > 1 and len(aspect) > 1
-    made = figure(11.0 if several else 6.2, 5.8, dpi=110)
+    fig = figure(11.0 if several else 6.2, 5.8, dpi=110)
     top = float(np.max(strength, initial=-300.0, where=np.isfinite(strength)))
     top = 5.0 * np.ceil(top / 5.0)
-    polar: PolarAxes = made.add_subplot(1, 1 + several, 1, projection="polar")  # type: ignore[assignment]
+    polar: PolarAxes = fig.add_subplot(1, 1 + several, 1, projection="polar")  # type: ignore[assignment]
     _rose(polar, aspect, frequency, strength, top)
     if several:
-        _map(made, made.add_subplot(1, 2, 2), aspect, frequency, strength, top)
-    made.suptitle(title, fontsize=10, color=INK, x=0.01, ha="left")
-    return made
+        _map(fig, fig.add_subplot(1, 2, 2), aspect, frequency, strength, top)
+    fig.suptitle(title, fontsize=10, color=INK, x=0.01, ha="left")
+    return fig
 
 
 def _rose(axes: PolarAxes, aspect: Floats, frequency: Floats, strength: Floats, top: float) -> None:
@@ -59,7 +59,7 @@ def _rose(axes: PolarAxes, aspect: Floats, frequency: Floats, strength: Floats, 
     axes.legend(fontsize=7, loc="lower left", bbox_to_anchor=(-0.12, -0.1), frameon=False)
 
 
-def _map(made: Figure, axes: Axes, aspect: Floats, frequency: Floats, strength: Floats, top: float) -> None:
+def _map(fig: Figure, axes: Axes, aspect: Floats, frequency: Floats, strength: Floats, top: float) -> None:
     from matplotlib.ticker import AutoLocator, MultipleLocator
 
     low = top - DYNAMIC_RANGE
@@ -75,6 +75,6 @@ def _map(made: Figure, axes: Axes, aspect: Floats, frequency: Floats, strength: 
     )
     label(axes, "frequency (kHz)", "aspect (deg, 0 bow, 90 port)")
     axes.yaxis.set_major_locator(MultipleLocator(45.0) if np.ptp(aspect) > np.pi else AutoLocator())
-    bar = made.colorbar(shown, ax=axes, fraction=0.05, pad=0.02)
+    bar = fig.colorbar(shown, ax=axes, fraction=0.05, pad=0.02)
     bar.set_label("target strength (dB re 1 m2)", fontsize=8)
     bar.ax.tick_params(labelsize=8)

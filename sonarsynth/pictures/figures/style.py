@@ -55,26 +55,26 @@ def figure(width: float, height: float, layout: str = "constrained", **more: Any
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    made = Figure(figsize=(width, height), layout=layout, **more)  # type: ignore[arg-type]
-    FigureCanvasAgg(made)
-    return made
+    fig = Figure(figsize=(width, height), layout=layout, **more)  # type: ignore[arg-type]
+    FigureCanvasAgg(fig)
+    return fig
 
 
-def save(made: Figure, out: Path, **how: Any) -> Path:
+def save(fig: Figure, out: Path, **options: Any) -> Path:
     """Write a figure into a file, a PNG where the name does not say, and its folder; returns the file."""
     file = out if out.suffix else out.with_suffix(".png")
     file.parent.mkdir(parents=True, exist_ok=True)
-    made.savefig(file, **how)
+    fig.savefig(file, **options)
     return file
 
 
-def settle(made: Figure) -> None:
+def settle(fig: Figure) -> None:
     """Give the axes of a figure their place, once: later drawings need not look for it."""
-    engine = made.get_layout_engine()
+    engine = fig.get_layout_engine()
     if engine is not None:
-        engine.execute(made)
-        made.set_layout_engine("none")
-    for axes in made.axes:
+        engine.execute(fig)
+        fig.set_layout_engine("none")
+    for axes in fig.axes:
         axes.apply_aspect()
 
 

@@ -32,21 +32,21 @@ def distribution_figure(sampled: SampledGeometry) -> Figure:
     """Histograms of QUANTITIES and of the number of targets in view: counts by target, and shares by split."""
     splits = [i for i in range(len(SPLITS)) if (sampled.split == i).any()]
     columns = 2 if len(splits) > 1 else 1
-    made = figure(6.4 * columns if columns > 1 else 7.5, 13.5, dpi=100)
+    fig = figure(6.4 * columns if columns > 1 else 7.5, 13.5, dpi=100)
     title = f"{sampled.recipe.title or 'untitled'}\n{sampled.how}; straight lines from the array centre"
-    made.suptitle(title, x=0.01, ha="left", fontsize=11, color=INK)
-    panels = made.subplots(len(AXES) + 1, columns, squeeze=False)
+    fig.suptitle(title, x=0.01, ha="left", fontsize=11, color=INK)
+    panels = fig.subplots(len(AXES) + 1, columns, squeeze=False)
     row, names = _few(sampled)
     of_row = [(name, row == i) for i, name in enumerate(names)]
     of_split = [(SPLITS[i], sampled.split[sampled.frame] == i) for i in splits]
     for (name, text), axes in zip(AXES.items(), panels, strict=False):
         values = sampled.columns[name]
-        seen = np.ones(len(values), bool) if name == "visible" else sampled.columns["visible"] > 0.0
-        edges = _edges(name, values[seen], sampled)
-        _by_target(axes[0], values, [(one, mask & seen) for one, mask in of_row], edges)
+        visible = np.ones(len(values), bool) if name == "visible" else sampled.columns["visible"] > 0.0
+        edges = _edges(name, values[visible], sampled)
+        _by_target(axes[0], values, [(group, mask & visible) for group, mask in of_row], edges)
         label(axes[0], text, "targets in frames")
         if columns > 1:
-            _by_split(axes[1], values, [(one, mask & seen) for one, mask in of_split], edges)
+            _by_split(axes[1], values, [(group, mask & visible) for group, mask in of_split], edges)
             label(axes[1], text, "share of the split")
         if name in ("azimuth", "elevation"):
             _field_of_view(axes, name, sampled)
@@ -57,7 +57,7 @@ def distribution_figure(sampled: SampledGeometry) -> Figure:
         panels[0, 1].set_title("by split", fontsize=10, color=INK, loc="left")
         sequences = np.bincount(sampled.recipe.spanned.split, minlength=len(SPLITS))
         _legend(panels[0, 1], [f"{SPLITS[i]}: {sequences[i]} sequences" for i in splits])
-    return made
+    return fig
 
 
 def _few(sampled: SampledGeometry) -> tuple[Ints, list[str]]:
@@ -90,11 +90,11 @@ def _half_span(name: str, sampled: SampledGeometry) -> float:
     return float(np.rad2deg(0.5 * (beams.azimuth_span if name == "azimuth" else beams.elevation_span)))
 
 
-def _by_target(axes: Axes, values: Floats, parts: Sequence[tuple[str, Bools]], edges: Floats) -> None:
-    """Bars of all parts on top of each other."""
+def _by_target(axes: Axes, values: Floats, groups: Sequence[tuple[str, Bools]], edges: Floats) -> None:
+    """Bars of all groups on top of each other."""
     grid(axes)
     below = np.zeros(len(edges) - 1)
-    for i, (_, mask) in enumerate(parts):
+    for i, (_, mask) in enumerate(groups):
         count = np.histogram(values[mask], edges)[0]
         axes.bar(edges[:-1], count, np.diff(edges), below, align="edge", color=RAYS[i % len(RAYS)], linewidth=0)
         below += count
@@ -102,10 +102,10 @@ def _by_target(axes: Axes, values: Floats, parts: Sequence[tuple[str, Bools]], e
     axes.locator_params(axis="y", integer=True)
 
 
-def _by_split(axes: Axes, values: Floats, parts: Sequence[tuple[str, Bools]], edges: Floats) -> None:
-    """A line for each part, as shares, so that splits of other sizes can be compared."""
+def _by_split(axes: Axes, values: Floats, groups: Sequence[tuple[str, Bools]], edges: Floats) -> None:
+    """A line for each group, as shares, so that splits of other sizes can be compared."""
     grid(axes)
-    for i, (_, mask) in enumerate(parts):
+    for i, (_, mask) in enumerate(groups):
         share = np.histogram(values[mask], edges)[0] / max(int(mask.sum()), 1)
         axes.stairs(share, edges, color=RAYS[i], linewidth=1.4)
     axes.set_xlim(edges[0], edges[-1])
@@ -114,8 +114,8 @@ def _by_split(axes: Axes, values: Floats, parts: Sequence[tuple[str, Bools]], ed
 
 def _field_of_view(row: Sequence[Axes], name: str, sampled: SampledGeometry) -> None:
     for axes in row:
-        for side in (-1.0, 1.0):
-            axes.axvline(side * _half_span(name, sampled), color=PALE, linewidth=1.0, linestyle="-.")
+        for sign in (-1.0, 1.0):
+            axes.axvline(sign * _half_span(name, sampled), color=PALE, linewidth=1.0, linestyle="-.")
         axes.annotate(
             "dash-dotted: field of view", (0.99, 0.9), xycoords="axes fraction", ha="right", fontsize=7, color=PALE
         )
@@ -132,10 +132,10 @@ def _in_view(row: Sequence[Axes], sampled: SampledGeometry, splits: Sequence[int
     if len(row) > 1:
         grid(row[1])
         width = 0.8 / len(splits)
-        for place, i in enumerate(splits):
+        for slot, i in enumerate(splits):
             own = number[sampled.split == i]
             share = np.bincount(own, minlength=len(values)) / max(len(own), 1)
-            row[1].bar(values + (place - 0.5 * (len(splits) - 1)) * width, share, width, color=RAYS[i])
+            row[1].bar(values + (slot - 0.5 * (len(splits) - 1)) * width, share, width, color=RAYS[i])
         label(row[1], "targets in view", "share of the split")
     for axes in row:
         axes.set_xticks(values if len(values) <= 15 else values[:: len(values) // 15 + 1])

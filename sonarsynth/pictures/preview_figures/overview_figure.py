@@ -58,8 +58,8 @@ class Overview:
     def points(self) -> Floats:
         """(point, xyz): all that is to be seen."""
         g = self.geometry
-        parts = [g.array[None], self.snaps, *(box.reshape(-1, 3) for box in self.boxes.values())]
-        return np.concatenate([*parts, *g.tracks.values(), *g.view.values()])
+        blocks = [g.array[None], self.snaps, *(box.reshape(-1, 3) for box in self.boxes.values())]
+        return np.concatenate([*blocks, *g.tracks.values(), *g.view.values()])
 
     @property
     def bottom_is_far(self) -> bool:
@@ -73,28 +73,28 @@ class Overview:
 
 def overview_figure(overview: Overview) -> Figure:
     """The scene of a sequence from above, in space, and from the side beside the sound speed."""
-    made = figure(12.0, 9.0, dpi=110)
-    rows = made.add_gridspec(2, 1, height_ratios=[1.35, 1.0])
+    fig = figure(12.0, 9.0, dpi=110)
+    rows = fig.add_gridspec(2, 1, height_ratios=[1.35, 1.0])
     top = rows[0].subgridspec(1, 2, width_ratios=[1.0, 1.15])
     below = rows[1].subgridspec(1, 2, width_ratios=[1.0, 4.6])
-    made.suptitle(overview.title, x=0.01, ha="left", fontsize=12, color=INK)
-    above = made.add_subplot(top[0])
+    fig.suptitle(overview.title, x=0.01, ha="left", fontsize=12, color=INK)
+    above = fig.add_subplot(top[0])
     _from_above(above, overview)
-    _in_space(made.add_subplot(top[1], projection="3d"), overview)
-    side = made.add_subplot(below[1])
-    _from_the_side(side, overview)
-    profile_axes(made.add_subplot(below[0], sharey=side), overview.depth, overview.speed, overview.geometry.bottom)
-    _legend(made, overview)
-    side.set_title("from the side", fontsize=10, loc="left")
-    settle(made)
+    _in_space(fig.add_subplot(top[1], projection="3d"), overview)
+    section = fig.add_subplot(below[1])
+    _from_the_side(section, overview)
+    profile_axes(fig.add_subplot(below[0], sharey=section), overview.depth, overview.speed, overview.geometry.bottom)
+    _legend(fig, overview)
+    section.set_title("from the side", fontsize=10, loc="left")
+    settle(fig)
     factor = _widen(above)
     low, high = above.get_ylim()
     above.set_ylim(low - 0.5 * (factor - 1.0) * (high - low), high + 0.5 * (factor - 1.0) * (high - low))
     deep = f"; the bottom is at {overview.geometry.bottom:.4g} m" if overview.bottom_is_far else ""
-    side.set_title(f"from the side, {scale_words(_widen(side))}{deep}", fontsize=10, color=INK, loc="left")
+    section.set_title(f"from the side, {scale_words(_widen(section))}{deep}", fontsize=10, color=INK, loc="left")
     lift_names(above)
-    lift_names(side)
-    return made
+    lift_names(section)
+    return fig
 
 
 def _from_above(axes: Axes, overview: Overview) -> None:
@@ -111,8 +111,8 @@ def _from_the_side(axes: Axes, overview: Overview) -> None:
     surface_and_bottom(axes, geometry.bottom)
     _flat(axes, overview, geometry.on_plane)
     axes.plot(*geometry.on_plane(geometry.view["upright"]).T, color=VIEW, linewidth=0.9, linestyle="-.")
-    seen = geometry.on_plane(overview.points)
-    _limits(axes, seen)
+    projected = geometry.on_plane(overview.points)
+    _limits(axes, projected)
     if not overview.bottom_is_far:
         axes.set_ylim(-1.06 * geometry.bottom, 0.06 * geometry.bottom)
     label(axes, f"distance from the array towards {compass(geometry.bearing)} (m)", "", "from the side")
@@ -191,7 +191,7 @@ def _widen(axes: Axes) -> float:
     return vertical_scale(axes)
 
 
-def _legend(made: Figure, overview: Overview) -> None:
+def _legend(fig: Figure, overview: Overview) -> None:
     from matplotlib.lines import Line2D
 
     handles = [Line2D([], [], color=VIEW, linestyle="-.", label="field of view on its two planes")]
@@ -209,4 +209,4 @@ def _legend(made: Figure, overview: Overview) -> None:
     if any(len(boxes) > 1 for boxes in overview.boxes.values()):
         pale = f"strong: frame {overview.frame}; pale: first and last frame"
         handles.append(Line2D([], [], color=PALE, label=pale))
-    made.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), fontsize=8, frameon=False)
+    fig.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), fontsize=8, frameon=False)

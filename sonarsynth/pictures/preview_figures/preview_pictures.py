@@ -70,8 +70,8 @@ def draw_preview(
     return files, value
 
 
-def _save(made: Any, file: Path) -> None:
-    made.savefig(file, bbox_inches="tight", pad_inches=0.1)
+def _save(fig: Any, file: Path) -> None:
+    fig.savefig(file, bbox_inches="tight", pad_inches=0.1)
 
 
 def overview(recipe: Recipe, sequence: int) -> Overview:
@@ -79,8 +79,8 @@ def overview(recipe: Recipe, sequence: int) -> Overview:
     scene = recipe.scene_of(sequence)
     last = recipe.steps(sequence) - 1
     middle = last // 2
-    some = np.unique(np.linspace(0, last, SNAP_STEPS).astype(int)).tolist()
-    frames = {step: frame_of(recipe, scene, sequence, step) for step in {*some, middle}}
+    snap_steps = np.unique(np.linspace(0, last, SNAP_STEPS).astype(int)).tolist()
+    frames = {step: frame_of(recipe, scene, sequence, step) for step in {*snap_steps, middle}}
     drawn = frames[middle]
     ahead = drawn.sonar_pose.turn_to_world([1.0, 0.0, 0.0])
     profile = profile_of(scene.world.environment.sound_speed)
@@ -101,8 +101,8 @@ def overview(recipe: Recipe, sequence: int) -> Overview:
 
 def _boxes(frames: list[Frame]) -> dict[str, Floats]:
     """Corners (frame, corner, xyz) of the boxes of each target, once where they stay."""
-    found: dict[str, list[Floats]] = {}
+    corners: dict[str, list[Floats]] = {}
     for frame in frames:
         for body in frame.moment.bodies:
-            found.setdefault(body.name, []).append(body.box)
-    return {name: np.array(boxes if np.ptp(boxes, axis=0).any() else boxes[:1]) for name, boxes in found.items()}
+            corners.setdefault(body.name, []).append(body.box)
+    return {name: np.array(boxes if np.ptp(boxes, axis=0).any() else boxes[:1]) for name, boxes in corners.items()}

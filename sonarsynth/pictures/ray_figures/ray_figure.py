@@ -54,32 +54,32 @@ def section_figure(
     across = np.concatenate([*flat, *(geometry.on_plane(np.atleast_2d(points)) for points in ends)])[:, 0]
     margin = 0.04 * np.ptp(across) or 1.0
     left, right = float(across.min()) - margin, float(across.max()) + margin
-    made = figure(WIDTH + 3.2, 4.0, dpi=110)
-    parts = made.add_gridspec(1, 2, width_ratios=[1.0, 4.0])
-    section = made.add_subplot(parts[1])
+    fig = figure(WIDTH + 3.2, 4.0, dpi=110)
+    layout = fig.add_gridspec(1, 2, width_ratios=[1.0, 4.0])
+    section = fig.add_subplot(layout[1])
     section.set(xlim=(left, right), ylim=(-1.06 * geometry.bottom, 0.06 * geometry.bottom))
     _section(section, geometry)
     drawn = styles(looks)
     for i in drawing_order(looks):
         _draw(section, flat[i], looks[i], drawn[i])
     label(section, f"distance from the array towards {compass(geometry.bearing)} (m)", "")
-    profile_axes(made.add_subplot(parts[0], sharey=section), depth, speed, geometry.bottom)
-    _legend(made, looks, [("field of view", VIEW, "-.")])
-    _colour_bar(made, section, looks)
+    profile_axes(fig.add_subplot(layout[0], sharey=section), depth, speed, geometry.bottom)
+    _legend(fig, looks, [("field of view", VIEW, "-.")])
+    _colour_bar(fig, section, looks)
     section.set_title(" ", fontsize=10, color=INK, loc="left")
-    factor = _equal_scales(made, section)
+    factor = _equal_scales(fig, section)
     section.set_title(f"{title}; {scale_words(factor)}", fontsize=10, color=INK, loc="left")
-    return made
+    return fig
 
 
-def _equal_scales(made: Figure, axes: Axes) -> float:
+def _equal_scales(fig: Figure, axes: Axes) -> float:
     """Give a figure the height at which the scales of axes are equal, within HEIGHTS; returns z over x that is left."""
     for _ in range(2):
-        made.draw_without_rendering()  # the axes find their place
+        fig.draw_without_rendering()  # the axes find their place
         box, (left, right), (low, high) = axes.get_window_extent(), axes.get_xlim(), axes.get_ylim()
-        inches, wide = box.height / made.dpi, box.width / made.dpi
-        made.set_figheight(made.get_figheight() + np.clip(wide * (high - low) / (right - left), *HEIGHTS) - inches)
-    made.draw_without_rendering()
+        inches, wide = box.height / fig.dpi, box.width / fig.dpi
+        fig.set_figheight(fig.get_figheight() + np.clip(wide * (high - low) / (right - left), *HEIGHTS) - inches)
+    fig.draw_without_rendering()
     return vertical_scale(axes)
 
 
@@ -96,9 +96,9 @@ def _section(axes: Axes, geometry: SceneGeometry) -> None:
         )
     axes.plot(*geometry.on_plane(geometry.sensors).T, "s", color=INK, markersize=2.0, zorder=5)
     for name, point in geometry.places.items():
-        place = geometry.on_plane(point[None])[0]
-        axes.plot(*place, "o", color=INK, markersize=4, zorder=5)
-        name_beside(axes, name, place)
+        projected = geometry.on_plane(point[None])[0]
+        axes.plot(*projected, "o", color=INK, markersize=4, zorder=5)
+        name_beside(axes, name, projected)
 
 
 def _draw(axes: Axes, points: Floats, look: Look, style: Style) -> None:
@@ -111,7 +111,7 @@ def _draw(axes: Axes, points: Floats, look: Look, style: Style) -> None:
             axes.plot(*at.T, marker, color=style.colour, markersize=4)
 
 
-def _legend(made: Figure, looks: Sequence[Look], lines: Sequence[tuple[str, str, str]]) -> None:
+def _legend(fig: Figure, looks: Sequence[Look], lines: Sequence[tuple[str, str, str]]) -> None:
     """One legend under the figure: rays by their labels, marks of vertices, other lines (name, colour, dashes)."""
     from matplotlib.lines import Line2D
 
@@ -127,25 +127,25 @@ def _legend(made: Figure, looks: Sequence[Look], lines: Sequence[tuple[str, str,
         name = event if event == "turning point" else f"reflected by {event}"
         handles.append(Line2D([], [], color=INK, marker=marker, linestyle="", markersize=4, label=name))
     handles += [Line2D([], [], color=c, linestyle=dash, label=name) for name, c, dash in lines]  # type: ignore[arg-type]
-    made.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), fontsize=8, frameon=False)
+    fig.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), fontsize=8, frameon=False)
 
 
-def _colour_bar(made: Figure, axes: Axes, looks: Sequence[Look], pad: float = 0.02) -> None:
+def _colour_bar(fig: Figure, axes: Axes, looks: Sequence[Look], pad: float = 0.02) -> None:
     """The scale of the coefficients, where rays have one."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     if highest := highest_coefficient(looks):
-        bar = made.colorbar(ScalarMappable(Normalize(0.0, highest), ERROR_MAP), ax=axes, shrink=0.8, pad=pad)
+        bar = fig.colorbar(ScalarMappable(Normalize(0.0, highest), ERROR_MAP), ax=axes, shrink=0.8, pad=pad)
         bar.set_label("coefficient of scattering", fontsize=8, color=INK)
         bar.ax.tick_params(labelsize=8)
 
 
 def space_figure(title: str, rays: Sequence[Floats], looks: Sequence[Look], geometry: SceneGeometry) -> Figure:
     """Rays (each (point, xyz) in m, world) in space on one scale, with tracks and field of view, and the array."""
-    made = figure(11.0, 5.6, dpi=110)
-    parts = made.add_gridspec(2, 2, width_ratios=[3.4, 1.0])
-    axes: Axes3D = made.add_subplot(parts[:, 0], projection="3d")
+    fig = figure(11.0, 5.6, dpi=110)
+    layout = fig.add_gridspec(2, 2, width_ratios=[3.4, 1.0])
+    axes: Axes3D = fig.add_subplot(layout[:, 0], projection="3d")
     bodies_in_space(axes, geometry.hulls)
     lines = [("field of view, at the array's elevation", VIEW, "-.")]
     axes.plot(*geometry.view["across"].T, color=VIEW, linewidth=0.8, linestyle="-.")
@@ -157,9 +157,9 @@ def space_figure(title: str, rays: Sequence[Floats], looks: Sequence[Look], geom
     for i in drawing_order(looks):
         _draw(axes, rays[i], looks[i], drawn[i])
     axes.scatter(*geometry.sensors.T, s=0.6, color=INK, depthshade=False)
-    for name, place in geometry.places.items():
-        axes.scatter(*place, s=22, color=INK, depthshade=False)
-        over = place if name != "array" else np.append(place[:2], geometry.sensors[:, 2].max())
+    for name, position in geometry.places.items():
+        axes.scatter(*position, s=22, color=INK, depthshade=False)
+        over = position if name != "array" else np.append(position[:2], geometry.sensors[:, 2].max())
         beside = {"ha": "center", "va": "bottom"} if name == "array" else {}
         axes.text(*over, name if beside else f"  {name}", fontsize=9, color=INK, **beside)
     for hull in geometry.hulls:
@@ -167,11 +167,11 @@ def space_figure(title: str, rays: Sequence[Floats], looks: Sequence[Look], geom
         axes.text(*top, f"{hull.name}\n", fontsize=9, color=INK, ha="center", va="bottom", linespacing=0.5)
     every = [*rays, *(hull.vertices for hull in geometry.hulls), *geometry.tracks.values(), geometry.view["across"]]
     one_scale(axes, np.concatenate([*every, *(p[None] for p in geometry.places.values())]), geometry.bearing)
-    _face(made.add_subplot(parts[0, 1]), geometry)
-    _legend(made, looks, lines)
-    _colour_bar(made, axes, looks, pad=0.14)
-    made.suptitle(f"{title}; one scale", x=0.01, ha="left", fontsize=11, color=INK)
-    return made
+    _face(fig.add_subplot(layout[0, 1]), geometry)
+    _legend(fig, looks, lines)
+    _colour_bar(fig, axes, looks, pad=0.14)
+    fig.suptitle(f"{title}; one scale", x=0.01, ha="left", fontsize=11, color=INK)
+    return fig
 
 
 def _face(axes: Axes, geometry: SceneGeometry) -> None:

@@ -53,12 +53,12 @@ def page_figure(rays: Mapping[str, Any], looks: Sequence[Look], geometry: SceneG
 
     specs = [[{"type": "scene", "colspan": 2}, None], [{}, {}]]
     sizes = {"row_heights": [0.66, 0.34], "column_widths": [0.16, 0.84]}
-    made = make_subplots(2, 2, specs=specs, horizontal_spacing=0.06, vertical_spacing=0.05, shared_yaxes=True, **sizes)
+    fig = make_subplots(2, 2, specs=specs, horizontal_spacing=0.06, vertical_spacing=0.05, shared_yaxes=True, **sizes)
     profile = rays["profile"]
     paths: list[str] = []  # of each trace: the paths that it is of, or EVERY
     for line in _surroundings(geometry):
-        made.add_trace(line, row=1, col=1)
-    made.add_trace(
+        fig.add_trace(line, row=1, col=1)
+    fig.add_trace(
         go.Scatter(
             x=profile["speed"], y=-np.array(profile["depth"]), mode="lines", line_color=INK, name="", showlegend=False
         ),
@@ -66,28 +66,28 @@ def page_figure(rays: Mapping[str, Any], looks: Sequence[Look], geometry: SceneG
         1,
     )
     for line in _section(rays, geometry):
-        made.add_trace(line, row=2, col=2)
-    paths += [EVERY] * len(made.data)
+        fig.add_trace(line, row=2, col=2)
+    paths += [EVERY] * len(fig.data)
     named: set[str] = set()
     for path, style, group in _groups(rays["rays"], looks):
         for row, line in ((1, _in_space(group)), (2, _in_section(group, geometry))):
             line.update(line={"color": style.colour, "width": 3.0 * style.width if row == 1 else 1.5 * style.width})
             line.update(legendgroup=style.label, name=style.label, showlegend=style.label not in named)
-            made.add_trace(line, row, row)
+            fig.add_trace(line, row, row)
             named.add(style.label)
             paths.append(path)
-    _lay_out(made, rays, geometry, paths, highest_coefficient(looks))
-    return made
+    _lay_out(fig, rays, geometry, paths, highest_coefficient(looks))
+    return fig
 
 
 def _groups(rays: Sequence[Mapping[str, Any]], looks: Sequence[Look]) -> Iterator[tuple[str, Style, list[Any]]]:
     """Rays of one path and one style, which are one line with gaps; the most important last."""
     drawn = styles(looks)
-    found: dict[tuple[str, Style], list[Any]] = {}
+    by_style: dict[tuple[str, Style], list[Any]] = {}
     for i in drawing_order(looks):
         path = FAN if looks[i].family == FAN else str(rays[i]["name"])
-        found.setdefault((path, drawn[i]), []).append(rays[i])
-    return ((path, style, group) for (path, style), group in found.items())
+        by_style.setdefault((path, drawn[i]), []).append(rays[i])
+    return ((path, style, group) for (path, style), group in by_style.items())
 
 
 def _joined(group: Sequence[Mapping[str, Any]]) -> tuple[Floats, dict[str, Any]]:
@@ -98,8 +98,8 @@ def _joined(group: Sequence[Mapping[str, Any]]) -> tuple[Floats, dict[str, Any]]
         points += [np.array(ray["position"], float), np.full((1, 3), np.nan)]
         numbers += [np.stack(columns, axis=1), np.full((1, 3), np.nan)]
         words += [*_words(ray), ""]
-    said = {"text": words, "customdata": np.concatenate(numbers), "hovertemplate": "%{text}" + HERE, "mode": "lines"}
-    return np.concatenate(points), said
+    options = {"text": words, "customdata": np.concatenate(numbers), "hovertemplate": "%{text}" + HERE, "mode": "lines"}
+    return np.concatenate(points), options
 
 
 def _words(ray: Mapping[str, Any]) -> list[str]:
@@ -120,16 +120,16 @@ def _words(ray: Mapping[str, Any]) -> list[str]:
 def _in_space(group: Sequence[Mapping[str, Any]]) -> Any:
     import plotly.graph_objects as go
 
-    points, said = _joined(group)
-    return go.Scatter3d(x=points[:, 0], y=points[:, 1], z=points[:, 2], **said)
+    points, options = _joined(group)
+    return go.Scatter3d(x=points[:, 0], y=points[:, 1], z=points[:, 2], **options)
 
 
 def _in_section(group: Sequence[Mapping[str, Any]], geometry: SceneGeometry) -> Any:
     import plotly.graph_objects as go
 
-    points, said = _joined(group)
+    points, options = _joined(group)
     flat = geometry.on_plane(points)
-    return go.Scatter(x=flat[:, 0], y=flat[:, 1], **said)
+    return go.Scatter(x=flat[:, 0], y=flat[:, 1], **options)
 
 
 def _section(rays: Mapping[str, Any], geometry: SceneGeometry) -> Iterator[Any]:
@@ -153,12 +153,12 @@ def _surroundings(geometry: SceneGeometry) -> Iterator[Any]:
     """Targets, hydrophones, names, tracks and field of view in space."""
     import plotly.graph_objects as go
 
-    for hull, kept in zip(geometry.hulls, thinned_facets(geometry.hulls), strict=True):
-        used, corner = np.unique(hull.faces[kept], return_inverse=True)
+    for hull, shown in zip(geometry.hulls, thinned_facets(geometry.hulls), strict=True):
+        used, corner = np.unique(hull.faces[shown], return_inverse=True)
         x, y, z = hull.vertices[used].astype(np.float32).T
         i, j, k = corner.reshape(-1, 3).T
         shade = {"color": GREY, "flatshading": True, "hoverinfo": "name", "showlegend": True}
-        note = "" if len(kept) == len(hull.faces) else f" ({len(kept)} of {len(hull.faces)} facets)"
+        note = "" if len(shown) == len(hull.faces) else f" ({len(shown)} of {len(hull.faces)} facets)"
         yield go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, name=escape(hull.name) + note, **shade)
     x, y, z = geometry.sensors.T
     dots = {"mode": "markers", "marker": {"size": 1.5, "color": INK}, "hoverinfo": "name"}
@@ -181,7 +181,7 @@ def thinned_facets(hulls: Sequence[Hull]) -> list[np.ndarray]:
 
 
 def _lay_out(
-    made: Figure, rays: Mapping[str, Any], geometry: SceneGeometry, paths: Sequence[str], strongest: float
+    fig: Figure, rays: Mapping[str, Any], geometry: SceneGeometry, paths: Sequence[str], strongest: float
 ) -> None:
     """Axes on one scale, menus for the vertical exaggeration and for the paths that are drawn."""
     points = [np.array(ray["position"]) for ray in rays["rays"]] + [hull.vertices for hull in geometry.hulls]
@@ -203,9 +203,9 @@ def _lay_out(
     axes = {f"{axis}axis": {"title": name} for axis, name in zip("xyz", AXES, strict=True)}
     angle = geometry.bearing - 0.5 * np.pi + 0.4
     eye = {"x": 1.3 * np.cos(angle), "y": 1.3 * np.sin(angle), "z": 0.6}
-    where = f"frame {rays['frame']}, {len(rays['rays'])} rays"
-    made.update_layout(
-        title={"text": f"{escape(rays['title'])}: {where}", "font": {"size": 15}},
+    subtitle = f"frame {rays['frame']}, {len(rays['rays'])} rays"
+    fig.update_layout(
+        title={"text": f"{escape(rays['title'])}: {subtitle}", "font": {"size": 15}},
         template="plotly_white",
         height=900,
         margin={"l": 60, "r": 20, "t": 90, "b": 50},
@@ -214,10 +214,10 @@ def _lay_out(
         hoverlabel={"align": "left"},
         uirevision="same",  # menus leave the view as it was turned
     )
-    made.update_xaxes(title="sound speed (m/s)", tickformat=".6~g", nticks=4, row=2, col=1)
-    made.update_yaxes(title="up, z (m)", row=2, col=1)
-    made.update_xaxes(title=f"distance from the array towards {compass(geometry.bearing)} (m)", row=2, col=2)
+    fig.update_xaxes(title="sound speed (m/s)", tickformat=".6~g", nticks=4, row=2, col=1)
+    fig.update_yaxes(title="up, z (m)", row=2, col=1)
+    fig.update_xaxes(title=f"distance from the array towards {compass(geometry.bearing)} (m)", row=2, col=2)
     if strongest:
         scale = {"colorscale": ERROR_MAP, "cmin": 0.0, "cmax": strongest, "color": [0.0], "showscale": True}
         bar = {"title": "coefficient", "len": 0.4, "y": 0.35}
-        made.add_scatter(x=[None], y=[None], marker={**scale, "colorbar": bar}, showlegend=False, row=2, col=2)
+        fig.add_scatter(x=[None], y=[None], marker={**scale, "colorbar": bar}, showlegend=False, row=2, col=2)

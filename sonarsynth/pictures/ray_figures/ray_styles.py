@@ -50,8 +50,8 @@ def styles(looks: Sequence[Look]) -> list[Style]:
 
 def highest_coefficient(looks: Sequence[Look]) -> float:
     """The largest coefficient of rays that were sent on from a target; 0 where none was."""
-    found = [look.coefficient for look in looks if np.isfinite(look.coefficient)]
-    return max(found, default=0.0)
+    coefficients = [look.coefficient for look in looks if np.isfinite(look.coefficient)]
+    return max(coefficients, default=0.0)
 
 
 def _style(look: Look, turn: int | None, strongest: float) -> Style:

@@ -36,12 +36,12 @@ def scale_words(factor: float) -> str:
     return "one scale" if 0.97 < factor < 1.03 else f"heights drawn {factor:.2g} times as large"
 
 
-def name_beside(axes: Axes, name: str, place: Floats, over: bool = False) -> None:
+def name_beside(axes: Axes, name: str, point: Floats, over: bool = False) -> None:
     """A name beside a point (2), or over it."""
     from matplotlib.patheffects import withStroke
 
     offset = {"xytext": (0, 5), "ha": "center"} if over else {"xytext": (6, -11)}
-    text = axes.annotate(name, place, textcoords="offset points", fontsize=9, color=INK, zorder=6, **offset)  # type: ignore[arg-type]
+    text = axes.annotate(name, point, textcoords="offset points", fontsize=9, color=INK, zorder=6, **offset)  # type: ignore[arg-type]
     text.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
 
 

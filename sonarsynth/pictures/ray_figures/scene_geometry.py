@@ -43,7 +43,7 @@ def scene_geometry(scene: Scene, frame: Frame, bearing: float) -> SceneGeometry:
     bottom, array = scene.world.environment.depth, frame.sonar_pose.position
     hulls = tuple(Hull(b.name, b.pose.to_world(b.mesh.vertices), b.mesh.faces.astype(int)) for b in frame.moment.bodies)
     snaps = [snap.position for snap in frame.moment.snaps]
-    first = {tuple(place): n for n, place in reversed(list(enumerate(snaps)))}  # of snaps at one place the first
+    first = {tuple(position): n for n, position in reversed(list(enumerate(snaps)))}  # of snaps at one place the first
     listening = elements(scene.sonar.array)
     ends = np.concatenate([[array], *(s[None] for s in snaps), *(hull.vertices for hull in hulls)])
     reach = 1.1 * float(np.linalg.norm(ends - array, axis=1).max()) or bottom
@@ -72,15 +72,15 @@ def _field_of_view(beams: BeamGrid, sonar: Pose, reach: float, bottom: float) ->
     """Sectors of the beams at elevation 0 and at azimuth 0, as far as `reach` (m) and where there is water."""
     level = np.zeros(33)
     sectors = {"across": (_spread(beams.azimuth), level), "upright": (level, _spread(beams.elevation))}
-    found = {}
+    outlines = {}
     for name, (azimuth, elevation) in sectors.items():
         towards = sonar.turn_to_world(direction(azimuth, elevation))
         z, climb = sonar.position[2], towards[:, 2]
         with np.errstate(divide="ignore", invalid="ignore"):
             wet = np.where(climb > 0, -z / climb, np.where(climb < 0, (-bottom - z) / climb, np.inf))
         arc = sonar.position + np.minimum(reach, wet)[:, None] * towards
-        found[name] = np.concatenate([[sonar.position], arc, [sonar.position]])
-    return found
+        outlines[name] = np.concatenate([[sonar.position], arc, [sonar.position]])
+    return outlines
 
 
 def _spread(angles: Floats) -> Floats:

@@ -37,7 +37,7 @@ def numbers_of(tree: xr.DataTree, warnings: Sequence[str] = (), progress: Progre
     objects = true_objects(tree, built)
     of_frame = dict(zip(built.tolist(), split, strict=True))
     whose = [of_frame[frame] for frame in objects.frame.tolist()]
-    found: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         "title": str(tree.attrs.get("title", "")),
         "frames": len(built),
         "frames_of_the_recipe": int(tree.sizes["frame"]),
@@ -54,17 +54,17 @@ def numbers_of(tree: xr.DataTree, warnings: Sequence[str] = (), progress: Progre
         "warnings": list(warnings),
     }
     if "image" in tree.children and len(built):
-        _judge(found, tree, built, progress)
-    return found
+        _judge(numbers, tree, built, progress)
+    return numbers
 
 
 def _by_category(tree: xr.DataTree, objects: TrueObjects, split: list[str]) -> dict[str, dict[str, int]]:
     names = category_names(tree)
     counts = Counter(zip(objects.category.tolist(), split, strict=True))
-    found: dict[str, dict[str, int]] = {}
-    for (number, part), count in sorted(counts.items()):
-        found.setdefault(names[number], {})[part] = count
-    return found
+    by_category: dict[str, dict[str, int]] = {}
+    for (number, split_name), count in sorted(counts.items()):
+        by_category.setdefault(names[number], {})[split_name] = count
+    return by_category
 
 
 def _histogram(values: Floats, split: list[str]) -> dict[str, Any]:
@@ -90,18 +90,18 @@ def leakage(tree: xr.DataTree, frames: Ints, split: list[str]) -> dict[str, int]
     """
     sequence = np.asarray(tree["trajectory"].values)[frames].tolist()
     in_splits: dict[int, set[str]] = {}
-    for number, part in zip(sequence, split, strict=True):
-        in_splits.setdefault(number, set()).add(part)
+    for number, split_name in zip(sequence, split, strict=True):
+        in_splits.setdefault(number, set()).add(split_name)
     names = ("truth/targets/position", "truth/emissions/position", "truth/sonar_position")
     places = [np.asarray(tree[name].values)[frames].reshape(len(frames), -1) for name in names]
     rounded = np.rint(1e3 * np.nan_to_num(np.concatenate(places, axis=1))).astype(np.int64)
-    seen: dict[bytes, set[str]] = {}
+    by_content: dict[bytes, set[str]] = {}
     keys = [row.tobytes() for row in rounded]
-    for key, part in zip(keys, split, strict=True):
-        seen.setdefault(key, set()).add(part)
+    for key, split_name in zip(keys, split, strict=True):
+        by_content.setdefault(key, set()).add(split_name)
     return {
-        "sequences": sum(len(parts) > 1 for parts in in_splits.values()),
-        "equal_frames": sum(len(seen[key]) > 1 for key in keys),
+        "sequences": sum(len(splits) > 1 for splits in in_splits.values()),
+        "equal_frames": sum(len(by_content[key]) > 1 for key in keys),
     }
 
 
@@ -109,15 +109,15 @@ def _range_errors(tree: xr.DataTree, frames: Ints) -> dict[str, Any]:
     """Errors of the ranges of points that are direct echoes, in tenths of the points by predicted error."""
     if not has_labels(tree):
         return {"points": 0, "predicted": [], "rms": []}
-    found = points(tree, frames)
-    good = found.judged & np.isfinite(found.error) & (found.range_error > 0.0)
-    order = np.argsort(found.range_error[good], kind="stable")
-    parts = [part for part in np.array_split(order, 10) if len(part)]
-    error, predicted = found.error[good], found.range_error[good]
+    cloud = points(tree, frames)
+    good = cloud.judged & np.isfinite(cloud.error) & (cloud.range_error > 0.0)
+    order = np.argsort(cloud.range_error[good], kind="stable")
+    tenths = [tenth for tenth in np.array_split(order, 10) if len(tenth)]
+    error, predicted = cloud.error[good], cloud.range_error[good]
     return {
         "points": int(good.sum()),
-        "predicted": [float(np.sqrt(np.mean(predicted[part] ** 2))) for part in parts],
-        "rms": [float(np.sqrt(np.mean(error[part] ** 2))) for part in parts],
+        "predicted": [float(np.sqrt(np.mean(predicted[tenth] ** 2))) for tenth in tenths],
+        "rms": [float(np.sqrt(np.mean(error[tenth] ** 2))) for tenth in tenths],
     }
 
 
@@ -126,24 +126,26 @@ def _some(frames: Ints) -> Ints:
     return frames if len(frames) <= MOST_JUDGED else frames[np.linspace(0, len(frames) - 1, MOST_JUDGED).astype(int)]
 
 
-def _judge(found: dict[str, Any], tree: xr.DataTree, built: Ints, progress: Progress | None) -> None:
+def _judge(numbers: dict[str, Any], tree: xr.DataTree, built: Ints, progress: Progress | None) -> None:
     """Baselines on some frames, and the frames that the first of them is worst in."""
-    some = _some(built)
+    judged = _some(built)
     methods = {kind: by_kind(kind) for kind in BASELINES}
     rows: dict[str, list[dict[str, Any]]] = {kind: [] for kind in methods}
-    for done, (frame, view) in enumerate(views(tree, some), 1):
+    for done, (frame, view) in enumerate(views(tree, judged), 1):
         for kind, method in methods.items():
-            rows[kind] += [{"frame": frame, **one} for one in detections_of(view, method.regions(view))]
+            rows[kind] += [{"frame": frame, **detection} for detection in detections_of(view, method.regions(view))]
         if progress is not None:
-            progress(done, len(some), 0)
-    objects = true_objects(tree, some)
-    reports = {kind: _report(tree, len(some), from_rows(mine), objects) for kind, mine in rows.items()}
-    found["judged_frames"] = len(some)
-    found["baselines"] = {kind: report.as_json() for kind, report in reports.items()}
-    found["hardest"] = _hardest(reports[ImagePeaks().kind])
-    if len(objects) and found["baselines"]["peaks"]["ap_2m"] > TRIVIAL:
-        reached = found["baselines"]["peaks"]["ap_2m"]
-        found["warnings"].append(f"a threshold reaches an average precision of {reached:.2f}: there is little to learn")
+            progress(done, len(judged), 0)
+    objects = true_objects(tree, judged)
+    reports = {kind: _report(tree, len(judged), from_rows(detections), objects) for kind, detections in rows.items()}
+    numbers["judged_frames"] = len(judged)
+    numbers["baselines"] = {kind: report.as_json() for kind, report in reports.items()}
+    numbers["hardest"] = _hardest(reports[ImagePeaks().kind])
+    if len(objects) and numbers["baselines"]["peaks"]["ap_2m"] > TRIVIAL:
+        reached = numbers["baselines"]["peaks"]["ap_2m"]
+        numbers["warnings"].append(
+            f"a threshold reaches an average precision of {reached:.2f}: there is little to learn"
+        )
 
 
 def _report(tree: xr.DataTree, frames: int, detections: Detections, objects: TrueObjects) -> DetectorReport:

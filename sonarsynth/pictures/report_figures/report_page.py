@@ -46,12 +46,12 @@ def report(
     out: the file, `<store>.report.html` where it is left out. The page holds plotly.js (5 MB) and its own numbers as
     JSON (the element `numbers`). Returns the file and the numbers. Raises NothingToDraw where no frame is built.
     """
-    place = folder_of(store)
-    tree = open_store(place)
+    folder = folder_of(store)
+    tree = open_store(folder)
     if not len(built_frames(tree)):
-        raise NothingToDraw(f"{place}: no frame has been built")
-    numbers = numbers_of(tree, warnings_of(place), progress)
-    beside = named_after(place)
+        raise NothingToDraw(f"{folder}: no frame has been built")
+    numbers = numbers_of(tree, warnings_of(folder), progress)
+    beside = named_after(folder)
     file = Path(out) if out is not None else beside.with_name(f"{beside.name}.report.html")
     from sonarsynth.pictures.report_figures import report_plots as plots
 
@@ -62,15 +62,15 @@ def report(
         ("Baseline detectors", plots.baselines(numbers)),
     ]
     title = escape(f"{numbers['title']}: {beside.name}")
-    parts = [f"<h1>{title}</h1>", *_head(numbers)]
+    sections = [f"<h1>{title}</h1>", *_head(numbers)]
     script = True
     for heading, figure in figures:
         if figure is not None:
-            parts.append(f"<h2>{escape(heading)}</h2>{_drawn(figure, script)}")
+            sections.append(f"<h2>{escape(heading)}</h2>{_drawn(figure, script)}")
             script = False
-    parts += [*_clouds(numbers), *_scores(numbers)]
+    sections += [*_clouds(numbers), *_scores(numbers)]
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(PAGE.format(title=title, body="\n".join(parts), numbers=_as_json(numbers)), encoding="utf-8")
+    file.write_text(PAGE.format(title=title, body="\n".join(sections), numbers=_as_json(numbers)), encoding="utf-8")
     return file, numbers
 
 
@@ -85,9 +85,9 @@ def _as_json(numbers: dict[str, Any]) -> str:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, dict):
-        return {str(name): _plain(part) for name, part in value.items()}
+        return {str(name): _plain(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(part) for part in value]
+        return [_plain(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -116,9 +116,9 @@ def _clouds(numbers: dict[str, Any]) -> list[str]:
     if not by:
         return []
     rows = [(limit, *(f"{row[name]:.3f}" for name in ("precision", "recall", "f_score"))) for limit, row in by.items()]
-    said = f"Chamfer distance {numbers['clouds']['chamfer']:.3g} m, of {numbers['clouds']['points']} points."
+    text = f"Chamfer distance {numbers['clouds']['chamfer']:.3g} m, of {numbers['clouds']['points']} points."
     table = _table(("within", "points on the surface", "surface found", "F-score"), rows)
-    return [f"<h2>Clouds against the surfaces that the array sees</h2><p>{said}</p>{table}"]
+    return [f"<h2>Clouds against the surfaces that the array sees</h2><p>{text}</p>{table}"]
 
 
 def _scores(numbers: dict[str, Any]) -> list[str]:

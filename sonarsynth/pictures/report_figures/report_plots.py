@@ -29,13 +29,13 @@ def film(tree: xr.DataTree, frames: Ints) -> Figure | None:
         return None
     import plotly.graph_objects as go
 
-    some = frames if len(frames) <= MOST_SHOWN else frames[np.linspace(0, len(frames) - 1, MOST_SHOWN).astype(int)]
+    chosen = frames if len(frames) <= MOST_SHOWN else frames[np.linspace(0, len(frames) - 1, MOST_SHOWN).astype(int)]
     image = tree["image"].dataset
     azimuth, elevation = image["azimuth"].values, image["elevation"].values
-    objects, names = true_objects(tree, some), [escape(name) for name in category_names(tree)]
+    objects, names = true_objects(tree, chosen), [escape(name) for name in category_names(tree)]
     sequence, step = (np.asarray(tree[name].values) for name in ("trajectory", "step"))
     shown, steps = [], []
-    for frame in some.tolist():
+    for frame in chosen.tolist():
         energy = np.nan_to_num(image["energy"].isel(frame=frame).values)
         brightest = max(float(energy.max()), np.finfo(np.float32).tiny)
         level = 10.0 * np.log10(np.maximum(energy / brightest, 10.0 ** (FAINTEST / 10.0)))
@@ -64,7 +64,7 @@ def _boxes(objects: TrueObjects, frame: int, azimuth: np.ndarray, elevation: np.
 
     x: list[float | None] = []
     y: list[float | None] = []
-    said: list[str] = []
+    texts: list[str] = []
     for row in np.flatnonzero(objects.frame == frame):
         sides = objects.box[row] - 0.5
         x0, x1 = np.interp(sides[[0, 2]], np.arange(len(azimuth)), azimuth).tolist()
@@ -72,8 +72,8 @@ def _boxes(objects: TrueObjects, frame: int, azimuth: np.ndarray, elevation: np.
         x += [x0, x1, x1, x0, x0, None]
         y += [y0, y0, y1, y1, y0, None]
         text = f"{names[objects.category[row]]}, {objects.range[row]:.1f} m, {objects.snr[row]:.1f} dB"
-        said += [text] * 6
-    return go.Scatter(x=x, y=y, text=said, mode="lines", line={"color": "#7fe0ff"}, hoverinfo="text")
+        texts += [text] * 6
+    return go.Scatter(x=x, y=y, text=texts, mode="lines", line={"color": "#7fe0ff"}, hoverinfo="text")
 
 
 def histograms(numbers: dict[str, Any]) -> Figure:
@@ -87,12 +87,12 @@ def histograms(numbers: dict[str, Any]) -> Figure:
         names = list(numbers["categories"])
         counts = [numbers["categories"][name].get(split, 0) for name in names]
         figure.add_trace(go.Bar(x=[escape(name) for name in names], y=counts, **look), 1, 1)
-        for place, name in enumerate(QUANTITIES, 1):
+        for number, name in enumerate(QUANTITIES, 1):
             of = numbers["histograms"][name]
             edges = np.array(of["edges"])
             if len(edges):
                 bar = go.Bar(x=0.5 * (edges[1:] + edges[:-1]), y=of["counts"].get(split, []), showlegend=False, **look)
-                figure.add_trace(bar, 1 + place // 3, 1 + place % 3)
+                figure.add_trace(bar, 1 + number // 3, 1 + number % 3)
     figure.update_layout(barmode="stack", height=560)
     return figure
 

@@ -21,27 +21,27 @@ def image_picture(tree: xr.DataTree, frame: int) -> Figure:
     _, view = _read(tree, frame)
     if view.level is None:
         raise NothingToDraw(f"frame {frame} has no image")
-    made = figure(7.6, 6.0, dpi=110)
-    made.suptitle(f"{view.title}   {view.moment}", x=0.01, ha="left", fontsize=11, color=INK)
-    axes = made.add_subplot()
+    fig = figure(7.6, 6.0, dpi=110)
+    fig.suptitle(f"{view.title}   {view.moment}", x=0.01, ha="left", fontsize=11, color=INK)
+    axes = fig.add_subplot()
     outlines = draw_image(axes, *beam_grid(tree), view, "energy re the brightest beam (dB)")
-    settle(made)
+    settle(fig)
     GhostMarks(axes).show(view.ghosts, view.lobes, outlines)
-    return made
+    return fig
 
 
 def cloud_picture(tree: xr.DataTree, frame: int) -> Figure:
     """The points in the true hulls, in 3-D, coloured by range error. Raises NothingToDraw."""
-    found, view = _read(tree, frame)
-    made = figure(7.6, 6.0, dpi=110)
-    made.suptitle(f"{view.title}   {view.moment}", x=0.01, ha="left", fontsize=11, color=INK)
-    axes = made.add_subplot(projection="3d")
-    draw_cloud(axes, made, view, Errors(found.points, found.range_error), window([view]))
-    return made
+    stored_frame, view = _read(tree, frame)
+    fig = figure(7.6, 6.0, dpi=110)
+    fig.suptitle(f"{view.title}   {view.moment}", x=0.01, ha="left", fontsize=11, color=INK)
+    axes = fig.add_subplot(projection="3d")
+    draw_cloud(axes, fig, view, Errors(stored_frame.points, stored_frame.range_error), window([view]))
+    return fig
 
 
 def _read(tree: xr.DataTree, frame: int) -> tuple[StoredFrame, View]:
     if frame not in built(tree):
         raise NothingToDraw(f"frame {frame} has not been built")
-    found = stored(tree, frame)
-    return found, frame_view(tree, found)
+    stored_frame = stored(tree, frame)
+    return stored_frame, frame_view(tree, stored_frame)

@@ -38,115 +38,127 @@ class _Curve:
 
 
 def soundscape_figure(
-    title: str, made: MeasuredFigures, model: PredictedFigures, recording: MeasuredFigures | None = None
+    title: str, measured: MeasuredFigures, model: PredictedFigures, recording: MeasuredFigures | None = None
 ) -> Figure:
     """The sheet: spectrum, rates of loud arrivals, amplitudes, elevations, coherence, gaps."""
     sheet = figure(15.0, 8.6)
     panels = sheet.subplots(2, 3).ravel()
     for axes in panels:
         grid(axes)
-    both = [_Curve(made, HEARD, "sound", PASCAL, "sound"), *([_of_recording(recording, made)] if recording else [])]
+    both = [
+        _Curve(measured, HEARD, "sound", PASCAL, "sound"),
+        *([_of_recording(recording, measured)] if recording else []),
+    ]
     _spectrum(panels[0], both, model)
     _rates(panels[1], both, model)
     _amplitudes(panels[2], both)
-    _elevations(panels[3], made, model)
-    _coherence(panels[4], made, model)
+    _elevations(panels[3], measured, model)
+    _coherence(panels[4], measured, model)
     _gaps(panels[5], both, model)
     for axes in panels:
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize=7, frameon=False)
     sheet.suptitle(title, fontsize=11, color=INK, x=0.01, ha="left")
-    notes = [*made.sound.notes, *(recording.sound.notes if recording else ())]
-    levels = [f"{one.name}: {_percentiles(one.figures)}" for one in both]
+    notes = [*measured.sound.notes, *(recording.sound.notes if recording else ())]
+    levels = [f"{curve.name}: {_percentiles(curve.figures)}" for curve in both]
     sheet.supxlabel(fill("; ".join([*levels, *notes]), 230), fontsize=8, color=INK, x=0.01, ha="left")
     return sheet
 
 
-def _of_recording(recording: MeasuredFigures, made: MeasuredFigures) -> _Curve:
+def _of_recording(recording: MeasuredFigures, measured: MeasuredFigures) -> _Curve:
     """The curve of a recording; without calibration its mean level in 1/3 octaves is put at that of the sound."""
     if recording.sound.calibrated:
         return _Curve(recording, RECORDED, "recording", PASCAL, "recording")
-    _, ours, theirs = np.intersect1d(made.centres.round(3), recording.centres.round(3), return_indices=True)
-    levels, others = made.figures.octaves[ours], recording.figures.octaves[theirs]
+    _, ours, theirs = np.intersect1d(measured.centres.round(3), recording.centres.round(3), return_indices=True)
+    levels, others = measured.figures.octaves[ours], recording.figures.octaves[theirs]
     if not len(levels):
-        levels, others = made.figures.moments[:1], recording.figures.moments[:1]
+        levels, others = measured.figures.moments[:1], recording.figures.moments[:1]
     shift = float(np.mean(levels) - np.mean(others))
     return _Curve(recording, RECORDED, "recording", PASCAL + shift, "recording, shifted to the sound")
 
 
-def _percentiles(one: MeasuredFigures) -> str:
-    zero = PASCAL if one.sound.calibrated else 0.0
-    found = " / ".join(f"{level + zero:.1f}" for level in one.figures.percentiles)
-    return f"{'/'.join(f'{p:g}' for p in PERCENT)} % of 1 ms levels {found} {one.sound.unit}"
+def _percentiles(data: MeasuredFigures) -> str:
+    zero = PASCAL if data.sound.calibrated else 0.0
+    levels = " / ".join(f"{level + zero:.1f}" for level in data.figures.percentiles)
+    return f"{'/'.join(f'{p:g}' for p in PERCENT)} % of 1 ms levels {levels} {data.sound.unit}"
 
 
 def _spectrum(axes: Axes, both: list[_Curve], model: PredictedFigures) -> None:
-    made = both[0].figures
+    first = both[0].figures
     for curve in both:
-        one, colour, zero = curve.figures, curve.colour, curve.zero
-        level = decibels(one.figures.density) + zero
-        wide = 10.0 / np.log(10.0) * one.spread.density / np.maximum(one.figures.density, 1e-300)
-        axes.fill_between(1e-3 * one.frequency, level - wide, level + wide, color=colour, alpha=0.2, linewidth=0)
+        data, colour, zero = curve.figures, curve.colour, curve.zero
+        level = decibels(data.figures.density) + zero
+        wide = 10.0 / np.log(10.0) * data.spread.density / np.maximum(data.figures.density, 1e-300)
+        axes.fill_between(1e-3 * data.frequency, level - wide, level + wide, color=colour, alpha=0.2, linewidth=0)
         axes.plot(
-            1e-3 * one.frequency,
+            1e-3 * data.frequency,
             level,
             color=colour,
             linewidth=0.9,
-            label=f"{curve.legend} ({one.sound.seconds:.3g} s)",
+            label=f"{curve.legend} ({data.sound.seconds:.3g} s)",
         )
-        centre = 1e-3 * one.centres
+        centre = 1e-3 * data.centres
         axes.errorbar(
-            centre, one.figures.octaves + zero, one.spread.octaves, fmt="s", color=colour, markersize=4, capsize=2
+            centre, data.figures.octaves + zero, data.spread.octaves, fmt="s", color=colour, markersize=4, capsize=2
         )
     total = decibels(model.density) + PASCAL
-    for (name, part), colour in zip(model.parts.items(), PARTS * len(model.parts), strict=False):
-        if len(model.parts) > 1 and (part_level := decibels(part) + PASCAL).max() > total.max() - SHOWN:
-            axes.plot(1e-3 * made.frequency, part_level, color=colour, linewidth=0.8, label=name)
-    axes.plot(1e-3 * made.frequency, total, "--", color=MODEL, linewidth=1.4, label="model")
+    for (name, density), colour in zip(model.parts.items(), PARTS * len(model.parts), strict=False):
+        if len(model.parts) > 1 and (part_level := decibels(density) + PASCAL).max() > total.max() - SHOWN:
+            axes.plot(1e-3 * first.frequency, part_level, color=colour, linewidth=0.8, label=name)
+    axes.plot(1e-3 * first.frequency, total, "--", color=MODEL, linewidth=1.4, label="model")
     axes.set_ylim(total.max() - SHOWN, None)
-    off = float(np.mean(made.figures.octaves - model.octaves)) if len(model.octaves) else float("nan")
-    said = f": {off:+.1f} dB re model (+- {model.scatter:.1f} by chance)" if np.isfinite(off) else ""
-    label(axes, "frequency (kHz)", "spectral level (dB re 1 uPa2/Hz)", f"spectrum, 1/3 octaves (squares){said}")
+    off = float(np.mean(first.figures.octaves - model.octaves)) if len(model.octaves) else float("nan")
+    offset = f": {off:+.1f} dB re model (+- {model.scatter:.1f} by chance)" if np.isfinite(off) else ""
+    label(axes, "frequency (kHz)", "spectral level (dB re 1 uPa2/Hz)", f"spectrum, 1/3 octaves (squares){offset}")
 
 
 def _rates(axes: Axes, both: list[_Curve], model: PredictedFigures) -> None:
-    made = both[0].figures
+    first = both[0].figures
     for curve in both:
-        one, colour, zero = curve.figures, curve.colour, curve.zero
-        some = one.figures.rates > 0.0
-        x = one.levels[some] + zero
+        data, colour, zero = curve.figures, curve.colour, curve.zero
+        positive = data.figures.rates > 0.0
+        x = data.levels[positive] + zero
         axes.errorbar(
-            x, one.figures.rates[some], one.spread.rates[some], fmt="o", color=colour, capsize=2, label=curve.legend
+            x,
+            data.figures.rates[positive],
+            data.spread.rates[positive],
+            fmt="o",
+            color=colour,
+            capsize=2,
+            label=curve.legend,
         )
     if model.rates is not None:
-        some = model.rates > 0.01 / made.sound.seconds
-        axes.plot(made.levels[some] + PASCAL, model.rates[some], "--", color=MODEL, label="model")
+        positive = model.rates > 0.01 / first.sound.seconds
+        axes.plot(first.levels[positive] + PASCAL, model.rates[positive], "--", color=MODEL, label="model")
     if axes.get_legend_handles_labels()[0]:
         axes.set_yscale("log")
-        axes.set_ylim(0.1 / made.sound.seconds, None)
+        axes.set_ylim(0.1 / first.sound.seconds, None)
     else:
         _nothing(axes, "nothing is 14 dB over the mean")
-    label(axes, f"peak level ({made.sound.unit})", "arrivals above it (1/s)", "loud arrivals at a hydrophone")
+    label(axes, f"peak level ({first.sound.unit})", "arrivals above it (1/s)", "loud arrivals at a hydrophone")
 
 
 def _amplitudes(axes: Axes, both: list[_Curve]) -> None:
     titles = []
     for curve in both:
-        one, colour, name, zero = curve.figures, curve.colour, curve.name, curve.zero
-        x, known = 10.0 ** (one.tail / 20.0), one.figures
-        some = known.exceedance > 0.0
-        axes.plot(one.tail[some] + zero, known.exceedance[some], color=colour, linewidth=1.4, label=curve.legend)
-        gauss = erfc(x / 10.0 ** (known.moments[0] / 20.0) / np.sqrt(2.0))
-        axes.plot(one.tail + zero, gauss, ":", color=colour, label="Gaussian of its power")
-        alpha, scale = known.alpha[1], known.scale[1]
+        data, colour, name, zero = curve.figures, curve.colour, curve.name, curve.zero
+        x, figures = 10.0 ** (data.tail / 20.0), data.figures
+        positive = figures.exceedance > 0.0
+        axes.plot(
+            data.tail[positive] + zero, figures.exceedance[positive], color=colour, linewidth=1.4, label=curve.legend
+        )
+        gauss = erfc(x / 10.0 ** (figures.moments[0] / 20.0) / np.sqrt(2.0))
+        axes.plot(data.tail + zero, gauss, ":", color=colour, label="Gaussian of its power")
+        alpha, scale = figures.alpha[1], figures.scale[1]
         if np.isfinite(alpha):
             law = exceedance(x / 10.0 ** (scale / 20.0), float(alpha))
-            axes.plot(one.tail + zero, law, "--", color=colour, linewidth=0.9, label=f"stable, alpha {alpha:.2f}")
-        each = ", ".join(f"{a:.2f}" if np.isfinite(a) else "none" for a in known.alpha)
-        titles.append(f"{name}: alpha {each}; kurtosis {known.moments[1]:.3g} over 3")
+            axes.plot(data.tail + zero, law, "--", color=colour, linewidth=0.9, label=f"stable, alpha {alpha:.2f}")
+        exponents = ", ".join(f"{a:.2f}" if np.isfinite(a) else "none" for a in figures.alpha)
+        titles.append(f"{name}: alpha {exponents}; kurtosis {figures.moments[1]:.3g} over 3")
     axes.set_yscale("log")
     least = min(
-        float(one.figures.exceedance[one.figures.exceedance > 0.0].min()) for one in (curve.figures for curve in both)
+        float(data.figures.exceedance[data.figures.exceedance > 0.0].min())
+        for data in (curve.figures for curve in both)
     )
     axes.set_ylim(0.5 * least, 1.5)
     short = "/".join(name.split()[0] for name in ESTIMATORS)
@@ -155,26 +167,28 @@ def _amplitudes(axes: Axes, both: list[_Curve]) -> None:
     )
 
 
-def _elevations(axes: Axes, made: MeasuredFigures, model: PredictedFigures) -> None:
-    known, edges = made.sound.arrivals, elevation_edges()
-    if known is None or model.elevation is None:
+def _elevations(axes: Axes, measured: MeasuredFigures, model: PredictedFigures) -> None:
+    arrivals, edges = measured.sound.arrivals, elevation_edges()
+    if arrivals is None or model.elevation is None:
         _nothing(axes, "no arrivals are known")
         label(axes, "elevation (deg)", "", "arrivals by elevation")
         return
     degrees = np.rad2deg(np.arcsin(edges))
-    value, wide = known.by_elevation(edges)
+    value, wide = arrivals.by_elevation(edges)
     middle = 0.5 * (degrees[1:] + degrees[:-1])
     axes.errorbar(middle[value > 0], value[value > 0], wide[value > 0], fmt="o", color=HEARD, capsize=2, label="sound")
     axes.stairs(model.elevation, degrees, color=MODEL, linestyle="--", label="model")
-    if known.above is None:
+    if arrivals.above is None:
         law = np.array([_inverse_sine(a, b) for a, b in pairwise(edges.tolist())])
         axes.stairs(law * model.elevation.sum() / law.sum(), degrees, color=PALE, label="1/|sin|, same sum")
         of = "energy re a snap at 1 m"
     else:
-        of = f"paths over {known.above:.0f} dB"
+        of = f"paths over {arrivals.above:.0f} dB"
     top = max(float(model.elevation.max()), float(value.max()))
     axes.set(yscale="log", ylim=(1e-4 * top, 3.0 * top))
-    label(axes, "elevation (deg, up positive)", f"{of} in 10 deg", f"arrivals by elevation ({len(known.sine)} paths)")
+    label(
+        axes, "elevation (deg, up positive)", f"{of} in 10 deg", f"arrivals by elevation ({len(arrivals.sine)} paths)"
+    )
 
 
 def _inverse_sine(low: float, high: float, least: float = 0.005) -> float:
@@ -183,18 +197,18 @@ def _inverse_sine(low: float, high: float, least: float = 0.005) -> float:
     return float(np.log(max(b, least) / max(a, least)))
 
 
-def _coherence(axes: Axes, made: MeasuredFigures, model: PredictedFigures) -> None:
-    offset = made.sound.position[made.pairs] - made.sound.position[0]
+def _coherence(axes: Axes, measured: MeasuredFigures, model: PredictedFigures) -> None:
+    offset = measured.sound.position[measured.pairs] - measured.sound.position[0]
     away = np.linalg.norm(offset, axis=1)
     level = np.abs(offset[:, 2]) < 0.5 * away
-    for n, (f, colour) in enumerate(zip(made.at.tolist(), RAYS, strict=False)):
-        for some, mark, line, way in ((level, "o", "--", "across"), (~level, "^", ":", "up")):
-            if not some.any():
+    for n, (f, colour) in enumerate(zip(measured.at.tolist(), RAYS, strict=False)):
+        for mask, mark, line, orientation in ((level, "o", "--", "across"), (~level, "^", ":", "up")):
+            if not mask.any():
                 continue
-            order = np.flatnonzero(some)[np.argsort(away[some])]
-            got, wide = made.figures.coherence[n, order], made.spread.coherence[n, order]
-            said = f"{1e-3 * f:.3g} kHz {way}"
-            axes.errorbar(away[order], got, wide, fmt=mark, color=colour, markersize=4, capsize=2, label=said)
+            order = np.flatnonzero(mask)[np.argsort(away[mask])]
+            coherence, wide = measured.figures.coherence[n, order], measured.spread.coherence[n, order]
+            text = f"{1e-3 * f:.3g} kHz {orientation}"
+            axes.errorbar(away[order], coherence, wide, fmt=mark, color=colour, markersize=4, capsize=2, label=text)
             axes.plot(away[order], model.coherence[n, order], mark + line, color=colour, mfc="none", linewidth=0.8)
     if not len(away):
         _nothing(axes, "no hydrophones near enough to each other")
@@ -204,16 +218,20 @@ def _coherence(axes: Axes, made: MeasuredFigures, model: PredictedFigures) -> No
 def _gaps(axes: Axes, both: list[_Curve], model: PredictedFigures) -> None:
     titles = []
     for curve in both:
-        one, colour, name, zero = curve.figures, curve.colour, curve.name, curve.zero
-        gaps = np.sort(one.gaps)
+        data, colour, name, zero = curve.figures, curve.colour, curve.name, curve.zero
+        gaps = np.sort(data.gaps)
         if not gaps.size:
-            titles.append(f"{name}: too few that stand apart" if one.sound.running else f"{name}: frames are too short")
+            titles.append(
+                f"{name}: too few that stand apart" if data.sound.running else f"{name}: frames are too short"
+            )
             continue
         share = 1.0 - np.arange(len(gaps)) / len(gaps)
-        axes.step(1e3 * gaps, share, where="post", color=colour, label=f"{curve.legend}, over {one.loud + zero:.0f} dB")
+        axes.step(
+            1e3 * gaps, share, where="post", color=colour, label=f"{curve.legend}, over {data.loud + zero:.0f} dB"
+        )
         axes.plot(1e3 * gaps, np.exp(-gaps / gaps.mean()), ":", color=colour, label="Poisson of its rate")
         predicted = f" (model {model.fano:.1f})" if name == "sound" and np.isfinite(model.fano) else ""
-        titles.append(f"{name}: Fano factor {one.figures.fano[0]:.2g} +- {one.spread.fano[0]:.1g}{predicted}")
+        titles.append(f"{name}: Fano factor {data.figures.fano[0]:.2g} +- {data.spread.fano[0]:.1g}{predicted}")
     if axes.get_legend_handles_labels()[0]:
         axes.set(xscale="log", yscale="log")
     else:

@@ -36,31 +36,31 @@ class Soundscape:
 
     def as_json(self) -> dict[str, Any]:
         """All numbers, for programs; null where there is none."""
-        found = {"title": self.title, **as_json(self.measured, self.predicted)}
-        return found if self.recording is None else found | {"recording": as_json(self.recording)}
+        content = {"title": self.title, **as_json(self.measured, self.predicted)}
+        return content if self.recording is None else content | {"recording": as_json(self.recording)}
 
     def summary(self) -> list[str]:
         """The figures in a few lines, each beside its model."""
-        got, wide, model = self.measured.figures, self.measured.spread, self.predicted
+        figures, wide, model = self.measured.figures, self.measured.spread, self.predicted
         lines = [
-            f"level in the band: {got.moments[0] + PASCAL:.1f} +- {wide.moments[0]:.1f} dB re 1 uPa rms "
+            f"level in the band: {figures.moments[0] + PASCAL:.1f} +- {wide.moments[0]:.1f} dB re 1 uPa rms "
             f"(model {model.root + PASCAL:.1f}, +- {model.scatter:.1f} in so short a time)"
         ]
-        off = got.octaves - model.octaves
+        off = figures.octaves - model.octaves
         if off.size:
             lines.append(
                 f"1/3 octaves: {np.mean(off):+.2f} dB re the model on average, at most {np.abs(off).max():.2f} dB off, "
                 f"spread {np.mean(wide.octaves):.2f} dB"
             )
         if model.rates is not None:
-            rows = zip(self.measured.levels, got.rates, wide.rates, model.rates, strict=True)
+            rows = zip(self.measured.levels, figures.rates, wide.rates, model.rates, strict=True)
             lines += [
-                f"arrivals over {level + PASCAL:.0f} dB: {rate:.3g} +- {spread:.2g} /s (model {said:.3g})"
-                for level, rate, spread, said in rows
+                f"arrivals over {level + PASCAL:.0f} dB: {rate:.3g} +- {spread:.2g} /s (model {predicted:.3g})"
+                for level, rate, spread, predicted in rows
             ]
-        if np.isfinite(got.fano[0]):
+        if np.isfinite(figures.fano[0]):
             lines.append(
-                f"Fano factor of loud arrivals: {got.fano[0]:.2g} +- {wide.fano[0]:.1g} (model {model.fano:.2g})"
+                f"Fano factor of loud arrivals: {figures.fano[0]:.2g} +- {wide.fano[0]:.1g} (model {model.fano:.2g})"
             )
         return [*lines, *(f"note: {note}" for note in self.measured.sound.notes)]
 
@@ -101,10 +101,10 @@ def _recording(recipe: Recipe, compare: SeaRecording | None) -> MeasuredFigures 
     return measure(recorded_sound(compare, recipe.scene_of(0).sonar))
 
 
-def draw_soundscape(found: Soundscape, out: Path) -> Path:
+def draw_soundscape(analysis: Soundscape, out: Path) -> Path:
     """Draw the sheet of figures into a file; returns it."""
-    made = soundscape_figure(found.title, found.measured, found.predicted, found.recording)
-    return save(made, out, dpi=110)
+    fig = soundscape_figure(analysis.title, analysis.measured, analysis.predicted, analysis.recording)
+    return save(fig, out, dpi=110)
 
 
 def soundscape(
@@ -143,8 +143,8 @@ def soundscape(
     """
     beside = None if compare is None else SeaRecording(compare, pascals, channel, dataset, sampling_frequency)
     if isinstance(source, Recipe):
-        found = soundscape_of_recipe(source, seconds, beside)
+        analysis = soundscape_of_recipe(source, seconds, beside)
     else:
-        found = soundscape_of_store(source, files, beside)
-    draw_soundscape(found, Path(out))
-    return found
+        analysis = soundscape_of_store(source, files, beside)
+    draw_soundscape(analysis, Path(out))
+    return analysis
