@@ -38,9 +38,9 @@ def envelope_levels(beams: BeamSpectra, sonar: Sonar, delays: int) -> Floats:
     u = direction(sonar.beams.azimuth, sonar.beams.elevation[:, None]).reshape(-1, 3)
     level = np.empty((len(u), delays))
     for low in range(0, len(u), BEAMS_AT_ONCE):
-        some = slice(low, low + BEAMS_AT_ONCE)
+        block = slice(low, low + BEAMS_AT_ONCE)
         # of a real signal: twice its positive frequencies; a sum over bins where ifft takes the mean
-        envelope = np.abs(ifft(beams.spectra(u[some]), axis=1)[:, :delays]) * (2.0 * bins / length)
+        envelope = np.abs(ifft(beams.spectra(u[block]), axis=1)[:, :delays]) * (2.0 * bins / length)
         with np.errstate(divide="ignore"):
-            level[some] = 20.0 * np.log10(envelope / (np.sqrt(2.0) * REFERENCE_PRESSURE))
+            level[block] = 20.0 * np.log10(envelope / (np.sqrt(2.0) * REFERENCE_PRESSURE))
     return level.reshape(sonar.beams.elevations, sonar.beams.azimuths, delays)

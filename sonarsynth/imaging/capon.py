@@ -96,13 +96,13 @@ class Capon(Steering):
         live = np.flatnonzero(elements.gain)
         delay = focus_delay(elements.position[live], direction, self.focus, sonar.assumed_sound_speed)
         beams = np.zeros((len(direction), len(frequency)), np.complex64)
-        for some in np.array_split(np.arange(len(frequency)), max(len(frequency) // self.bins, 1)):
-            received, f = spectra[np.ix_(live, some)].astype(complex), frequency[some]
-            inverse = self._inverse(received @ received.conj().T / len(some))
+        for block in np.array_split(np.arange(len(frequency)), max(len(frequency) // self.bins, 1)):
+            received, f = spectra[np.ix_(live, block)].astype(complex), frequency[block]
+            inverse = self._inverse(received @ received.conj().T / len(block))
             if inverse is not None:
                 weight = distortionless(inverse, np.exp(-2j * np.pi * f.mean() * delay))
-                for at, one, x in zip(some, f, received.T, strict=True):
-                    beams[:, at] = (weight.conj() * np.exp(2j * np.pi * (one - f.mean()) * delay)) @ x
+                for at, centre, x in zip(block, f, received.T, strict=True):
+                    beams[:, at] = (weight.conj() * np.exp(2j * np.pi * (centre - f.mean()) * delay)) @ x
         return beams
 
     def _inverse(self, covariance: Complexes) -> Complexes | None:

@@ -72,8 +72,8 @@ class Clean(Steering):
         power = snapshots.power(weights(elements, self.shading))
         amplitude = np.sqrt(power / power.sum()) if power.any() else power
 
-        def point(place: Place) -> Floats:
-            u = direction(sonar.beams.azimuth[place[1]], sonar.beams.elevation[place[0]])
+        def point(beam: Place) -> Floats:
+            u = direction(sonar.beams.azimuth[beam[1]], sonar.beams.elevation[beam[0]])
             delay = focus_delay(elements.position, u, self.focus, sonar.assumed_sound_speed)
             wave = (amplitude * np.exp(-2j * np.pi * snapshots.frequency * delay[:, None])).astype(np.complex64)
             return plain.energies(replace(snapshots, spectra=wave), elements, sonar)
@@ -85,29 +85,29 @@ class Clean(Steering):
 def cleaned(dirty: Floats, point: Callable[[Place], Floats], gain: float, depth: float, steps: int) -> Floats:
     """The image (elevation, azimuth) of an energy image of point echoes without their side lobes, not below zero.
 
-    `point(place)` is the image of an echo of energy one there; gain, depth (dB) and steps as for `Clean`.
+    `point(beam)` is the image of an echo of energy one in that beam; gain, depth (dB) and steps as for `Clean`.
     """
-    left, found = dirty.copy(), dict[Place, float]()
+    residual, components = dirty.copy(), dict[Place, float]()
     images = dict[Place, Floats]()
     least = dirty.max() * 10.0 ** (-depth / 10.0)
     for _ in range(steps):
-        row, column = np.unravel_index(np.argmax(left), left.shape)
-        place = int(row), int(column)
-        if not left[place] > least:  # silence, and what is no number, too
+        row, column = np.unravel_index(np.argmax(residual), residual.shape)
+        beam = int(row), int(column)
+        if not residual[beam] > least:  # silence, and what is no number, too
             break
-        if place not in images:
-            images[place] = point(place)
-        share = gain * left[place] / images[place][place]
-        left -= share * images[place]
-        found[place] = found.get(place, 0.0) + share
-    for place, energy in found.items():
-        left += energy * np.where(main_lobe(images[place], place), images[place], 0.0)
-    return np.maximum(left, 0.0)
+        if beam not in images:
+            images[beam] = point(beam)
+        share = gain * residual[beam] / images[beam][beam]
+        residual -= share * images[beam]
+        components[beam] = components.get(beam, 0.0) + share
+    for beam, energy in components.items():
+        residual += energy * np.where(main_lobe(images[beam], beam), images[beam], 0.0)
+    return np.maximum(residual, 0.0)
 
 
-def main_lobe(image: Floats, place: Place) -> Bools:
-    """The beams around `place` in which the image (elevation, azimuth) of a point there stays above `MAIN_LOBE`."""
+def main_lobe(image: Floats, beam: Place) -> Bools:
+    """The beams around `beam` in which the image (elevation, azimuth) of a point there stays above `MAIN_LOBE`."""
     from scipy.ndimage import label
 
-    lobes, _ = label(image >= MAIN_LOBE * image[place])
-    return np.asarray(lobes == lobes[place])
+    lobes, _ = label(image >= MAIN_LOBE * image[beam])
+    return np.asarray(lobes == lobes[beam])

@@ -66,15 +66,15 @@ class Subarrays:
 
 
 @lru_cache(maxsize=16)
-def subarrays(elements: Elements, most: int) -> Subarrays | None:
-    """The largest blocks of at most `most` by `most` sensors of which there are half as many as sensors in a block: as
-    many snapshots, forward and backward, as they have sensors. None where there are none."""
+def subarrays(elements: Elements, limit: int) -> Subarrays | None:
+    """The largest blocks of at most `limit` by `limit` sensors of which there are half as many as sensors in a block:
+    as many snapshots, forward and backward, as they have sensors. None where there are none."""
     if not elements.on_lattice:
         return None
     sensor = np.full((elements.rows, elements.columns), -1)
     live = np.flatnonzero(elements.gain)
     sensor[elements.row[live], elements.column[live]] = live
-    for n in range(most, 1, -1):
+    for n in range(limit, 1, -1):
         rows, columns = min(n, elements.rows), min(n, elements.columns)
         blocks = np.lib.stride_tricks.sliding_window_view(sensor, (rows, columns)).reshape(-1, rows * columns)
         members = blocks[(blocks >= 0).all(axis=1)]

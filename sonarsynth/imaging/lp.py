@@ -78,5 +78,5 @@ def detection_index(ratio: float, alpha: float, samples: int, p: float = 0.0) ->
 
 def _moment(p: float, alpha: float) -> float:
     """E|y|^p of symmetric alpha-stable noise of unit scale, 0 < p < alpha; of alpha 2, Gaussian of variance 2, any."""
-    whole = 2.0**p * gamma(0.5 * (1.0 + p)) / sqrt(pi)
-    return float(whole if alpha == 2.0 else whole * gamma(1.0 - p / alpha) / gamma(1.0 - 0.5 * p))
+    moment = 2.0**p * gamma(0.5 * (1.0 + p)) / sqrt(pi)
+    return float(moment if alpha == 2.0 else moment * gamma(1.0 - p / alpha) / gamma(1.0 - 0.5 * p))

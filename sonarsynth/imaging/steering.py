@@ -41,9 +41,9 @@ class Steering(Method):
         grid = direction(sonar.beams.azimuth, sonar.beams.elevation[:, None])
         u, energy = grid.reshape(-1, 3), np.empty(grid[..., 0].size)
         for low in range(0, len(u), BEAMS_AT_ONCE):
-            some = slice(low, low + BEAMS_AT_ONCE)
-            beams = self.steer(snapshots, elements, sonar, u[some])
-            energy[some] = np.sum(np.abs(beams).astype(float) ** 2, axis=1)
+            block = slice(low, low + BEAMS_AT_ONCE)
+            beams = self.steer(snapshots, elements, sonar, u[block])
+            energy[block] = np.sum(np.abs(beams).astype(float) ** 2, axis=1)
         return np.asarray(snapshots.unit * energy.reshape(grid.shape[:2]))
 
     def steer(

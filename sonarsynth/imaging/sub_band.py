@@ -55,9 +55,9 @@ class SubBand(Steering):
         plain = AutoBeamforming(focus=self.focus, shading=self.shading).estimated(elements, sonar, AUTO_ERROR)
         gain = weights(elements, self.shading)
         bins = len(snapshots.frequency)
-        parts = [snapshots.select(some) for some in np.array_split(np.arange(bins), min(self.bands, bins))]
-        images = np.stack([plain.energies(part, elements, sonar) for part in parts])
-        received = np.array([part.unit * part.power(gain).sum() for part in parts])
+        bands = [snapshots.select(block) for block in np.array_split(np.arange(bins), min(self.bands, bins))]
+        images = np.stack([plain.energies(band, elements, sonar) for band in bands])
+        received = np.array([band.unit * band.power(gain).sum() for band in bands])
         return weighted_geometric_mean(images, received)
 
 

@@ -48,8 +48,8 @@ class TimeStatistic(Steering):
         length = 1 if self.window is None else max(round(self.window * rate), 1)
         level = np.empty(len(u))
         for low in range(0, len(u), BEAMS_AT_ONCE):
-            some = slice(low, low + BEAMS_AT_ONCE)
-            level[some] = self.amplitude(root_mean_squares(beam_pressure(beams, u[some]), length))
+            block = slice(low, low + BEAMS_AT_ONCE)
+            level[block] = self.amplitude(root_mean_squares(beam_pressure(beams, u[block]), length))
         return np.asarray(snapshots.duration * level.reshape(grid.shape[:2]) ** 2)
 
 
@@ -60,9 +60,9 @@ def beam_pressure(beams: BeamSpectra, direction: Floats) -> Floats:
     window = beams.snapshots
     length, first = (round(f / window.spacing) for f in (window.sampling_frequency, window.frequency[0]))
     spectra = beams.spectra(direction)
-    whole = np.zeros((len(spectra), length // 2 + 1), complex)
-    whole[:, first : first + spectra.shape[1]] = spectra
-    return np.asarray(irfft(whole, length, axis=1)[:, : window.samples])
+    full_band = np.zeros((len(spectra), length // 2 + 1), complex)
+    full_band[:, first : first + spectra.shape[1]] = spectra
+    return np.asarray(irfft(full_band, length, axis=1)[:, : window.samples])
 
 
 def root_mean_squares(pressure: Floats, length: int) -> Floats:

@@ -32,21 +32,21 @@ def fewer_bins(snapshots: Snapshots, travel_time: float) -> Snapshots:
     step = min(int(1.0 / (snapshots.spacing * lasting)), bins // FEWEST)
     if step < 2:
         return snapshots
-    some, weight = weighted_bins(bins, step)
-    spectra = snapshots.spectra[:, some] * np.sqrt(weight).astype(np.float32)
-    return replace(snapshots, frequency=snapshots.frequency[some], spacing=step * snapshots.spacing, spectra=spectra)
+    chosen, weight = weighted_bins(bins, step)
+    spectra = snapshots.spectra[:, chosen] * np.sqrt(weight).astype(np.float32)
+    return replace(snapshots, frequency=snapshots.frequency[chosen], spacing=step * snapshots.spacing, spectra=spectra)
 
 
 @lru_cache(maxsize=64)
 def weighted_bins(bins: int, step: int) -> tuple[Ints, Floats]:
     """Every `step`-th of so many bins, and weights, about one, with which `step` times their sum is that over all."""
-    some = np.arange((bins - 1) % step // 2, bins, step)
+    chosen = np.arange((bins - 1) % step // 2, bins, step)
     longest = LONGEST / step  # periods of a cosine over a bin
     turns = 2.0 * np.pi * np.linspace(0.0, longest, int(6 * bins * longest) + 8)
     counts = np.sqrt(1.02 - turns / turns[-1])[:, None]
-    place, all_places = some - 0.5 * (bins - 1), np.arange(bins) - 0.5 * (bins - 1)
-    cosine, sine = (counts * wave(np.outer(turns, place)) for wave in (np.cos, np.sin))
-    whole = counts[:, 0] * np.cos(np.outer(turns, all_places)).sum(axis=1)
-    wrong = np.concatenate([whole / step - cosine.sum(axis=1), -sine.sum(axis=1), np.zeros(len(some))])
-    change = np.linalg.lstsq(np.concatenate([cosine, sine, np.eye(len(some)) / step]), wrong, rcond=None)[0]
-    return some, np.maximum(1.0 + change, 0.0)
+    offset, all_offsets = chosen - 0.5 * (bins - 1), np.arange(bins) - 0.5 * (bins - 1)
+    cosine, sine = (counts * wave(np.outer(turns, offset)) for wave in (np.cos, np.sin))
+    total = counts[:, 0] * np.cos(np.outer(turns, all_offsets)).sum(axis=1)
+    wrong = np.concatenate([total / step - cosine.sum(axis=1), -sine.sum(axis=1), np.zeros(len(chosen))])
+    change = np.linalg.lstsq(np.concatenate([cosine, sine, np.eye(len(chosen)) / step]), wrong, rcond=None)[0]
+    return chosen, np.maximum(1.0 + change, 0.0)

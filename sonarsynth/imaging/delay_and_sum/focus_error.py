@@ -69,9 +69,9 @@ def focus_error(
         return zone.estimate(glass, moments, u[at][None])
 
     tried = [(zone, at, left_out(zone, at)) for zone in cut for at in corners(zone)]
-    tried.sort(key=lambda one: -one[2])
+    tried.sort(key=lambda row: -row[2])
     live = weight > 0
-    found = 0.0
+    largest = 0.0
     for which, (zone, at, _) in enumerate(tried[:BEAMS]):
         # The array may be lopsided: each beam in another quadrant than the one before.
         mirror = np.array([1.0 - 2.0 * (which % 2), 1.0 - 2.0 * (which // 2 % 2)])
@@ -79,8 +79,8 @@ def focus_error(
         error = _beam_error(
             array, weight[live], elements.pitch, glass, zone, u[at], view=_view(beams), band=band, within=within
         )
-        found = max(found, error)
-    return found
+        largest = max(largest, error)
+    return largest
 
 
 def _view(beams: BeamGrid) -> Floats:
@@ -108,10 +108,10 @@ def _beam_error(
         spectra = np.exp(2j * np.pi * frequencies * steering[:, None]).astype(np.complex64)
         sums = steered_sums(spectra, -delay[1:], weight, frequencies[0], spacing)
         levels.append(10.0 * np.log10(np.mean(np.square(np.abs(sums).astype(float)), axis=1)))
-    exact, got = levels
+    exact, approximate = levels
     if within == 0.0:
-        return float(abs(got[0] - exact[0]))
-    return MARGIN * float(np.max(np.abs(got - exact)[exact >= -within]))
+        return float(abs(approximate[0] - exact[0]))
+    return MARGIN * float(np.max(np.abs(approximate - exact)[exact >= -within]))
 
 
 def _around(u: Floats, size: Floats, pitch: float, glass: Lens, view: Floats, band: Band) -> Floats:

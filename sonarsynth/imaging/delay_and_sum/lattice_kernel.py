@@ -147,15 +147,15 @@ def _store_line(line: Any, at: int, sums: Any) -> None:
 
 @nb.njit(cache=True, nogil=True)
 def _first_pass(
-    folded: Any, size: int, rows: int, heights: Any, odd: bool, one: float, other: float, frequency: float,
+    folded: Any, size: int, rows: int, heights: Any, odd: bool, inner: float, outer: float, frequency: float,
     spacing: float, groups: int, lines: Any,
 ) -> None:  # fmt: skip
-    """Sums over rows for two elevations (half steps `one`, `other`, s): lines [two][group][column][Ss Ds Sd Dd]."""
+    """Sums over rows for two elevations (half steps `inner`, `outer`, s): lines [two][group][column][Ss Ds Sd Dd]."""
     columns = len(heights)
     for group in range(groups):
         at = frequency + group * LANES * spacing
-        c, s = half_phasors(one, at, spacing)
-        d, t = half_phasors(other, at, spacing)
+        c, s = half_phasors(inner, at, spacing)
+        d, t = half_phasors(outer, at, spacing)
         for n in range(columns):
             start = group * size + n * rows * TERM
             upper, lower = _sums(folded, start, start + heights[n] * TERM, odd, c, s, d, t)
@@ -176,8 +176,8 @@ def _second_pass(
         near, far = (zero, zero, zero, zero), (zero, zero, zero, zero)
         for group in range(groups):
             first = start + group * columns * TERM
-            one, other = _sums(lines, first, first + columns * TERM, odd, c, s, d, t)
-            near, far = _add_energies(one, near), _add_energies(other, far)
+            inner, outer = _sums(lines, first, first + columns * TERM, odd, c, s, d, t)
+            near, far = _add_energies(inner, near), _add_energies(outer, far)
             c, s = turned(c, s, splat(turns_c[i]), splat(turns_s[i]))
             d, t = turned(d, t, splat(turns_c[i + 1]), splat(turns_s[i + 1]))
         sums[i, 0], sums[i, 1], sums[i, 2], sums[i, 3] = total(near[0]), total(near[1]), total(near[2]), total(near[3])
@@ -237,8 +237,8 @@ def lattice_energies(
             _focus_and_fold(pairs, bins, places, weight, delay, frequency, spacing, low + group * LANES, at)
         for pair in range(0, len(upper), 2):
             both = upper[pair], upper[min(pair + 1, len(upper) - 1)]
-            one, other = half_pitch * np.sin(both[0]), half_pitch * np.sin(both[1])
-            _first_pass(folded, size, rows, heights, odd_rows, one, other, first, spacing, groups, lines)
+            inner, outer = half_pitch * np.sin(both[0]), half_pitch * np.sin(both[1])
+            _first_pass(folded, size, rows, heights, odd_rows, inner, outer, first, spacing, groups, lines)
             for which in range(min(2, len(upper) - pair)):
                 steps[: len(port)] = np.cos(both[which]) * along
                 group_steps(steps, spacing, turns_c, turns_s)

@@ -55,11 +55,11 @@ def _sums(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, 
 
 
 @nb.njit(cache=True, nogil=True, forceinline=True)
-def _store_pair(terms: Any, at: int, one: Any, other: Any) -> None:
-    store(terms, at, one[0] + other[0])
-    store(terms, at + LANES, one[1] + other[1])
-    store(terms, at + 2 * LANES, one[0] - other[0])
-    store(terms, at + 3 * LANES, one[1] - other[1])
+def _store_pair(terms: Any, at: int, above: Any, below: Any) -> None:
+    store(terms, at, above[0] + below[0])
+    store(terms, at + LANES, above[1] + below[1])
+    store(terms, at + 2 * LANES, above[0] - below[0])
+    store(terms, at + 3 * LANES, above[1] - below[1])
 
 
 @nb.njit(cache=True, nogil=True)
@@ -76,9 +76,9 @@ def _focusing(delay: Any, frequency: float, spacing: float, focusing: Any) -> No
 
 
 @nb.njit(cache=True, nogil=True, forceinline=True)
-def _focused(pairs: Any, at: int, weight: float, focusing: Any, where: int) -> Any:
+def _focused(pairs: Any, at: int, weight: float, focusing: Any, offset: int) -> Any:
     x, y = weighted(pairs, at, weight)
-    return turned(x, y, load(focusing, where), load(focusing, where + LANES))
+    return turned(x, y, load(focusing, offset), load(focusing, offset + LANES))
 
 
 @nb.njit(cache=True, nogil=True)
@@ -91,30 +91,30 @@ def _focus_and_fold(
         for m in range(rows):
             for side in range(2):
                 up, down = places[n, m, side ^ mirror], places[n, m, (side + 2) ^ mirror]
-                where = ((n * rows + m) * 4 + side) * 2 * LANES
-                one = _focused(pairs, 2 * (up * bins + low), weight[up], focusing, where)
-                other = _focused(pairs, 2 * (down * bins + low), weight[down], focusing, where + 4 * LANES)
-                _store_pair(folded, ((side * columns + n) * rows + m) * TERM, one, other)
+                offset = ((n * rows + m) * 4 + side) * 2 * LANES
+                above = _focused(pairs, 2 * (up * bins + low), weight[up], focusing, offset)
+                below = _focused(pairs, 2 * (down * bins + low), weight[down], focusing, offset + 4 * LANES)
+                _store_pair(folded, ((side * columns + n) * rows + m) * TERM, above, below)
 
 
 @nb.njit(cache=True, nogil=True)
 def _first_pass(
-    folded: Any, size: int, rows: int, heights: Any, odd: bool, one: Any, other: Any, frequency: float, spacing: float,
-    groups: int, lines: Any,
+    folded: Any, size: int, rows: int, heights: Any, odd: bool, inner: Any, outer: Any, frequency: float,
+    spacing: float, groups: int, lines: Any,
 ) -> None:  # fmt: skip
-    """Sums over rows for two elevations (half steps one, other (side, column), s): lines [two][group][column][s d]."""
+    """Sums over rows at two elevations (half steps inner, outer (side, column), s): lines [two][group][column][s d]."""
     columns = len(heights)
     for group in range(groups):
         at = frequency + group * LANES * spacing
         for n in range(columns):
             # Whole phasors, not half: columns are summed, and all need the same sign.
             start = group * size + n * rows * TERM
-            c, s = phasors(one[0, n], at, spacing)
-            d, t = phasors(other[0, n], at, spacing)
+            c, s = phasors(inner[0, n], at, spacing)
+            d, t = phasors(outer[0, n], at, spacing)
             upper, lower = _sums(folded, start, start + heights[n] * TERM, odd, c, s, d, t)
             start += columns * rows * TERM
-            c, s = phasors(one[1, n], at, spacing)
-            d, t = phasors(other[1, n], at, spacing)
+            c, s = phasors(inner[1, n], at, spacing)
+            d, t = phasors(outer[1, n], at, spacing)
             upper_, lower_ = _sums(folded, start, start + heights[n] * TERM, odd, c, s, d, t)
             _store_pair(lines, (group * columns + n) * TERM, upper, upper_)
             _store_pair(lines, ((GROUPS + group) * columns + n) * TERM, lower, lower_)
@@ -132,9 +132,9 @@ def _second_pass(
         near = far = splat(ZERO)
         for group in range(groups):
             first = start + group * columns * TERM
-            one, other = _sums(lines, first, first + columns * TERM, odd, c, s, d, t)
-            near = near + one[0] * one[0] + one[1] * one[1]
-            far = far + other[0] * other[0] + other[1] * other[1]
+            inner, outer = _sums(lines, first, first + columns * TERM, odd, c, s, d, t)
+            near = near + inner[0] * inner[0] + inner[1] * inner[1]
+            far = far + outer[0] * outer[0] + outer[1] * outer[1]
             c, s = turned(c, s, splat(turns_c[i]), splat(turns_s[i]))
             d, t = turned(d, t, splat(turns_c[i + 1]), splat(turns_s[i + 1]))
         sums[i], sums[i + 1] = total(near), total(far)
@@ -165,17 +165,17 @@ def zone_energies(
     for low in range(0, bins, CHUNK):
         groups = min(GROUPS, (bins - low) // LANES)
         first = frequency + low * spacing
-        part = columns * rows * 8 * LANES
+        length = columns * rows * 8 * LANES
         for group in range(groups):
-            _focusing(delay, first + group * LANES * spacing, spacing, focusing[group * part : (group + 1) * part])
+            _focusing(delay, first + group * LANES * spacing, spacing, focusing[group * length : (group + 1) * length])
         for mirror in range(4):
             for group in range(groups):
                 at = folded[group * size : (group + 1) * size]
-                turn = focusing[group * part : (group + 1) * part]
+                turn = focusing[group * length : (group + 1) * length]
                 _focus_and_fold(pairs, bins, places, weight, mirror, turn, low + group * LANES, at)
             for pair in range(0, elevations, 2):
-                one, other = rise[pair], rise[min(pair + 1, elevations - 1)]
-                _first_pass(folded, size, rows, heights, odd_rows, one, other, first, spacing, groups, lines)
+                inner, outer = rise[pair], rise[min(pair + 1, elevations - 1)]
+                _first_pass(folded, size, rows, heights, odd_rows, inner, outer, first, spacing, groups, lines)
                 for which in range(min(2, elevations - pair)):
                     steps[:azimuths] = across[pair + which]
                     group_steps(steps, spacing, turns_c, turns_s)

@@ -118,18 +118,18 @@ class Zone:
         if self.shared:
             elevation = np.arcsin(u[:, 1])
             up, port = self.sines(glass, elevation, np.arcsin(u[:, 0] / np.cos(elevation)))
-            kept = y * (u[:, 0] - np.sqrt(1.0 - up * up) * port)[:, None] + z * (u[:, 1] - up)[:, None]
-            return exact - glass.even(y, z, self.centre) - kept / glass.sound_speed
+            modelled = y * (u[:, 0] - np.sqrt(1.0 - up * up) * port)[:, None] + z * (u[:, 1] - up)[:, None]
+            return exact - glass.even(y, z, self.centre) - modelled / glass.sound_speed
         u = u[:, None, :]
         level = np.stack(np.broadcast_arrays(self.centre[0], u[..., 1]), axis=-1)
-        kept = glass.bulge(y, z, self.centre) + z * glass.slope_along_z(y, level, self.centre)
-        return exact - kept - y * glass.slope_along_y(u, level)
+        modelled = glass.bulge(y, z, self.centre) + z * glass.slope_along_z(y, level, self.centre)
+        return exact - modelled - y * glass.slope_along_y(u, level)
 
     def variances(self, glass: Lens, moments: ArrayMoments, u: Floats) -> tuple[Floats, Floats]:
         """Variance over the array (beam,) in rad2 of what is left out in beams u (beam, yz): even and odd part."""
         y, z = (np.concatenate([q, -q]) for q in (moments.y, moments.z))
-        one, other = np.split(self.left_out(glass, y, z, u), 2, axis=1)
-        even, odd = 0.5 * moments.angular * (one + other), 0.5 * moments.angular * (one - other)
+        direct, mirrored = np.split(self.left_out(glass, y, z, u), 2, axis=1)
+        even, odd = 0.5 * moments.angular * (direct + mirrored), 0.5 * moments.angular * (direct - mirrored)
         return np.square(even) @ moments.weight - np.square(even @ moments.weight), np.square(odd) @ moments.weight
 
     def estimate(self, glass: Lens, moments: ArrayMoments, u: Floats) -> float:
@@ -200,24 +200,24 @@ def zones_of(glass: Lens, moments: ArrayMoments, beams: BeamGrid, zones: int) ->
             far = ((chosen.far if chosen else near) + stop) // 2
         return chosen
 
-    edge = [_zone(u, *bands[-1], *part, False) for part in azimuths]
+    edge = [_zone(u, *bands[-1], *span, False) for span in azimuths]
     columns = [_zone(u, *band, u.shape[1] - 1, u.shape[1], False) for band in bands]
     worst = max(estimate(zone) for zone in edge + columns)
-    found: list[Zone] = []
+    tiling: list[Zone] = []
     for low, high in bands:
         near = 0
         while near < u.shape[1]:
             shared, zone = widest(low, high, near, True), widest(low, high, near, False)
             if shared is not None and (zone is None or WORTH * (shared.far - near) >= zone.far - near):
                 zone = shared
-            found.append(zone or _zone(u, low, high, near, near + 1, False))
-            near = found[-1].far
-    return found
+            tiling.append(zone or _zone(u, low, high, near, near + 1, False))
+            near = tiling[-1].far
+    return tiling
 
 
 def _zone(u: Floats, low: int, high: int, near: int, far: int, shared: bool) -> Zone:
-    part = u[low:high, near:far].reshape(-1, 2)
-    return Zone(low, high, near, far, 0.5 * (part.min(axis=0) + part.max(axis=0)), shared)
+    directions = u[low:high, near:far].reshape(-1, 2)
+    return Zone(low, high, near, far, 0.5 * (directions.min(axis=0) + directions.max(axis=0)), shared)
 
 
 def _parts(angles: Floats, edges: Floats) -> list[tuple[int, int]]:
