@@ -146,12 +146,12 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     context = context_of(plan, frame)
     arrivals = trace(context, plan.propagation)
     mark_stage("trace")
-    seen, levels = arrivals.seen_from_centre.without_reverberation, snap_levels(context.snaps)
+    from_centre, levels = arrivals.seen_from_centre.without_reverberation, snap_levels(context.snaps)
     truth = label(context, plan.propagation, levels)
     band, targets = band_of(plan, context.snaps), len(context.bodies)
-    powers = path_powers(seen, band)
-    budget = link_budget(seen, powers, band, targets, levels, expansion_error(plan, seen))
-    levels_of_echoes = echo_levels(seen, powers, targets, levels)
+    powers = path_powers(from_centre, band)
+    budget = link_budget(from_centre, powers, band, targets, levels, expansion_error(plan, from_centre))
+    levels_of_echoes = echo_levels(from_centre, powers, targets, levels)
     mark_stage("label")
     others = frame_chorus(plan, frame), frame_reverberation(plan, frame)
     mark_stage("trace")
@@ -289,5 +289,5 @@ def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
     ------
     FieldError as `plan` does, IndexError for a frame that is not there.
     """
-    made = plan(recipe) if isinstance(recipe, Recipe) else recipe
-    return frame_tree(made, index, _values(made, index))
+    resolved = plan(recipe) if isinstance(recipe, Recipe) else recipe
+    return frame_tree(resolved, index, _values(resolved, index))

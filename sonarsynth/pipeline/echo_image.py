@@ -24,21 +24,21 @@ def image_of(
     if plan.scene.processing.direct_pulse != "keep":
         signals = remove_others(signals, estimates, elements, sonar, length, window)
 
-    def beams_of(some: Signals, start: float, stop: float) -> BeamSpectra:
-        return method.beams(snapshots_of(some, sonar, start, stop), elements, sonar)
+    def beams_of(received: Signals, start: float, stop: float) -> BeamSpectra:
+        return method.beams(snapshots_of(received, sonar, start, stop), elements, sonar)
 
-    def imaging(some: Signals, start: float, stop: float) -> EnergyImage:
-        return energy_image(beams_of(some, start, stop).energies(), sonar, start, stop)
+    def imaging(received: Signals, start: float, stop: float) -> EnergyImage:
+        return energy_image(beams_of(received, start, stop).energies(), sonar, start, stop)
 
     if not plan.windows.direct_removed:
         beams = beams_of(signals, *window)
         return signals, beams, energy_image(beams.energies(), sonar, *window)
-    left = remove(signals, estimates, elements, sonar, length)
-    if left is None:  # what was located is no wave that could be taken out: no echo is told from it
+    residual = remove(signals, estimates, elements, sonar, length)
+    if residual is None:  # what was located is no wave that could be taken out: no echo is told from it
         return signals, None, no_image(sonar, *window, remainder=1.0)
-    beams = beams_of(left, *window)
+    beams = beams_of(residual, *window)
     image = energy_image(beams.energies(), sonar, *window)
-    return left, beams, trusted(image, signals, left, sonar, imaging, float(estimates.time[0]) - length)
+    return residual, beams, trusted(image, signals, residual, sonar, imaging, float(estimates.time[0]) - length)
 
 
 def no_image(sonar: Sonar, start: float, stop: float, remainder: float = np.nan) -> EnergyImage:

@@ -57,8 +57,8 @@ def with_chorus(plan: Plan, frame: Frame, signals: Signals, arrivals: ChorusArri
     if distant is not None:
         mark_stage("synthesise")
         random = stream(frame.seed, "distant chorus", frame.key, frame.step)
-        here, speed = frame.sonar_pose, receiver_of(plan, frame).speed(plan.medium)
-        signals = add_noise(signals, distant, plan.scene.sonar, plan.elements, random, here, speed)
+        pose, speed = frame.sonar_pose, receiver_of(plan, frame).speed(plan.medium)
+        signals = add_noise(signals, distant, plan.scene.sonar, plan.elements, random, pose, speed)
         mark_stage(DISTANT_CHORUS)
     if not len(arrivals.delay):
         return signals
@@ -86,9 +86,9 @@ def soundscape_values(plan: Plan, frame: Frame, arrivals: ChorusArrivals | None)
     arrivals = arrivals.select((arrivals.delay >= start) & (arrivals.delay < stop))
     level, time, azimuth, elevation = np.full((4, LOUDEST), np.nan)
     loud = np.argsort(-arrivals.received, kind="stable")[:LOUDEST]
-    some = slice(0, len(loud))
-    level[some], time[some] = arrivals.received[loud], arrivals.delay[loud]
-    azimuth[some], elevation[some] = (np.rad2deg(x) for x in azimuth_elevation(arrivals.direction[loud]))
+    rows = slice(0, len(loud))
+    level[rows], time[rows] = arrivals.received[loud], arrivals.delay[loud]
+    azimuth[rows], elevation[rows] = (np.rad2deg(x) for x in azimuth_elevation(arrivals.direction[loud]))
     counts = {"snaps": np.int32(len(np.unique(arrivals.snap))), "paths": np.int32(len(arrivals.delay))}
     return table("/truth/soundscape", **counts, level=level, arrival=time, azimuth=azimuth, elevation=elevation)
 

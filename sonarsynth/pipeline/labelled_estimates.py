@@ -39,10 +39,10 @@ def emission_values(
 ) -> Values:
     """Which snap each estimate came from, and whether the first, which is the clock, is of one that lights."""
     band, window = plan.scene.sonar.band, (plan.windows.echo_start, plan.windows.echo_stop)
-    found = emissions(estimates, direct, band.high - band.low, beam_width(plan))
-    clock = in_record(estimates, signals, *window)[:1].any() and found[0] >= 0
-    usable = np.int8(clock and snaps[int(found[0])].illuminates)
-    return table("/source_estimates", emission=found, usable=usable)
+    emission = emissions(estimates, direct, band.high - band.low, beam_width(plan))
+    clock = in_record(estimates, signals, *window)[:1].any() and emission[0] >= 0
+    usable = np.int8(clock and snaps[int(emission[0])].illuminates)
+    return table("/source_estimates", emission=emission, usable=usable)
 
 
 def beam_width(plan: Plan) -> float:

@@ -33,20 +33,20 @@ def in_slots(plan: Plan, values: Values, variables: tuple[Variable, ...]) -> Val
     """The values of a frame, axes of targets and emissions as long as in the store; `plan` is that of its sequence."""
     values = _with_room(values, plan.sizes["emission"], variables)
     slots = {name: n for n, name in enumerate(plan.recipe.target_names)}
-    here = np.array([slots[target.name] for target in plan.scene.world.targets], np.int64)
-    if len(here) == len(slots):
+    own_slots = np.array([slots[target.name] for target in plan.scene.world.targets], np.int64)
+    if len(own_slots) == len(slots):
         return values
-    found = dict(values)
+    padded = dict(values)
     for v in variables:
         if "target" in v.dims and (v.group, v.name) in values:
-            found[v.group, v.name] = _spread(values[v.group, v.name], v, here, len(slots))
-    found["/truth/targets", "present"] = np.isin(np.arange(len(slots)), here).astype(np.int8)
+            padded[v.group, v.name] = _spread(values[v.group, v.name], v, own_slots, len(slots))
+    padded["/truth/targets", "present"] = np.isin(np.arange(len(slots)), own_slots).astype(np.int8)
     for key in INDICES:
         if key in values:
             numbers = values[key]
-            known = np.append(here, -1)[np.where(numbers < 0, len(here), numbers)]
-            found[key] = known.astype(numbers.dtype)
-    return found
+            renumbered = np.append(own_slots, -1)[np.where(numbers < 0, len(own_slots), numbers)]
+            padded[key] = renumbered.astype(numbers.dtype)
+    return padded
 
 
 def _with_room(values: Values, emissions: int, variables: tuple[Variable, ...]) -> Values:
@@ -54,20 +54,20 @@ def _with_room(values: Values, emissions: int, variables: tuple[Variable, ...]) 
     missing = emissions - len(values["/truth/emissions", "source"])
     if not missing:
         return values
-    found = dict(values)
+    padded = dict(values)
     for v in variables:
         if "emission" in v.dims and (v.group, v.name) in values:
             widths = [(0, missing if dim == "emission" else 0) for dim in v.dims[1:]]
-            found[v.group, v.name] = np.pad(values[v.group, v.name], widths, constant_values=v.fill)
-    return found
+            padded[v.group, v.name] = np.pad(values[v.group, v.name], widths, constant_values=v.fill)
+    return padded
 
 
-def _spread(values: np.ndarray, variable: Variable, here: np.ndarray, slots: int) -> np.ndarray:
+def _spread(values: np.ndarray, variable: Variable, own_slots: np.ndarray, slots: int) -> np.ndarray:
     """Values along the axis of targets, in their slots; the direct path of the link budget stays the last."""
     axis = variable.dims.index("target") - 1  # without frames
-    also = values.shape[axis] - len(here)
+    also = values.shape[axis] - len(own_slots)
     shape = (*values.shape[:axis], slots + also, *values.shape[axis + 1 :])
     spread = np.full(shape, variable.fill, values.dtype)
-    places = np.concatenate([here, slots + np.arange(also)])
+    places = np.concatenate([own_slots, slots + np.arange(also)])
     np.moveaxis(spread, axis, 0)[places] = np.moveaxis(values, axis, 0)
     return spread

@@ -133,17 +133,17 @@ class _Look:
         ends = arrivals.delay - supports.before - spare, arrivals.delay + supports.after + spare
         return np.asarray((ends[1] > self.window[0]) & (ends[0] < self.window[1]))
 
-    def alone(self, plan: Plan, frame: Frame, arrivals: Arrivals, some: Bools) -> Part:
+    def alone(self, plan: Plan, frame: Frame, arrivals: Arrivals, mask: Bools) -> Part:
         """Pressure of some paths (path,) alone."""
-        return array_signals(plan, frame, arrivals.select(some), self.sensors).pressure if some.any() else None
+        return array_signals(plan, frame, arrivals.select(mask), self.sensors).pressure if mask.any() else None
 
     def energy(self, pressure: Part, beams: Ints) -> float:
         """Energy in Pa2 s of pressure in beams (beam,), added up."""
         if pressure is None:
             return 0.0
         if id(pressure) not in self._made:
-            made = snapshots_of(replace(self.signals, pressure=pressure), self.sonar, *self.window)
-            self._made[id(pressure)] = pressure, made  # kept, so that no other has its id
-        _, seen = self._made[id(pressure)]
-        steered = self.method.steer(seen, self.elements, self.sonar, self.grid[beams])
-        return float(seen.unit * np.sum(np.abs(steered).astype(float) ** 2))
+            prepared = snapshots_of(replace(self.signals, pressure=pressure), self.sonar, *self.window)
+            self._made[id(pressure)] = pressure, prepared  # kept, so that no other has its id
+        _, snapshots = self._made[id(pressure)]
+        steered = self.method.steer(snapshots, self.elements, self.sonar, self.grid[beams])
+        return float(snapshots.unit * np.sum(np.abs(steered).astype(float) ** 2))

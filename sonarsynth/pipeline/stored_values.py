@@ -117,8 +117,8 @@ def beam_values(plan: Plan, beams: BeamSpectra | None, image: EnergyImage) -> Va
     stored = np.full(shape, NO_LEVEL, np.int16)
     if beams is not None:
         level = envelope_levels(beams, plan.scene.sonar, shape[2]) / LEVEL_STEP
-        known = np.isfinite(level) & np.isfinite(image.energy)[..., None]
-        stored[known] = np.rint(np.clip(level[known], NO_LEVEL + 1, -NO_LEVEL - 1))
+        finite = np.isfinite(level) & np.isfinite(image.energy)[..., None]
+        stored[finite] = np.rint(np.clip(level[finite], NO_LEVEL + 1, -NO_LEVEL - 1))
     return table("/beams", level=stored, start=np.nan if beams is None else beams.snapshots.start)
 
 

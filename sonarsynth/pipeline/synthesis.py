@@ -90,15 +90,15 @@ def digitise(plan: Plan, frame: Frame, signals: Signals, hearing: Hearing = told
     """Signals as the sonar has them: ambient noise, errors of the channels, electronics, converter; `plan` is that of
     the sequence. Each part has a stream of its own."""
     mark_stage("synthesise")
-    sonar, here = plan.scene.sonar, frame.sonar_pose
-    sound_speed = float(plan.profile.at(depth(here.position)))
+    sonar, pose = plan.scene.sonar, frame.sonar_pose
+    sound_speed = float(plan.profile.at(depth(pose.position)))
     noises = plan.scene.world.environment.noises
     for number, (name, noise) in enumerate(zip(part_names(noises), noises, strict=True)):
         if noise.played:
             signals = _with_played_noise(plan, frame, signals, noise, number)
         else:
             random = stream(frame.seed, "noise", frame.key, frame.step, *([number] if number else []))
-            signals = add_noise(signals, noise, sonar, plan.elements, random, here, sound_speed)
+            signals = add_noise(signals, noise, sonar, plan.elements, random, pose, sound_speed)
         mark_stage(name)
     for number, source in enumerate(plan.scene.world.noise_sources):
         signals = _with_noise_source(plan, frame, signals, source, number)
@@ -115,10 +115,10 @@ def _with_played_noise(plan: Plan, frame: Frame, signals: Signals, noise: Any, n
     def even(stretch: int) -> Floats:
         return stream(frame.seed, "played noise", frame.key, number, stretch).random(2)
 
-    here = frame.sonar_pose
-    sound_speed = float(plan.profile.at(depth(here.position)))
+    pose = frame.sonar_pose
+    sound_speed = float(plan.profile.at(depth(pose.position)))
     return add_played_noise(
-        signals, noise, plan.scene.sonar, plan.elements, here, sound_speed, time=frame.time, even=even
+        signals, noise, plan.scene.sonar, plan.elements, pose, sound_speed, time=frame.time, even=even
     )
 
 
@@ -145,8 +145,8 @@ def _behind(arrivals: Arrivals, sonar: Sonar) -> Arrivals:
     """Arrivals, with what the baffle leaves of those from behind."""
     if not sonar.baffle:
         return arrivals
-    left = np.where(arrivals.direction[:, 0] < 0.0, sonar.behind, 1.0)
-    return replace(arrivals, amplitude=arrivals.amplitude * left)
+    gain = np.where(arrivals.direction[:, 0] < 0.0, sonar.behind, 1.0)
+    return replace(arrivals, amplitude=arrivals.amplitude * gain)
 
 
 def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: float, hearing: Hearing) -> Signals:
@@ -174,8 +174,8 @@ def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: f
             signals = channel_errors.overloaded(signals, errors.overload)
         if errors.stuck and sonar.converter is not None:
             stuck = (sonar.converter.full_scale * drawn.stuck_at)[:, None].astype(np.float32)
-            held = (drawn.state == SensorState.STUCK)[:, None]
-            signals = replace(signals, pressure=np.where(held, stuck, signals.pressure))
+            is_stuck = (drawn.state == SensorState.STUCK)[:, None]
+            signals = replace(signals, pressure=np.where(is_stuck, stuck, signals.pressure))
         mark_stage(SENSORS)
     return signals
 

@@ -97,8 +97,8 @@ def frame_tree(plan: Plan, index: int, values: Mapping[tuple[str, str], npt.NDAr
 
     groups = {"/": xr.Dataset(attrs=attributes(plan))}
     for (group, name), (dims, array, attrs) in coordinates(plan).items():
-        one = (dims[1:], array[index], attrs) if "frame" in dims else (dims, array, attrs)
-        groups.setdefault(group, xr.Dataset()).coords[name] = one
+        entry = (dims[1:], array[index], attrs) if "frame" in dims else (dims, array, attrs)
+        groups.setdefault(group, xr.Dataset()).coords[name] = entry
     for v in variables(plan):
         attrs = {"units": v.units, "long_name": v.long_name, **dict(v.attributes)}
         data = values[v.group, v.name]

@@ -40,8 +40,8 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
     add("/truth" + estimates, "xyz", ("xyz",), list("xyz"), "1", "axis")
     add("/truth", "wxyz", ("wxyz",), list("wxyz"), "1", "part of a unit quaternion, scalar first")
     add("/truth/targets", "target", ("target",), np.array(names, dtype=np.str_), "1", "name of the target")
-    for name, values, what in _BOUNDS:
-        add("/truth/targets", name, (name,), values, "1", what)
+    for name, values, description in _BOUNDS:
+        add("/truth/targets", name, (name,), values, "1", description)
     if plan.products:
         add(
             "/link_budget",
