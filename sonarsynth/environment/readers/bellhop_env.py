@@ -54,35 +54,35 @@ class _Records:
     lines: list[str]
     line: int = 0  # of the next record, from 0
 
-    def read(self, held: tuple[str | float, ...], needed: int = 1) -> list[str | float]:
-        """One value for each that is held already, which stays where a `/` comes first; numbers where numbers are
-        held. The first `needed` must be there. Raises CastError."""
-        found = list(held)
+    def read(self, defaults: tuple[str | float, ...], needed: int = 1) -> list[str | float]:
+        """A value for each default, which stays where a `/` comes first; numbers where the defaults are numbers.
+        The first `needed` must be there. Raises CastError."""
+        values = list(defaults)
         count, ended = 0, False
-        while count < len(held) and not ended:
+        while count < len(defaults) and not ended:
             if self.line >= len(self.lines):
                 raise CastError(f"{self.path}: ends where more of a Bellhop environment must follow")
             self.line += 1
             for match in WORD.finditer(self.lines[self.line - 1]):
                 ended = match[1] == "/"
-                if ended or count == len(held) or match[1][0] == "!":
+                if ended or count == len(defaults) or match[1][0] == "!":
                     break
-                found[count] = self._value(match[1], held[count])
+                values[count] = self._value(match[1], defaults[count])
                 count += 1
         if count < needed:
             raise self.error(f"has {count} values where a Bellhop environment has {needed} or more")
-        return found
+        return values
 
-    def numbers(self, held: tuple[float, ...], needed: int = 1) -> list[float]:
+    def numbers(self, defaults: tuple[float, ...], needed: int = 1) -> list[float]:
         """As `read`, of numbers alone."""
-        return [float(value) for value in self.read(held, needed)]
+        return [float(value) for value in self.read(defaults, needed)]
 
     def text(self) -> str:
         """A record that is one text. Raises CastError."""
         return str(self.read(("",))[0])
 
-    def _value(self, word: str, held: str | float) -> str | float:
-        if isinstance(held, str):
+    def _value(self, word: str, default: str | float) -> str | float:
+        if isinstance(default, str):
             return word[1:-1] if word[0] in "'\"" else word
         try:
             number = float(re.sub("[dD]", "e", word))
@@ -92,9 +92,9 @@ class _Records:
             raise self.error(f"{word[:40]!r} is not a finite number")
         return number
 
-    def error(self, what: str) -> CastError:
+    def error(self, message: str) -> CastError:
         """An error in the record that was read last."""
-        return CastError(f"{self.path}, line {self.line}: {what}")
+        return CastError(f"{self.path}, line {self.line}: {message}")
 
 
 def read_bellhop(path: Path, text: str) -> CastTable:
@@ -117,8 +117,8 @@ def read_bellhop(path: Path, text: str) -> CastTable:
     nodes, lines = _nodes(records, depth)
     notes = []
     if options[0] in INTERPOLATION:
-        how = INTERPOLATION[options[0]]
-        notes.append(f"Bellhop interpolates this profile {how} (option '{options[0]}'), here it is straight lines")
+        law = INTERPOLATION[options[0]]
+        notes.append(f"Bellhop interpolates this profile {law} (option '{options[0]}'), here it is straight lines")
     notes.append(_bottom(records, options[2], frequency, depth, nodes[-1, 1]))
     columns = {"depth": Column("z", nodes[:, 0]), "sound speed": Column("c", nodes[:, 1])}
     return CastTable(path, "Bellhop", columns, lines, ("z", "c"), notes=tuple(notes))
@@ -141,14 +141,14 @@ def _nodes(records: _Records, bottom: float) -> tuple[np.ndarray, np.ndarray]:
     """Depths and speeds (node, 2) down to the bottom, and the line of each."""
     nodes: list[tuple[float, float]] = []
     lines: list[int] = []
-    held: tuple[float, ...] = WATER
+    previous: tuple[float, ...] = WATER
     while not nodes or abs(nodes[-1][0] - bottom) > SAME:
-        depth, *rest = records.numbers((nodes[-1][0] if nodes else 0.0, *held))
-        held = tuple(rest)
+        depth, *properties = records.numbers((nodes[-1][0] if nodes else 0.0, *previous))
+        previous = tuple(properties)
         if depth > bottom + SAME or (nodes and depth <= nodes[-1][0]):
-            where = "not below the one before" if nodes and depth <= nodes[-1][0] else f"below the bottom, {bottom:g} m"
-            raise records.error(f"the node at {depth:g} m is {where}")
-        nodes.append((depth, held[0]))
+            fault = "not below the one before" if nodes and depth <= nodes[-1][0] else f"below the bottom, {bottom:g} m"
+            raise records.error(f"the node at {depth:g} m is {fault}")
+        nodes.append((depth, previous[0]))
         lines.append(records.line)
         if len(nodes) > MAX_ROWS:
             raise records.error(f"has more than {MAX_ROWS} nodes")
@@ -160,18 +160,18 @@ def _bottom(records: _Records, unit: str, frequency: float, depth: float, speed:
     options, _ = (str(value) for value in records.read(("", 0.0)))
     shape = "" if options[1:2] not in ("~", "*") else "; its bathymetry file is not read: the bottom is flat"
     kind, depth_note = options[:1], f"the environment's depth is {depth:g} m in the file"
-    made = {"V": "{kind: pressure_release}", "R": "{kind: rigid}"}.get(kind)
+    reflection = {"V": "{kind: pressure_release}", "R": "{kind: rigid}"}.get(kind)
     if kind == "A":
         _, cp, cs, density, attenuation, _ = records.numbers((0.0, *WATER))
         if cp > 0.0 and density > 0.0 and speed > 0.0:
             loss = _loss_tangent(attenuation, unit, frequency, cp)
-            made = f"{{kind: fluid, density_ratio: {density:.6g}, speed_ratio: {cp / speed:.6g}"
-            made += "}" if loss is None else f", loss_tangent: {loss:.4g}}}"
-            made += f", its loss (unit '{unit}') is not read" if loss is None else ""
-            made += f", without its shear waves of {cs:g} m/s" if cs else ""
-    if made is None:
+            reflection = f"{{kind: fluid, density_ratio: {density:.6g}, speed_ratio: {cp / speed:.6g}"
+            reflection += "}" if loss is None else f", loss_tangent: {loss:.4g}}}"
+            reflection += f", its loss (unit '{unit}') is not read" if loss is None else ""
+            reflection += f", without its shear waves of {cs:g} m/s" if cs else ""
+    if reflection is None:
         return f"{depth_note}; its bottom (option '{kind}') is not read{shape}"
-    return f"{depth_note}, the reflection of its bottom {made}{shape}"
+    return f"{depth_note}, the reflection of its bottom {reflection}{shape}"
 
 
 def _loss_tangent(attenuation: float, unit: str, frequency: float, speed: float) -> float | None:

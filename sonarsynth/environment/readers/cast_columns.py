@@ -120,18 +120,18 @@ def meaning(column: str, unit: str | None = None) -> Meaning | None:
     unit: written elsewhere (a line of units); left out: as the name says, else ours. Raises UnitError.
     """
     name, own = split(column)
-    given = own if unit is None or not unit.strip() else _clean_unit(unit)
+    stated = own if unit is None or not unit.strip() else _clean_unit(unit)
     for pattern, quantity, short_unit in SEA_BIRD:
         if re.fullmatch(pattern, column.strip().lower()):
             return Meaning(quantity, *_conversion(quantity, short_unit, column))
-    found = [quantity for quantity, names in NAMES.items() if name in names]
-    if not found:
+    candidates = [quantity for quantity, names in NAMES.items() if name in names]
+    if not candidates:
         return None
-    fitting = [q for q in found if given is not None and _known(q, given)]
+    fitting = [q for q in candidates if stated is not None and _known(q, stated)]
     if fitting:
-        return Meaning(fitting[0], *_conversion(fitting[0], str(given), column))
-    quantity = found[-1]  # 'c' without a unit is the sound speed
-    return Meaning(quantity, *_conversion(quantity, given, column), stated=given is not None)
+        return Meaning(fitting[0], *_conversion(fitting[0], str(stated), column))
+    quantity = candidates[-1]  # 'c' without a unit is the sound speed
+    return Meaning(quantity, *_conversion(quantity, stated, column), stated=stated is not None)
 
 
 def is_unit(text: str) -> bool:
@@ -148,9 +148,9 @@ def split(column: str) -> tuple[str, str | None]:
     if bracketed:
         text = bracketed[1]
     unit = after if after.strip() else bracketed[2] if bracketed else None
-    name, _, rest = text.partition(",")  # 'Temperature, ITS-90', 'Pressure, Digiquartz'
+    name, _, remark = text.partition(",")  # 'Temperature, ITS-90', 'Pressure, Digiquartz'
     if unit is not None:
-        also = f", {rest}" if "68" in rest else ""
+        also = f", {remark}" if "68" in remark else ""
         return _plain(name), _clean_unit(unit + also)
     stem, _, last = name.strip().replace(" ", "_").rpartition("_")
     if stem and any(last in texts for units in UNITS.values() for texts in units):
@@ -164,13 +164,13 @@ def _plain(name: str) -> str:
 
 def _clean_unit(text: str) -> str | None:
     """A unit as it is in the table; of several words between commas that which is no scale ('ITS-90, deg F')."""
-    whole = re.sub(r"\s+", " ", text.replace("_", " ").strip(" ()[]").lower())
-    if whole in NO_UNITS:
+    plain = re.sub(r"\s+", " ", text.replace("_", " ").strip(" ()[]").lower())
+    if plain in NO_UNITS:
         return None
-    parts = [part.strip() for part in re.split(r"[,;]", whole)]
-    scale = next((part for part in parts if "68" in part), None)
-    known = [part for part in parts if any(_known(quantity, part) for quantity in UNITS)]
-    unit = next((part for part in reversed(known) if part not in SCALES), known[-1] if known else whole)
+    words = [word.strip() for word in re.split(r"[,;]", plain)]
+    scale = next((word for word in words if "68" in word), None)
+    units = [word for word in words if any(_known(quantity, word) for quantity in UNITS)]
+    unit = next((word for word in reversed(units) if word not in SCALES), units[-1] if units else plain)
     celsius = next(iter(UNITS["temperature"]))
     return scale if scale and _known("temperature", scale) and unit in (scale, *celsius) else unit
 
@@ -183,5 +183,5 @@ def _conversion(quantity: str, unit: str | None, column: str) -> tuple[float, fl
     for texts, numbers in UNITS[quantity].items():
         if unit is None or unit in texts:  # no unit: ours, which comes first
             return numbers
-    known = ", ".join(texts[0] for texts in UNITS[quantity])
-    raise UnitError(f"column '{column}': unit '{unit}' is not one of {known}")
+    allowed = ", ".join(texts[0] for texts in UNITS[quantity])
+    raise UnitError(f"column '{column}': unit '{unit}' is not one of {allowed}")

@@ -42,8 +42,8 @@ def read_netcdf(
             if engine == "h5netcdf":
                 hdf5_files.refuse_other_files(data)
             dataset = xr.open_dataset(io.BytesIO(data), engine=engine, decode_times=False)
-            found = _columns(path, dataset)
-            return _table(path, dataset, found, profile, (latitude, longitude))
+            variables = _columns(path, dataset)
+            return _table(path, dataset, variables, profile, (latitude, longitude))
     except CastError:
         raise
     except named_files.FileError as error:
@@ -59,7 +59,7 @@ def read_netcdf(
 
 def _columns(path: Path, dataset: xr.Dataset) -> dict[str, list[tuple[str, Meaning]]]:
     """Variables and meanings of each quantity; adjusted values before those in real time. Raises CastError."""
-    found: dict[str, list[tuple[str, Meaning]]] = {}
+    variables: dict[str, list[tuple[str, Meaning]]] = {}
     names = sorted((str(name) for name in dataset.variables), key=lambda n: "adjusted" not in n.lower())
     for name in names:
         variable = dataset[name]
@@ -68,27 +68,27 @@ def _columns(path: Path, dataset: xr.Dataset) -> dict[str, list[tuple[str, Meani
         unit = str(variable.attrs.get("units", "")) or None
         for called in (name, str(variable.attrs.get("standard_name", ""))):
             try:
-                held = meaning(called, unit) if called else None
+                definition = meaning(called, unit) if called else None
             except UnitError:
                 continue
-            if held is not None:
-                found.setdefault(held.quantity, []).append((name, held))
+            if definition is not None:
+                variables.setdefault(definition.quantity, []).append((name, definition))
                 break
-    if not {"depth", "pressure"} & set(found) or not {"temperature", "sound speed"} & set(found):
+    if not {"depth", "pressure"} & set(variables) or not {"temperature", "sound speed"} & set(variables):
         shown = ", ".join(f"'{n}'" for n in list(dataset.variables)[:12])
         raise CastError(f"{path}: no profile of depth or pressure, and temperature or sound speed, among {shown}")
-    return found
+    return variables
 
 
 def _table(
     path: Path,
     dataset: xr.Dataset,
-    found: dict[str, list[tuple[str, Meaning]]],
+    variables: dict[str, list[tuple[str, Meaning]]],
     profile: int | None,
-    place: tuple[float | None, float | None],
+    position: tuple[float | None, float | None],
 ) -> CastTable:
     notes: list[str] = []
-    lead = dataset[found["temperature" if "temperature" in found else "sound speed"][0][0]]
+    lead = dataset[variables["temperature" if "temperature" in variables else "sound speed"][0][0]]
     levels = next((d for d in reversed(lead.dims) if str(d).lower() in LEVELS), lead.dims[-1])
     if dataset.sizes[levels] > MAX_ROWS:
         raise CastError(f"{path}: has more than {MAX_ROWS} rows")
@@ -96,46 +96,48 @@ def _table(
     others = [dim for dim in lead.dims if dim != levels]
     for dim in others:
         if str(dim).lower() in PLACES:
-            pick[dim] = _nearest(path, dataset, dim, place[0 if str(dim).lower().startswith("lat") else 1])
+            pick[dim] = _nearest(path, dataset, dim, position[0 if str(dim).lower().startswith("lat") else 1])
     rows = slice(None) if others else _same_cast(dataset, levels, profile, path, notes)
     columns: dict[str, Column] = {}
     for dim in others:
         if dim not in pick:
             pick[dim] = _chosen(path, dataset, dim, profile)
-            while profile is None and pick[dim] + 1 < dataset.sizes[dim] and not _usable(dataset, found, levels, pick):
+            while (
+                profile is None and pick[dim] + 1 < dataset.sizes[dim] and not _usable(dataset, variables, levels, pick)
+            ):
                 pick[dim] += 1
             if dataset.sizes[dim] > 1:
                 notes.append(f"profile {pick[dim]} of {dataset.sizes[dim]} along {dim}")
-    columns = _values(dataset, found, levels, pick, rows)
+    columns = _values(dataset, variables, levels, pick, rows)
     size = len(next(iter(columns.values())).values)
     latitude, longitude = (_coordinate(dataset, name, pick, rows) for name in ("lat", "lon"))
     names = tuple(str(n) for n in dataset.variables)
-    made = "Argo" if "argo" in str(dataset.attrs.get("title", "")).lower() else "netCDF"
-    return CastTable(path, made, columns, np.arange(1, size + 1), names, 0, latitude, longitude, tuple(notes))
+    make = "Argo" if "argo" in str(dataset.attrs.get("title", "")).lower() else "netCDF"
+    return CastTable(path, make, columns, np.arange(1, size + 1), names, 0, latitude, longitude, tuple(notes))
 
 
 def _values(
-    dataset: xr.Dataset, found: dict[str, list[tuple[str, Meaning]]], levels: Any, pick: dict[Any, int], rows: Any
+    dataset: xr.Dataset, variables: dict[str, list[tuple[str, Meaning]]], levels: Any, pick: dict[Any, int], rows: Any
 ) -> dict[str, Column]:
     """Columns of the profile picked: of each quantity the first variable that has a good value in it."""
     columns: dict[str, Column] = {}
-    for quantity, several in found.items():
-        for name, held in several:
+    for quantity, several in variables.items():
+        for name, definition in several:
             variable = dataset[name]
             if levels not in variable.dims:
                 continue
             at = {dim: pick.get(dim, 0) for dim in variable.dims if dim != levels}
             values = without_flags(_good(dataset, name, variable.isel(at).values.astype(float), at)[rows])
             if quantity not in columns or not np.isfinite(columns[quantity].values).any():
-                columns[quantity] = Column(name, held.ours(values), held.stated)
+                columns[quantity] = Column(name, definition.ours(values), definition.stated)
     return columns
 
 
 def _usable(
-    dataset: xr.Dataset, found: dict[str, list[tuple[str, Meaning]]], levels: Any, pick: dict[Any, int]
+    dataset: xr.Dataset, variables: dict[str, list[tuple[str, Meaning]]], levels: Any, pick: dict[Any, int]
 ) -> bool:
     """Whether a profile has rows with all that the file has of pressure or depth, temperature and salinity."""
-    columns = _values(dataset, found, levels, pick, slice(None))
+    columns = _values(dataset, variables, levels, pick, slice(None))
     wanted = [columns[name].values for name in ("pressure", "temperature", "salinity") if name in columns]
     return bool(np.any(np.all(np.isfinite(wanted), axis=0)))
 
@@ -148,12 +150,12 @@ def _chosen(path: Path, dataset: xr.Dataset, dim: Any, profile: int | None) -> i
     return profile or 0
 
 
-def _nearest(path: Path, dataset: xr.Dataset, dim: Any, place: float | None) -> int:
+def _nearest(path: Path, dataset: xr.Dataset, dim: Any, wanted: float | None) -> int:
     if dataset.sizes[dim] == 1:
         return 0
-    if place is None:
+    if wanted is None:
         raise CastError(f"{path}: is a grid of places: give the `latitude` and the `longitude` of the scene")
-    off = dataset[dim].values.astype(float) - place
+    off = dataset[dim].values.astype(float) - wanted
     return int(np.argmin(np.abs((off + 180.0) % 360.0 - 180.0)))
 
 
@@ -186,11 +188,11 @@ def _good(dataset: xr.Dataset, name: str, values: Floats, at: dict[Any, int]) ->
 
 def _coordinate(dataset: xr.Dataset, start: str, pick: dict[Any, int], rows: Any) -> float | None:
     """Latitude or longitude (degrees) of the profile."""
-    most = 90.0 if start == "lat" else 360.0
+    limit = 90.0 if start == "lat" else 360.0
     for name in dataset.variables:
         if str(name).lower() in (start, "latitude" if start == "lat" else "longitude"):
             variable = dataset[name].isel({d: i for d, i in pick.items() if d in dataset[name].dims})
             values = np.ravel(variable.values[rows] if variable.ndim and not pick else variable.values)
-            if values.size and np.issubdtype(values.dtype, np.number) and abs(float(values[0])) <= most:
+            if values.size and np.issubdtype(values.dtype, np.number) and abs(float(values[0])) <= limit:
                 return float(values[0])
     return None

@@ -101,9 +101,10 @@ def degrees(text: str) -> float | None:
 
 def placed(latitude: str | None, longitude: str | None) -> tuple[float | None, float | None]:
     """Degrees of a place given as texts, None for each that is no latitude or no longitude (999: none given)."""
-    found = [None if text is None else degrees(text) for text in (latitude, longitude)]
+    values = [None if text is None else degrees(text) for text in (latitude, longitude)]
     return tuple(
-        None if value is None or abs(value) > most else value for value, most in zip(found, (90.0, 360.0), strict=True)
+        None if value is None or abs(value) > limit else value
+        for value, limit in zip(values, (90.0, 360.0), strict=True)
     )  # type: ignore[return-value]
 
 
@@ -118,6 +119,6 @@ def numbers_of(cells: Sequence[str], path: Path, lines: Sequence[int], name: str
         try:
             values[i] = np.nan if cell.strip().lower() in MISSING_MARKS else float(cell)
         except ValueError:
-            where = f"{path}, line {lines[i]}, column '{name}'"
-            raise CastError(f"{where}: {cell.strip()[:40]!r} is not a number") from None
+            location = f"{path}, line {lines[i]}, column '{name}'"
+            raise CastError(f"{location}: {cell.strip()[:40]!r} is not a number") from None
     return without_flags(values)

@@ -126,16 +126,16 @@ def read_fixed_columns(path: Path, text: str, profile: int) -> CastTable | None:
     """
     lines = text.split("\n")
     for layout in LAYOUTS:
-        if (found := _heads(layout, lines, text[:HEAD_LETTERS])) is not None:
+        if (heads := _heads(layout, lines, text[:HEAD_LETTERS])) is not None:
             break
     else:
         return None
-    place, starts = found
+    position, starts = heads
     if profile >= len(starts):
         raise CastError(f"{path}: has no profile {profile}, only {len(starts)} (from 0)")
     if layout.several:
-        place = _groups(re.match(layout.last, lines[starts[profile] - 1], re.IGNORECASE))
-    wanted = [(i, held) for i, name in enumerate(layout.columns) if (held := meaning(name))]
+        position = _groups(re.match(layout.last, lines[starts[profile] - 1], re.IGNORECASE))
+    wanted = [(i, definition) for i, name in enumerate(layout.columns) if (definition := meaning(name))]
     stop = starts[profile + 1] - 1 if profile + 1 < len(starts) else len(lines)
     rows, numbers = [], []
     for number, line in enumerate(lines[starts[profile] : stop], start=starts[profile] + 1):
@@ -147,12 +147,15 @@ def read_fixed_columns(path: Path, text: str, profile: int) -> CastTable | None:
             rows.append(row)
             numbers.append(number)
     values = np.array(rows, float).reshape(-1, len(wanted))
-    columns = {held.quantity: Column(held.quantity, held.ours(values[:, k])) for k, (_, held) in enumerate(wanted)}
+    columns = {
+        definition.quantity: Column(definition.quantity, definition.ours(values[:, k]))
+        for k, (_, definition) in enumerate(wanted)
+    }
     several = len(starts) > 1
     notes = (f"profile {profile} of {len(starts)}",) if several else ()
-    names = tuple(held.quantity for _, held in wanted)
-    where = placed(place.get("lat"), place.get("lon"))
-    return CastTable(path, layout.make, columns, np.array(numbers, np.int64), names, 0, *where, notes, several)
+    names = tuple(definition.quantity for _, definition in wanted)
+    coordinates = placed(position.get("lat"), position.get("lon"))
+    return CastTable(path, layout.make, columns, np.array(numbers, np.int64), names, 0, *coordinates, notes, several)
 
 
 def _heads(layout: Layout, lines: list[str], head: str) -> tuple[dict[str, str], list[int]] | None:
@@ -161,19 +164,21 @@ def _heads(layout: Layout, lines: list[str], head: str) -> tuple[dict[str, str],
     also = [re.search("^.{0,80}?" + pattern, head, re.IGNORECASE | re.MULTILINE) for pattern in layout.has]
     if begun is None or not all(also):
         return None
-    place = {name: value for found in (begun, *also) for name, value in _groups(found).items()}
+    position = {name: value for match in (begun, *also) for name, value in _groups(match).items()}
     if not layout.last:
-        return place, [layout.head]
-    most = len(lines) if layout.several else 500
-    ends = [(i, found) for i, line in enumerate(lines[:most]) if (found := re.match(layout.last, line, re.IGNORECASE))]
+        return position, [layout.head]
+    searched = len(lines) if layout.several else 500
+    ends = [
+        (i, match) for i, line in enumerate(lines[:searched]) if (match := re.match(layout.last, line, re.IGNORECASE))
+    ]
     if not ends:
         return None
     ends = ends if layout.several else ends[:1]
-    return place | _groups(ends[0][1]), [i + 1 for i, _ in ends]
+    return position | _groups(ends[0][1]), [i + 1 for i, _ in ends]
 
 
-def _groups(found: re.Match[str] | None) -> dict[str, str]:
-    return {} if found is None else {name: value for name, value in found.groupdict().items() if value}
+def _groups(match: re.Match[str] | None) -> dict[str, str]:
+    return {} if match is None else {name: value for name, value in match.groupdict().items() if value}
 
 
 def _number(cells: list[str], index: int) -> float:

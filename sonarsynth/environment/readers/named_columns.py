@@ -67,19 +67,20 @@ class _Header:
 
     def meanings(self, path: Path) -> dict[str, tuple[int, Meaning]]:
         """Index and meaning of the first column of each quantity; raises CastError where a unit is not known."""
-        found: dict[str, tuple[int, Meaning]] = {}
+        columns: dict[str, tuple[int, Meaning]] = {}
         for i, name in enumerate(self.names):
             unit = self.units[i] if i < len(self.units) else None
             try:
-                held = meaning(split(name)[0] if self.shifted else name, unit)
+                definition = meaning(split(name)[0] if self.shifted else name, unit)
             except UnitError as error:
                 raise CastError(f"{path}, line {self.index + 1}, {error}") from None
-            if held is None:
+            if definition is None:
                 continue
-            of_sea = held.quantity == "pressure" and split(name)[0].startswith("sea ")  # not that of the air with it
-            if held.quantity not in found or of_sea:
-                found[held.quantity] = (i, held)
-        return found
+            # the pressure of the sea, not that of the air with it
+            of_sea = definition.quantity == "pressure" and split(name)[0].startswith("sea ")
+            if definition.quantity not in columns or of_sea:
+                columns[definition.quantity] = (i, definition)
+        return columns
 
 
 def read_named_columns(path: Path, text: str) -> CastTable:
@@ -98,8 +99,8 @@ def read_named_columns(path: Path, text: str) -> CastTable:
             continue
         cells = _cells(path, number, line, cut)
         wanted = [cells[i] for i, _ in columns.values() if i < len(cells)]
-        whole = len(cells) >= needed or all(map(_numeric, wanted))  # a shorter line of words is no row
-        if not columns or (whole and any(map(_numeric, wanted))) or not any(cells[1:]):
+        complete = len(cells) >= needed or all(map(_numeric, wanted))  # a shorter line of words is no row
+        if not columns or (complete and any(map(_numeric, wanted))) or not any(cells[1:]):
             rows.append([*cells, *[""] * (needed - len(cells))])
             numbers.append(number)
             widths.append(len(cells))
@@ -108,10 +109,10 @@ def read_named_columns(path: Path, text: str) -> CastTable:
     make = _make(lines[: header.first])
     rows, numbers = (rows[MVP_ROWS:], numbers[MVP_ROWS:]) if make == "MVP" else (rows, numbers)
     own: dict[str, Column] = {}
-    for quantity, (i, held) in columns.items():
+    for quantity, (i, definition) in columns.items():
         cells = [row[i].strip().replace(",", ".") if comma else row[i].strip() for row in rows]
         name = header.names[i].strip()
-        own[quantity] = Column(name, held.ours(numbers_of(cells, path, numbers, name)), held.stated)
+        own[quantity] = Column(name, definition.ours(numbers_of(cells, path, numbers, name)), definition.stated)
     return CastTable(
         path,
         make,
@@ -135,8 +136,8 @@ def _check_widths(path: Path, header: _Header, widths: list[int]) -> None:
 def _header(path: Path, lines: list[str]) -> _Header:
     """The line that names the columns. Raises CastError where there is none, or nothing after it."""
     for index, line in enumerate(lines[:HEAD_LINES]):
-        if (found := _as_header(lines, index, line)) is not None:
-            return found
+        if (header := _as_header(lines, index, line)) is not None:
+            return header
     written = [(i, line) for i, line in enumerate(lines) if _is_row(line)]
     if len(written) < 2:
         raise CastError(f"{path}: has no rows of numbers")
@@ -173,16 +174,16 @@ def _as_header(lines: list[str], index: int, line: str) -> _Header | None:
 
 def _quantity(name: str) -> str | None:
     try:
-        held = meaning(name)
+        definition = meaning(name)
     except UnitError:
         return _nominal(name)
-    return None if held is None else held.quantity
+    return None if definition is None else definition.quantity
 
 
 def _nominal(name: str) -> str | None:
     """The quantity of a column whose unit is not known, or another's."""
-    held = meaning(split(name)[0])
-    return None if held is None else held.quantity
+    definition = meaning(split(name)[0])
+    return None if definition is None else definition.quantity
 
 
 def _units(lines: list[str], index: int, count: int, cut: Splitter) -> tuple[list[str], int]:
@@ -255,11 +256,11 @@ def _cells(path: Path, number: int, line: str, cut: Splitter) -> list[str]:
 
 def _place(lines: list[str]) -> tuple[float | None, float | None]:
     """Latitude and longitude that the head of the file gives ('% Start latitude,-36.2'), each if it is one."""
-    found: list[str | None] = []
+    coordinates: list[str | None] = []
     for pattern in (LATITUDE, LONGITUDE):
-        given = [m[1].strip("\t ,;") for line in lines[:HEAD_LINES] if (m := pattern.match(line))]
-        found.append(next((text for text in given if re.search(r"\d", text)), None))
-    return placed(*found)
+        candidates = [m[1].strip("\t ,;") for line in lines[:HEAD_LINES] if (m := pattern.match(line))]
+        coordinates.append(next((text for text in candidates if re.search(r"\d", text)), None))
+    return placed(*coordinates)
 
 
 def _repeated(header: _Header, columns: dict[str, tuple[int, Meaning]]) -> tuple[str, ...]:

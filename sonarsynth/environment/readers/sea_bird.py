@@ -41,9 +41,9 @@ def read_sea_bird(path: Path, data: bytes, text: str) -> CastTable:
         raise CastError(f"{path}: its head does not name its columns ('# name 0 = ...')")
     meanings: dict[int, Meaning] = {}
     for i, (short, full) in sorted(names.items()):
-        held = _meaning(path, head, short, full)
-        if held is not None and held.quantity not in [m.quantity for m in meanings.values()]:
-            meanings[i] = held  # of a pair of sensors the first
+        definition = _meaning(path, head, short, full)
+        if definition is not None and definition.quantity not in [m.quantity for m in meanings.values()]:
+            meanings[i] = definition  # of a pair of sensors the first
     shown = tuple(f"{short}: {full}" if full else short for short, full in (names[i] for i in range(len(names))))
     first = head.count("\n") + 1
     body, binary = data[end.end() :], re.search(r"file_type\s*=\s*binary", head) is not None
@@ -55,17 +55,17 @@ def read_sea_bird(path: Path, data: bytes, text: str) -> CastTable:
     flag = re.search(r"bad_flag\s*=\s*(\S+)", head)
     bad = float(flag[1]) if flag and is_number(flag[1]) else -9.99e-29
     columns = {}
-    for i, held in meanings.items():
+    for i, definition in meanings.items():
         values = np.where(np.isclose(table[:, i], bad, rtol=1e-5, atol=0.0), np.nan, table[:, i])
-        columns[held.quantity] = Column(shown[i], held.ours(values))
+        columns[definition.quantity] = Column(shown[i], definition.ours(values))
     return CastTable(path, "Sea-Bird", columns, lines, shown, _line(head, "# name 0"), *_place(head))
 
 
 def _meaning(path: Path, head: str, short: str, full: str) -> Meaning | None:
     """What a column holds: by its short name where that is one of ours, else by its full one."""
-    known = any(re.fullmatch(pattern, short.lower()) for pattern, _, _ in SEA_BIRD)
+    recognised = any(re.fullmatch(pattern, short.lower()) for pattern, _, _ in SEA_BIRD)
     try:
-        return meaning(short if known or not full else full)
+        return meaning(short if recognised or not full else full)
     except UnitError as error:
         raise CastError(f"{path}, line {_line(head, f'= {short}')}, {error}") from None
 
@@ -113,10 +113,10 @@ def _bottles(path: Path, text: str) -> CastTable:
     numbers = [means[i][0] for i in good]
     columns: dict[str, Column] = {}
     for i, name in enumerate(names):
-        held = meaning(name)
-        if held is not None and held.quantity not in columns:
-            columns[held.quantity] = Column(
-                name, held.ours(numbers_of([cells[g][i] for g in good], path, numbers, name))
+        definition = meaning(name)
+        if definition is not None and definition.quantity not in columns:
+            columns[definition.quantity] = Column(
+                name, definition.ours(numbers_of([cells[g][i] for g in good], path, numbers, name))
             )
     return CastTable(
         path, "Sea-Bird bottles", columns, np.array(numbers, np.int64), tuple(names), at + 1, *_place(text)
@@ -124,8 +124,8 @@ def _bottles(path: Path, text: str) -> CastTable:
 
 
 def _place(head: str) -> tuple[float | None, float | None]:
-    found = [m[1] if (m := pattern.search(head)) else None for pattern in (LATITUDE, LONGITUDE)]
-    latitude, longitude = placed(*found)
+    texts = [m[1] if (m := pattern.search(head)) else None for pattern in (LATITUDE, LONGITUDE)]
+    latitude, longitude = placed(*texts)
     if latitude is None and (m := re.search(r"\[salt water, m\], lat = ([-\d.]+)", head)):
         latitude = placed(m[1], None)[0]
     return latitude, longitude
