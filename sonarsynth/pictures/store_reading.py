@@ -151,16 +151,16 @@ class StoredFrame:
 def every_stored(tree: xr.DataTree, frames: Sequence[int]) -> list[StoredFrame]:
     """Some frames as stored. A frame that was not built comes back full of NaN."""
     source = held(tree, frames)
-    found = points(tree, frames) if has_labels(tree) else None
-    made = []
+    labelled = points(tree, frames) if has_labels(tree) else None
+    stored_frames = []
     for row, index in enumerate(frames):
         cloud: dict[str, Floats] = dict.fromkeys((*POINTS, "range_error"), np.zeros(0))
-        if found is not None:
-            own = found.frame == index
-            cloud = {name: needed(source, f"cloud/{name}", row)[found.row[own]].astype(float) for name in POINTS}
-            cloud["range_error"] = np.where(found.judged[own], found.error[own], np.nan)
-        made.append(_stored(source, row, index, cloud))
-    return made
+        if labelled is not None:
+            own = labelled.frame == index
+            cloud = {name: needed(source, f"cloud/{name}", row)[labelled.row[own]].astype(float) for name in POINTS}
+            cloud["range_error"] = np.where(labelled.judged[own], labelled.error[own], np.nan)
+        stored_frames.append(_stored(source, row, index, cloud))
+    return stored_frames
 
 
 def stored(tree: xr.DataTree, index: int) -> StoredFrame:
@@ -221,18 +221,18 @@ def echo_levels(tree: Source, frame: int) -> tuple[Floats, list[str]] | None:
 
 def ghosts(tree: Source, frame: int) -> tuple[Ghost, ...]:
     """Ghosts of all targets that are less than `FAINTEST` under the direct echo; none in a store without echoes."""
-    found = echo_levels(tree, frame)
+    levels = echo_levels(tree, frame)
     azimuth, elevation = (read(tree, f"truth/targets/echo_{name}", frame) for name in ("azimuth", "elevation"))
     targets = read(tree, "truth/targets/target")
-    if found is None or azimuth is None or elevation is None or targets is None:
+    if levels is None or azimuth is None or elevation is None or targets is None:
         return ()
-    level, families = found
+    level, families = levels
     drawn = []
     for target, family in np.argwhere(level > -FAINTEST):
         if families[family] != "direct" and not _blended(azimuth[target], elevation[target], families, int(family)):
             whose = f"{targets[target]}: " if len(targets) > 1 else ""
-            where = float(azimuth[target, family]), float(elevation[target, family])
-            drawn.append(Ghost(f"{whose}{families[family]} ghost", int(target), *where, float(level[target, family])))
+            bearing = float(azimuth[target, family]), float(elevation[target, family])
+            drawn.append(Ghost(f"{whose}{families[family]} ghost", int(target), *bearing, float(level[target, family])))
     return tuple(drawn)
 
 
@@ -241,16 +241,16 @@ def lobes(tree: Source, frame: int) -> tuple[Floats, ...]:
 
     None in a store without echoes, or of an array that is no lattice.
     """
-    found, position = echo_levels(tree, frame), read(tree, "signals/position")
+    levels, position = echo_levels(tree, frame), read(tree, "signals/position")
     azimuth, elevation = (read(tree, f"truth/targets/echo_{name}", frame) for name in ("azimuth", "elevation"))
     pitch = 0.0 if position is None else lattice_pitch(position)
-    if found is None or azimuth is None or elevation is None or not pitch:
+    if levels is None or azimuth is None or elevation is None or not pitch:
         return ()
     frequency = np.linspace(tree.attrs["band_low"], tree.attrs["band_high"], LOBE_POINTS)
     grid = [needed(tree, f"truth/beams/{name}") for name in ("azimuth", "elevation")]
     low, high = np.array([[axis.min(), axis.max()] for axis in grid]).T
     drawn = []
-    for echo in np.argwhere((found[0] > -LOBED) & np.isfinite(azimuth + elevation)):
+    for echo in np.argwhere((levels[0] > -LOBED) & np.isfinite(azimuth + elevation)):
         towards = direction(*np.deg2rad([azimuth[tuple(echo)], elevation[tuple(echo)]]))
         beams = grating_lobes(towards, frequency, pitch, tree.attrs["assumed_sound_speed"])
         lines = np.rad2deg(np.stack(azimuth_elevation(beams), axis=-1))
@@ -288,13 +288,13 @@ def hulls(tree: Source, index: int) -> tuple[Hull, ...]:
         return ()
     placed = (needed(tree, f"truth/targets/{name}", index) for name in ("position", "orientation", "scale"))
     position, orientation, scale = placed
-    made = []
+    bodies = []
     for i, name in enumerate(map(str, names)):
         if not np.isfinite(position[i]).all():  # not in this sequence
             continue
         group = mesh_group(tree, i, index)
         vertices, faces = read(tree, f"{group}/vertices"), read(tree, f"{group}/faces")
         if vertices is not None and faces is not None:
-            there = sonar.to_body(Pose(position[i], orientation[i]).to_world(scale[i] * vertices))
-            made.append(Hull(name, there, faces.astype(np.int64)))
-    return tuple(made)
+            points = sonar.to_body(Pose(position[i], orientation[i]).to_world(scale[i] * vertices))
+            bodies.append(Hull(name, points, faces.astype(np.int64)))
+    return tuple(bodies)

@@ -51,45 +51,45 @@ def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     names = read(tree, "truth/targets/target")
     if names is None or not len(names):
         return ["  targets    none"]
-    sonar, where = needed(tree, "truth/sonar_position"), needed(tree, "truth/targets/position")
-    away = np.linalg.norm(where[frames] - sonar[frames, None], axis=2)
-    seen = (needed(tree, "truth/targets/visible_fraction")[frames] > 0).sum(axis=0)
+    sonar, position = needed(tree, "truth/sonar_position"), needed(tree, "truth/targets/position")
+    away = np.linalg.norm(position[frames] - sonar[frames, None], axis=2)
+    visible = (needed(tree, "truth/targets/visible_fraction")[frames] > 0).sum(axis=0)
     view = read(tree, "truth/targets/view")
     inside = None if view is None else np.isin(view[frames], (View.IN_VIEW, View.PARTLY_IN_VIEW)).sum(axis=0)
     snr, lines = read(tree, "truth/targets/snr"), []
     for i, name in enumerate(map(str, names)):
         faces = read(tree, f"{mesh_group(tree, i, int(frames[0]))}/faces")
         facets = f"{len(faces)} facets, " if faces is not None else ""
-        there = away[np.isfinite(away[:, i]), i]
-        reach = f"{there.min():.2f} to {there.max():.2f} m away" if len(there) else "in none of these frames"
+        distance = away[np.isfinite(away[:, i]), i]
+        reach = f"{distance.min():.2f} to {distance.max():.2f} m away" if len(distance) else "in none of these frames"
         ratio = "" if snr is None or not np.isfinite(snr[frames, i]).any() else _ratios(snr[frames, i])
-        within = "" if inside is None or inside[i] == seen[i] else f" ({inside[i]} within the beams)"
-        lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen[i]} frames{within}{ratio}")
+        within = "" if inside is None or inside[i] == visible[i] else f" ({inside[i]} within the beams)"
+        lines.append(f"  target     {name}: {facets}{reach}, in sight in {visible[i]} frames{within}{ratio}")
     return [*lines, *_ghosts(tree, frames, list(map(str, names)))]
 
 
 def _ratios(snr: np.ndarray) -> str:
     """Signal-to-noise ratios (frame,) in dB in a few words."""
-    some = snr[np.isfinite(snr)]
-    return f", snr {some.min():.0f} to {some.max():.0f} dB (median {np.median(some):.0f})"
+    finite = snr[np.isfinite(snr)]
+    return f", snr {finite.min():.0f} to {finite.max():.0f} dB (median {np.median(finite):.0f})"
 
 
 def _ghosts(tree: xr.DataTree, frames: np.ndarray, names: list[str]) -> list[str]:
     """Levels of each target's echoes by the boundaries they touched on their way to the array, medians over frames."""
-    found = [levels for frame in frames if (levels := echo_levels(tree, int(frame))) is not None]
-    if not found:
+    echoes = [levels for frame in frames if (levels := echo_levels(tree, int(frame))) is not None]
+    if not echoes:
         return []
-    families, each = found[0][1], np.array([level for level, _ in found])  # (frame, target, family)
+    families, decibels = echoes[0][1], np.array([level for level, _ in echoes])  # (frame, target, family)
     lines = []
     for i, name in enumerate(names):
         ghosts = [
-            f"{family} {np.nanmedian(each[:, i, k]):+.1f} dB"
+            f"{family} {np.nanmedian(decibels[:, i, k]):+.1f} dB"
             for k, family in enumerate(families)
-            if family != "direct" and np.isfinite(each[:, i, k]).any()
+            if family != "direct" and np.isfinite(decibels[:, i, k]).any()
         ]
-        seen = np.isfinite(each[:, i, families.index("direct")]).any()
+        direct = np.isfinite(decibels[:, i, families.index("direct")]).any()
         if ghosts:
-            lines.append(f"  ghosts     {name}: {', '.join(ghosts)} re its {'direct' if seen else 'strongest'} echo")
+            lines.append(f"  ghosts     {name}: {', '.join(ghosts)} re its {'direct' if direct else 'strongest'} echo")
     return lines
 
 
