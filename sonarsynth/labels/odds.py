@@ -3,50 +3,83 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Bools, Floats, counted
 
+CONFIDENCE: Final = 1.959964
+"""Standard deviations of a band of 95 %."""
+PEAKS: Final = 3
+"""Brightest peaks of an image that are looked at."""
+
 
 @dataclass(frozen=True)
 class Odds:
-    """Of some frames that were made."""
+    """Of some frames that were made of a scene with more than echoes."""
 
     frames: int  # with an image, and a target that is no clutter in view
     found: int  # of these: whose brightest beam is on a target, or within a beam width of its outline
-    snr: tuple[float, ...] = ()  # dB, of such targets in all of them; none where echoes are all that is heard
+    among_peaks: int  # of these: where one of the `PEAKS` brightest peaks is
+    chance: float = 0.0  # of these, on average: where a beam at random is
+    snr: tuple[float, ...] = ()  # dB, of such targets in all of them
 
     @property
     def line(self) -> str:
         """What `plan` says; "" where no frame has a target in view."""
         if not self.frames:
             return ""
-        text = f"of {counted(self.frames, 'frame')} with a target, the brightest beam is on it in {self.found}"
+        text = (
+            f"of {counted(self.frames, 'frame')} with a target, the brightest beam is on it in "
+            f"{self._share(self.found)}, a beam at random in {self.chance:.2g}, "
+            f"one of the {PEAKS} brightest peaks in {self._share(self.among_peaks)}"
+        )
         if not self.snr:
             return text
         low, middle, high = np.quantile(self.snr, (0.0, 0.5, 1.0))
         return f"{text}; snr of targets {low:.0f} to {high:.0f} dB, median {middle:.0f}"
 
+    def _share(self, hits: int) -> str:
+        low, high = binomial_band(hits, self.frames)
+        return f"{hits} (95 %: {low:.2f} to {high:.2f})"
+
     def __add__(self, other: Odds) -> Odds:
-        return Odds(self.frames + other.frames, self.found + other.found, self.snr + other.snr)
+        return Odds(*(mine + more for mine, more in zip(vars(self).values(), vars(other).values(), strict=True)))
 
 
-NO_ODDS = Odds(0, 0)
+NO_ODDS = Odds(0, 0, 0)
 """Of no frame."""
 
 
 def odds(energy: Floats, beam_target: npt.NDArray[np.int16], clutter: Bools, snr: Floats | None, reach: int) -> Odds:
     """Of one frame: its image (elevation, azimuth), the target of each beam (-1: none), which targets are clutter
-    (target,), their ratios (target,) dB, and a beam width in beams."""
-    from scipy.ndimage import binary_dilation
+    (target,), their ratios (target,) dB (none where echoes are all that is heard: no odds), a beam width in beams.
+    A peak is as bright as any beam so near to it."""
+    from scipy.ndimage import binary_dilation, maximum_filter
 
     of = np.append(~clutter, False)[beam_target]  # beams on nothing: the last
-    if not of.any() or not np.isfinite(energy).any():
+    if snr is None or not of.any() or not np.isfinite(energy).any():
         return NO_ODDS
     rows, columns = np.mgrid[-reach : reach + 1, -reach : reach + 1]
-    near = binary_dilation(of, rows**2 + columns**2 <= reach**2)
-    on_target = bool(near.ravel()[int(np.nanargmax(energy))])
-    ratios = np.zeros(0) if snr is None else snr[~clutter & np.isfinite(snr)]
-    return Odds(1, int(on_target), tuple(ratios.tolist()))
+    disc = rows**2 + columns**2 <= reach**2
+    heard = np.where(np.isfinite(energy), energy, -np.inf)
+    peaks = np.where(maximum_filter(heard, footprint=disc) == heard, heard, -np.inf).ravel()
+    best = np.argsort(-peaks, kind="stable")[:PEAKS]
+    near = binary_dilation(of, disc)
+    on_target = near.ravel()[best] & np.isfinite(peaks[best])
+    ratios = snr[~clutter & np.isfinite(snr)]
+    return Odds(1, int(on_target[0]), int(on_target.any()), float(near.mean()), tuple(ratios.tolist()))
+
+
+def binomial_band(hits: int, trials: int) -> tuple[float, float]:
+    """Bounds of the probability, with 95 % confidence. Source: Wilson (1927), JASA 22, 209."""
+    if trials == 0:
+        return float("nan"), float("nan")
+    p, z2 = hits / trials, CONFIDENCE**2
+    middle = (p + 0.5 * z2 / trials) / (1.0 + z2 / trials)
+    half = CONFIDENCE * np.sqrt(p * (1.0 - p) / trials + 0.25 * z2 / trials**2) / (1.0 + z2 / trials)
+    return float(min(max(middle - half, 0.0), p)), float(
+        max(min(middle + half, 1.0), p)
+    )  # whatever rounds, p is inside

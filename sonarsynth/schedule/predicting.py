@@ -163,7 +163,7 @@ class Prediction:
             "predicted_for": {"frames": self.frames, "workers": self.workers, "cores": self.cores},
             "predicted_from": self.basis,
             "not_tried": list(self.failures),
-            "odds": {"frames": self.odds.frames, "found": self.odds.found, "snr": list(self.odds.snr)},
+            "odds": vars(self.odds),
         }
 
     def against(self, report: BuildReport) -> dict[str, Any]:

@@ -13,7 +13,8 @@ import pytest
 from sonarsynth.detection import Detections, from_rows
 from sonarsynth.evaluation.detectors import DetectorReport, TrueObjects, as_detections
 from sonarsynth.evaluation.detectors.detector_scores import OVERLAPS
-from sonarsynth.evaluation.detectors.precision_and_recall import average_precision, binomial_band, threshold_at
+from sonarsynth.evaluation.detectors.precision_and_recall import average_precision, threshold_at
+from sonarsynth.labels.odds import binomial_band
 
 
 def objects(frame: Any, box: Any, category: Any = 0, **more: Any) -> TrueObjects:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from sonarsynth import render
 from sonarsynth.conventions import direction
@@ -23,6 +24,7 @@ from sonarsynth.receiver.sensor_errors import Electronics
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
 from sonarsynth.scattering import Isotropic
+from sonarsynth.schedule.benchmark_frames import try_frames
 from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.shapes import Sphere
@@ -106,16 +108,6 @@ def test_parts_are_those_of_each_sound_alone_in_the_beams_of_the_target() -> Non
         assert float(truth["snr"][n]) == pytest.approx(10.0 * np.log10(alone / sum(rest)), abs=0.1)
 
 
-def test_without_anything_else_there_is_no_ratio_and_out_of_view_it_is_missing() -> None:
-    silent = render(plan(recipe(("left",), ()), ("image",)), 0)
-    assert not [name for name in silent["truth/targets"].dataset if str(name) == "snr" or str(name).endswith("_energy")]
-    behind = recipe(("left",), ("electronics",))
-    body = replace(behind.scene.world.targets[0], motion=Still(position=(5.0, 9.0, -5.0)))
-    world = replace(behind.scene.world, targets=(body,))
-    truth = render(plan(replace(behind, scene=replace(behind.scene, world=world)), ("image",)), 0)["truth/targets"]
-    assert np.isnan(truth["snr"]).all() and np.isnan(truth["electronics_energy"]).all()
-
-
 def test_odds_count_frames_whose_brightest_beam_is_on_a_target_that_is_no_clutter() -> None:
     beams = np.full((9, 12), -1, np.int16)
     beams[4, 2], beams[4, 9] = 0, 1
@@ -124,10 +116,31 @@ def test_odds_count_frames_whose_brightest_beam_is_on_a_target_that_is_no_clutte
     for at, hit in (((4, 2), True), ((4, 3), True), ((4, 5), False), ((4, 9), False)):
         here = image.copy()
         here[at] = 2.0
-        one = odds(here, beams, clutter, snr, 1)
-        assert (one.frames, one.found, one.snr) == (1, hit, (3.0,))
-        found += one
-    assert (
-        found.line == "of 4 frames with a target, the brightest beam is on it in 2; snr of targets 3 to 3 dB, median 3"
+        found += (one := odds(here, beams, clutter, snr, 1))
+        assert vars(one) == {"frames": 1, "found": hit, "among_peaks": hit, "chance": 5 / 108, "snr": (3.0,)}
+        for third in (False, True):  # two brighter peaks, then a third
+            here[1, [5, 7]], here[7, 6] = 2.5, 2.5 if third else 1.0
+            one_of = odds(here, beams, clutter, snr, 1)
+            assert (one_of.found, one_of.among_peaks) == (0, hit and not third)
+    assert found.line == (
+        "of 4 frames with a target, the brightest beam is on it in 2 (95 %: 0.15 to 0.85), a beam at random in 0.19, "
+        "one of the 3 brightest peaks in 2 (95 %: 0.15 to 0.85); snr of targets 3 to 3 dB, median 3"
     )
+    assert odds(image, beams, clutter, None, 1) == NO_ODDS  # nothing but echoes
     assert odds(image, np.full((9, 12), -1, np.int16), clutter, snr, 1).line == ""
+
+
+@pytest.mark.parametrize(("level", "far"), [(-10.0, 60.0), (115.0, -40.0)])
+def test_loud_targets_are_found_in_all_tried_frames_faint_ones_by_chance(level: float, far: float) -> None:
+    """Faint: more than so many by chance is one in 1000. The array is sparse, for narrow beams."""
+    scene = recipe(("left",), ("electronics",)).scene
+    sonar = replace(
+        scene.sonar, array=PlanarLattice(columns=12, rows=8, pitch=0.04), electronics=Electronics(level=level)
+    )
+    eight = replace(scene, sonar=sonar, trajectory=replace(scene.trajectory, frames=8))
+    seen = try_frames(plan(replace(recipe(), scene=eight), ("image",))).odds
+    assert seen.frames == 8 and len(seen.snr) == 8 and seen.chance < 1.0
+    if far > 0.0:
+        assert min(seen.snr) > far and seen.found == seen.among_peaks == 8
+    else:
+        assert max(seen.snr) < far and seen.found <= binom.ppf(0.999, 8, seen.chance / 8)

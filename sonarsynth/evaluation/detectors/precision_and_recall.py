@@ -10,8 +10,6 @@ from sonarsynth.conventions import Floats
 
 RECALLS: Final = np.linspace(0.0, 1.0, 101)
 """Where COCO reads the precision."""
-CONFIDENCE: Final = 1.959964
-"""Standard deviations of a band of 95 %."""
 
 
 def average_precision(score: Floats, hit: np.ndarray, objects: int) -> float:
@@ -35,15 +33,3 @@ def threshold_at(score: Floats, hit: np.ndarray, false_alarms: float) -> float:
     wrong = np.sort(score[~hit])[::-1]
     allowed = int(np.floor(false_alarms + 1e-9))
     return float(np.nextafter(wrong[allowed], np.inf)) if allowed < len(wrong) else float("-inf")
-
-
-def binomial_band(hits: int, trials: int) -> tuple[float, float]:
-    """Bounds of the probability, with 95 % confidence. Source: Wilson (1927), JASA 22, 209."""
-    if trials == 0:
-        return float("nan"), float("nan")
-    p, z2 = hits / trials, CONFIDENCE**2
-    middle = (p + 0.5 * z2 / trials) / (1.0 + z2 / trials)
-    half = CONFIDENCE * np.sqrt(p * (1.0 - p) / trials + 0.25 * z2 / trials**2) / (1.0 + z2 / trials)
-    return float(min(max(middle - half, 0.0), p)), float(
-        max(min(middle + half, 1.0), p)
-    )  # whatever rounds, p is inside

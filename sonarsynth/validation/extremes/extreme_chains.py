@@ -15,8 +15,9 @@ from sonarsynth.pipeline import render
 from sonarsynth.planning import plan
 from sonarsynth.products import LINK_BUDGET, View
 from sonarsynth.receiver import BeamGrid, PlanarLattice, PositionTable, Sonar
+from sonarsynth.receiver.sensor_errors import Electronics
 from sonarsynth.recipe import Recipe
-from sonarsynth.recipe.scene import Processing, Scene, World
+from sonarsynth.recipe.scene import EchoWindow, Processing, Scene, World
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.shapes import Box, Shape, Sphere
 from sonarsynth.targets.target import Target
@@ -225,6 +226,30 @@ def _arrays() -> CaseResult:
     return together(*results)
 
 
+def _snr() -> CaseResult:
+    """White noise of S Pa2/Hz in M sensors brings S/M B T in each beam of a band of B Hz in T s."""
+    ball, beside = ((Sphere(radius=0.6, edge=0.1), place) for place in ((9.0, 1.0, 0.0), (2.0, 9.0, 0.0)))
+    silent = frame(recipe((ball,)), ("image",))["truth/targets"]
+    parts = [holds(not {"snr", "echo_energy"} & {*silent.data_vars}, "a silent sea: no such variable")]
+    huge = 20.0 * np.log10(1e9 / 1e-6) - 10.0 * np.log10(0.5 * Sonar().sampling_frequency)  # dB of 1e9 Pa in all
+    band = Sonar().band.high - Sonar().band.low
+    late = EchoWindow(start=0.02, stop=0.03)
+    for level, window, what in ((30.0, EchoWindow(), "30 dB"), (huge, EchoWindow(), "1e9 Pa"), (30.0, late, "late")):
+        chosen = Processing(echo_window=window)
+        tree = frame(recipe((ball, beside), electronics=Electronics(level=level), processing=chosen), ("image",))
+        truth, image = tree["truth/targets"], tree["image"]
+        (snr, hidden), echo, noise = (np.asarray(truth[name]) for name in ("snr", "echo_energy", "electronics_energy"))
+        beams = np.count_nonzero(tree["truth/beams"].target.values == 0)
+        expected_gain = beams / (LATTICE.columns * LATTICE.rows) * band * float(image.stop - image.start)
+        parts += [
+            off(noise[0] - level - 10.0 * np.log10(expected_gain), 1.0, "dB", f"{what}: noise"),
+            off(snr - echo[0] + noise[0], 1e-6, "dB", "snr"),
+            holds(np.isnan([hidden, echo[1], noise[1]]).all(), "NaN out of view"),
+            holds((echo[0] == -200.0) == (window is late), f"echo {echo[0]:.0f} dB"),
+        ]
+    return together(*parts)
+
+
 CASES = (
     Case("a target that covers the field of view", "every beam meets it, at 1/cos of its angles", _wall),
     Case("just inside and just outside the view", "the last column of beams meets it; none does", _beside_view),
@@ -239,5 +264,10 @@ CASES = (
         "frames of one sensor and of two at one place",
         "no bearing, so no clock and no point; NaN with its reason",
         _arrays,
+    ),
+    Case(
+        "snr: a silent sea, no echo in the window, out of view, 1e9 Pa",
+        "no variable; -200 dB over the noise; NaN; S/M B T of noise in a beam",
+        _snr,
     ),
 )
