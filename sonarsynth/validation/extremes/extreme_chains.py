@@ -100,9 +100,11 @@ def reasoned(tree: xr.DataTree) -> CaseResult:
         wrong += ["/cloud/count"] if int(tree["cloud"]["count"]) != np.isfinite(columns["range"]).sum() else []
         points = [np.isnan(column) for column in columns.values() if column.dtype.kind == "f"]
         clock = np.isfinite(float(tree["image"].start))
+        removed = "remainder" in tree["image"]  # the direct pulse was: beams that may hold much of it still are none
+        leftover = removed and float(tree["image"].remainder) > 0.0
         unheard = bool(np.isnan(tree["image"].energy.values).any())
         wrong += ["/cloud"] if not all((p == points[0]).all() for p in points) else []
-        wrong += ["/image/energy"] if unheard == clock else []
+        wrong += ["/image/energy"] if unheard == clock and not (unheard and leftover) else []
     return holds(not wrong, "every NaN has its reason" if not wrong else f"NaN without one in {', '.join(wrong)}")
 
 
