@@ -129,6 +129,18 @@ def test_bodies_lie_on_it(tmp_path) -> None:
     assert (over > 0.0).all() and (over < 0.5).all()
 
 
+@pytest.mark.parametrize(("kind", "reason"), [("linked", "lies in another file"), ("vast", "numbers 'z', more than")])
+def test_no_grid_is_read_from_elsewhere_or_past_memory(tmp_path: Path, kind: str, reason: str) -> None:
+    h5py, path = pytest.importorskip("h5py"), tmp_path / "grid.nc"
+    with h5py.File(path, "w") as file:
+        if kind == "linked":
+            file["z"] = h5py.ExternalLink("other.nc", "z")
+        else:
+            file.create_dataset("z", (10**7, 10**7), "f4", chunks=(1000, 1000))
+    with pytest.raises(FieldError, match=reason):
+        sea(path).scene_of(0)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "reason"),
     [

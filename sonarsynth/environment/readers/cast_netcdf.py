@@ -5,15 +5,13 @@ Classic netCDF (3) needs nothing more; netCDF 4 needs h5netcdf (`pip install 'so
 
 from __future__ import annotations
 
-import io
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.description import hdf5_files, named_files
+from sonarsynth.description import named_files, netcdf_files
 from sonarsynth.environment.readers.cast_columns import Meaning, UnitError, meaning
 from sonarsynth.environment.readers.cast_table import MAX_ROWS, CastError, CastTable, Column, without_flags
 
@@ -33,28 +31,11 @@ def read_netcdf(
 
     Raises CastError.
     """
-    import xarray as xr
-
-    engine = "scipy" if data[:3] == b"CDF" else "h5netcdf"
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            if engine == "h5netcdf":
-                hdf5_files.refuse_other_files(data)
-            dataset = xr.open_dataset(io.BytesIO(data), engine=engine, decode_times=False)
-            variables = _columns(path, dataset)
-            return _table(path, dataset, variables, profile, (latitude, longitude))
-    except CastError:
-        raise
+        with netcdf_files.netcdf(data, CastError) as dataset:
+            return _table(path, dataset, _columns(path, dataset), profile, (latitude, longitude))
     except named_files.FileError as error:
         raise CastError(f"{path}: {error}") from None
-    except ImportError:
-        raise CastError(f"{path}: is netCDF 4, which needs h5netcdf: pip install 'sonarsynth[netcdf]'") from None
-    except Exception as error:  # whatever a damaged file may bring
-        if engine == "h5netcdf" and "h5netcdf" in str(error):
-            raise CastError(f"{path}: is netCDF 4, which needs h5netcdf: pip install 'sonarsynth[netcdf]'") from None
-        text = " ".join(str(error).split())[:120]
-        raise CastError(f"{path}: cannot be read as netCDF ({type(error).__name__}: {text})") from None
 
 
 def _columns(path: Path, dataset: xr.Dataset) -> dict[str, list[tuple[str, Meaning]]]:

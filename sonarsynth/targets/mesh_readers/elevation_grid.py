@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import io
 import re
-import warnings
 import zipfile
 from typing import Any, Final
 
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
-from sonarsynth.description import hdf5_files
+from sonarsynth.description import netcdf_files
 from sonarsynth.description.memory import max_facets
 from sonarsynth.geometry.surfaces import MeshError, Surface, weld
 from sonarsynth.targets.mesh_readers.mesh_repair import without_area
@@ -107,35 +106,29 @@ def read_npz(data: bytes) -> Surface:
 
 
 def read_netcdf_grid(data: bytes) -> Surface:
-    """A variable of two dimensions with a coordinate in metres each. Raises MeshError."""
-    import xarray as xr
-
-    engine = "scipy" if data[:3] == b"CDF" else "h5netcdf"
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            if engine == "h5netcdf":
-                hdf5_files.refuse_other_files(data)
-            grid = xr.open_dataset(io.BytesIO(data), engine=engine, decode_times=False).load()
-    except ImportError:
-        raise MeshError("is netCDF 4, which needs h5netcdf: pip install 'sonarsynth[netcdf]'") from None
-    except Exception as error:  # whatever a damaged file may bring
-        raise MeshError(f"cannot be read as netCDF ({type(error).__name__})") from None
+    """A variable of two dimensions with a coordinate in metres each. Raises MeshError, FileError."""
     flat: dict[str, Floats] = {}
-    for name, variable in grid.variables.items():
-        unit = str(variable.attrs.get("units", "m")).lower()
-        wanted = str(name).lower() in sum(NAMES.values(), ())
-        if "degree" in unit and str(name).lower() in ("lat", "lon", "latitude", "longitude", *NAMES["x"], *NAMES["y"]):
-            raise MeshError(f"has '{name}' in degrees: a grid in metres, east and north, is needed")
-        if wanted and unit not in ("m", "metre", "metres", "meter", "meters", "1", ""):
-            raise MeshError(f"has '{name}' in {unit[:20]}: it must be in m")
-        if wanted:
-            down = str(variable.attrs.get("positive", "")).lower() == "down" and str(name).lower() != "depth"
-            order = [str(d) for d in variable.dims]
-            values = np.asarray(variable.values, float)
-            transposed = len(order) == 2 and order[0].lower() in NAMES["x"]
-            flat[str(name)] = (-1.0 if down else 1.0) * (values.T if transposed else values)
+    with netcdf_files.netcdf(data, MeshError) as grid:
+        for name, variable in grid.variables.items():
+            wanted = _in_metres(str(name), str(variable.attrs.get("units", "m")).lower())
+            if wanted and variable.size > max_facets():
+                raise MeshError(f"has {variable.size} numbers '{name}', more than {max_facets()}")
+            if wanted:
+                down = str(variable.attrs.get("positive", "")).lower() == "down" and str(name).lower() != "depth"
+                values = np.asarray(variable.values, float)
+                transposed = values.ndim == 2 and str(variable.dims[0]).lower() in NAMES["x"]
+                flat[str(name)] = (-1.0 if down else 1.0) * (values.T if transposed else values)
     return grid_surface(*_picked(flat))
+
+
+def _in_metres(name: str, unit: str) -> bool:
+    """Whether a variable is one of the grid. Raises MeshError where its unit is not the metre."""
+    wanted = name.lower() in sum(NAMES.values(), ())
+    if "degree" in unit and (wanted or name.lower() in ("lat", "lon", "latitude", "longitude")):
+        raise MeshError(f"has '{name}' in degrees: a grid in metres, east and north, is needed")
+    if wanted and unit not in ("m", "metre", "metres", "meter", "meters", "1", ""):
+        raise MeshError(f"has '{name}' in {unit[:20]}: it must be in m")
+    return wanted
 
 
 def _picked(arrays: dict[str, Any]) -> tuple[Floats, Floats, Floats]:
