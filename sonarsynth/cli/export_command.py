@@ -17,6 +17,9 @@ def export(
     source: Annotated[
         str, typer.Argument(metavar="STORE", help="The store, or for bellhop the recipe.", show_default=False)
     ],
+    folder: Annotated[
+        Path | None, typer.Argument(metavar="[DIR]", help="Where to write: the same as --out.", show_default=False)
+    ] = None,
     to: Annotated[
         str,
         typer.Option(
@@ -55,6 +58,9 @@ def export(
     """
     from sonarsynth.export import FORMATS
 
+    if folder is not None and out is not None:
+        raise BadOption("--out: where to write is given twice")
+    out = out or folder
     if to == BELLHOP:
         if relative_to is not None:
             raise BadOption("--relative-to is for point clouds: Bellhop has no such axes")

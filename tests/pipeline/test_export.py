@@ -70,6 +70,7 @@ def test_files_hold_the_points_with_colours_normals_and_labels(crossing: Path, t
     ("options", "said"),
     [
         (["--relative-to", "whale"], "must be sonar, world or a target (remus), not 'whale'"),
+        (["a.ply", "--out", "b.ply"], "--out: where to write is given twice"),
         (["--to", "las"], "--to must be one of ply, pcd, coco, sonar-netcdf, bellhop, not las"),
         (["--frames", "5:70"], "ends past the last frame, 63"),
         (["--frames", "1:3"], "there is no point to write"),

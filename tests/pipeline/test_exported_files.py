@@ -66,8 +66,9 @@ def store(small_text: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def coco(store: Path) -> Path:
-    assert run(app, ["export", str(store), "--to", "coco"]) == 0
-    return store.with_name("s.zarr.coco")
+    folder = store.with_name("boxes")
+    assert run(app, ["export", str(store), "--to", "coco", str(folder)]) == 0
+    return folder
 
 
 def test_coco_reads_boxes_and_masks(store: Path, coco: Path) -> None:
