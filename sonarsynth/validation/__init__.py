@@ -11,33 +11,16 @@ from typing import Final
 from sonarsynth.validation.bodies.cylinder import cylinder_accuracy
 from sonarsynth.validation.bodies.plate import plate_accuracy
 from sonarsynth.validation.bodies.sphere import sphere_accuracy
-from sonarsynth.validation.bubbles.all_bubbles import bubble_accuracy
+from sonarsynth.validation.bubbles import bubble_accuracy
 from sonarsynth.validation.rays.eigenray_checks import ray_accuracy
 from sonarsynth.validation.validation_rows import Row
 
-
-def _sphere(quick: bool) -> list[Row]:
-    return sphere_accuracy(quick)
-
-
-def _cylinder(quick: bool) -> list[Row]:
-    return cylinder_accuracy(quick)
-
-
-def _plate(quick: bool) -> list[Row]:
-    return plate_accuracy(quick)
-
-
-def _bubble(quick: bool) -> list[Row]:
-    return bubble_accuracy(quick)
-
-
 REFERENCES: Final[dict[str, Callable[[bool], list[Row]]]] = {
     "rays": ray_accuracy,
-    "sphere": _sphere,
-    "cylinder": _cylinder,
-    "plate": _plate,
-    "bubble": _bubble,
+    "sphere": sphere_accuracy,
+    "cylinder": cylinder_accuracy,
+    "plate": plate_accuracy,
+    "bubble": bubble_accuracy,
 }
 """Rows of each reference; the argument is whether to be quick about it."""
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Final
 from sonarsynth.pictures.accuracy_figures.accuracy_figure import Line, Mark, error_and_time_figure
 from sonarsynth.pictures.accuracy_figures.bodies_figure import RefinementCurve, bodies_figure
 from sonarsynth.validation.bodies.level_curves import cylinder_panels, plate_panels, sphere_panels
-from sonarsynth.validation.bubbles.bubbles_solvers import solver_picture
 from sonarsynth.validation.validation_rows import Row
 
 if TYPE_CHECKING:
@@ -31,7 +30,7 @@ def write(rows: Sequence[Row], out: Path, name: str) -> list[Path]:
     out.mkdir(parents=True, exist_ok=True)
     files = [out / f"{name}.json", out / f"{name}.png"]
     files[0].write_text(json.dumps(as_json(rows), indent=2) + "\n")
-    picture = PICTURES[name](rows)
+    picture = PICTURES[name](rows) if name in PICTURES else None
     if picture is None:
         return files[:1]
     picture.savefig(files[1])
@@ -75,16 +74,10 @@ def _plate(rows: Sequence[Row]) -> Figure:
     return bodies_figure("Flat plates: facets, however cut, against closed forms", trades, plate_panels())
 
 
-def _bubble(rows: Sequence[Row]) -> Figure | None:
-    drawn: Figure | None = solver_picture(rows)
-    return drawn
-
-
 PICTURES: Final[dict[str, Callable[[Sequence[Row]], Figure | None]]] = {
     "rays": _rays,
     "sphere": _sphere,
     "cylinder": _cylinder,
     "plate": _plate,
-    "bubble": _bubble,
 }
-"""Picture of the rows of each reference; None where there is nothing to draw."""
+"""Picture of the rows of a reference; None where there is nothing to draw."""

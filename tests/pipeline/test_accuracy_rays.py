@@ -17,7 +17,6 @@ from sonarsynth.validation import REFERENCES, Row, ray_accuracy
 from sonarsynth.validation.rays.ray_matching import Bounds, Rays, errors, matched, miscounted, nearest
 from sonarsynth.validation.references.rays.image_rays import image_rays
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
-from sonarsynth.validation.references.rays.ode import followed_rays
 from sonarsynth.validation.references.rays.one_gradient import Gradient, gradient_rays
 from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
 from sonarsynth.validation.references.rays.slowness_fan import count_rays
@@ -74,19 +73,6 @@ def test_images_digits_and_fan_agree() -> None:
     assert images.families == digits.families
     assert within(images, digits, Bounds(time=1e-14, angle=1e-14, amplitude=1e-14))
     assert miscounted(images, count_rays(depth, speed, start, end, distance, 4, 4)) == 0
-
-
-def test_integrated_rays_and_digits_agree() -> None:
-    depth, speed = np.array([0.0, 30.0, 30.0, 100.0]), np.array([1510.0, 1505.0, 1515.0, 1490.0])
-    start, end, distance = np.array([20.0, 60.0]), np.array([55.0, 10.0]), np.array([400.0, 900.0])
-    first = image_rays(1503.0, 100.0, start, end, distance, 1)
-    p = np.cos(first.start_angle) / np.interp(start[first.pair], depth, speed)
-    digits = exact_rays(Layers(depth, speed), first, p, start, end, distance)
-    digits = digits.select(np.isfinite(digits.travel_time))
-    assert len(digits.pair) >= 3
-    integrated = followed_rays(depth, speed, digits, start, end, distance)
-    assert integrated.families == digits.families
-    assert within(integrated, digits, Bounds(time=1e-13, angle=1e-12, amplitude=1e-7))
 
 
 def test_shooting_in_a_smooth_profile_is_reciprocal() -> None:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import BDF, DOP853, LSODA, RK45, OdeSolution, Radau
+from scipy.integrate import DOP853, OdeSolution
 from scipy.optimize import brentq
 from scipy.special import boxcox
 
@@ -45,9 +45,6 @@ POINT: Final = -40.0
 
 MOST_STEPS: Final = 20_000
 """Steps from turn to turn of the wall after which a bubble is given up (25 are usual)."""
-
-Method = Literal["DOP853", "RK45", "LSODA", "Radau", "BDF"]
-METHODS: Final = {"DOP853": DOP853, "RK45": RK45, "LSODA": LSODA, "Radau": Radau, "BDF": BDF}
 
 
 class Turn(NamedTuple):
@@ -94,12 +91,7 @@ class Motion(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def collapse(
-    cavity: Cavity,
-    rebounds: int = 0,
-    tolerance: float = 1e-10,
-    method: Method = "DOP853",
-) -> Collapse:
+def collapse(cavity: Cavity, rebounds: int = 0, tolerance: float = 1e-10) -> Collapse:
     """The bubble from rest through its first collapse to the top of its rebound, and through so many collapses more.
 
     `tolerance` is the solver's relative one: 1e-10 gives the smallest radius to 1e-9 and times to 1e-11 of the
@@ -114,7 +106,7 @@ def collapse(
 
     with np.errstate(all="ignore"):  # trial steps may overflow: they are refused
         rtol, atol = max(tolerance, 3e-14), 0.1 * tolerance
-        solver = METHODS[method](derivative, 0.0, [0.0, 0.0, 0.0], 1e300, rtol=rtol, atol=atol)
+        solver = DOP853(derivative, 0.0, [0.0, 0.0, 0.0], 1e300, rtol=rtol, atol=atol)
         steps, pieces, turns = _march(solver, 2 * (rebounds + 1), n, 30.0 * tolerance)
         state = OdeSolution(steps, pieces)
         steps[-1] = turns[-1] if len(turns) == 2 * (rebounds + 1) else steps[-1]

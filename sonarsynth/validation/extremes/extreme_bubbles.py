@@ -2,20 +2,54 @@
 
 from __future__ import annotations
 
-import numpy as np
+from math import gamma
 
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import betaincinv, boxcox
+
+from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble import bubble_collapse
+from sonarsynth.equations.bubble.bubble_collapse import Cavity, Collapse
 from sonarsynth.sources.snap_models import KellerMiksis
 from sonarsynth.validation.bubbles.bubble_checks import RADIUS
-from sonarsynth.validation.bubbles.bubbles_conserved import COLLAPSE, EMPTY, UNIT, drift, left, smallest
 from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, refused, together
+
+EMPTY = Cavity(RADIUS, 0.0, 1e5, 0.0, 0.0, 0.0, 1000.0, compressible=False)
+UNIT = RADIUS * np.sqrt(EMPTY.density / EMPTY.ambient_pressure)  # s
+COLLAPSE = float(np.sqrt(np.pi / 6.0) * gamma(5.0 / 6.0) / gamma(4.0 / 3.0))  # 0.914681356501962
+
+
+def radius_before(time: Floats) -> Floats:
+    """R/R0 of an empty cavity so long before its collapse (R0 sqrt(rho/p)): from Rayleigh's speed, R'^2 = 2/3 ((R0/R)^3
+    - 1), the time is COLLAPSE I((R/R0)^3; 5/6, 1/2), with the incomplete beta function I."""
+    return np.asarray(np.cbrt(betaincinv(5.0 / 6.0, 0.5, time / COLLAPSE)))
+
+
+def smallest(cavity: Cavity) -> float:
+    """Smallest R/R0 of a cavity without friction and tension, of energy alone: the work of the drive is in the gas."""
+    drive, g = cavity.ambient_pressure - cavity.vapour_pressure, cavity.exponent - 1.0
+
+    def left_over(q: float) -> float:
+        return float(drive * (1.0 - np.exp(3.0 * q)) - cavity.gas_pressure * boxcox(np.exp(-3.0 * q), g))
+
+    return float(np.exp(brentq(left_over, -25.0, -1e-3, xtol=1e-15, rtol=1e-15)))
+
+
+def drift(bubble: Collapse) -> float:
+    """Largest change of the energy over all of what was solved, relative; times are dense about each collapse."""
+    first, last = bubble.clock[[0, -1]]
+    near = np.geomspace(1e-12, 1e-5, 40)
+    about = np.concatenate([turn.time + np.append(-near, near) for turn in bubble.smallest])
+    time = np.concatenate([np.linspace(first, last, 2000), bubble.clock, about])
+    return float(np.abs(bubble_collapse.energy(time, bubble) / bubble_collapse.energy(first, bubble) - 1.0).max())
 
 
 def _rayleigh() -> CaseResult:
     """To the last billionth of the time: the radius over R0 is that of the incomplete beta function."""
     bubble = bubble_collapse.collapse(EMPTY, 0, 1e-13)
     before = np.geomspace(1e-9, 0.9, 30)
-    exact = left(before)
+    exact = radius_before(before)
     radius = bubble_collapse.wall(-before * UNIT, bubble).radius / RADIUS
     return together(
         off(bubble.collapse_time / UNIT / COLLAPSE - 1.0, 1e-12, what="time of collapse"),

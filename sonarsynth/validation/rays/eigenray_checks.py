@@ -1,15 +1,15 @@
 """The eigenray search against computations that share no code with it: error against run time.
 
-Isovelocity water against image sources; one gradient against its circles; layers against arithmetic of 50 digits and
-against the ray equations integrated by DOP853, with a dense fan that counts the rays of every family; the canonical
-profile of Munk, whose layers have an error of their own, against shooting through the smooth profile.
+Isovelocity water against image sources; one gradient against its circles; layers against arithmetic of 50 digits, with
+a dense fan that counts the rays of every family; the canonical profile of Munk, whose layers have an error of their
+own, against the ray equations of the smooth profile, integrated.
 """
 
 from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,6 @@ from sonarsynth.validation.rays.ray_cases import Case
 from sonarsynth.validation.rays.ray_matching import Rays, errors, matched, miscounted, nearest, rays_of, worst
 from sonarsynth.validation.references.rays.image_rays import image_rays
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
-from sonarsynth.validation.references.rays.ode import followed_rays
 from sonarsynth.validation.references.rays.one_gradient import gradient_rays
 from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
 from sonarsynth.validation.references.rays.slowness_fan import count_rays
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from sonarsynth.equations.rays.ray_solutions import Eigenrays
 
 IMAGES, CIRCLES = "image sources", "circles, 40 digits"
-MANY_DIGITS, INTEGRATED, FAN = "50 digits", "DOP853 through the layers", "a dense fan"
+MANY_DIGITS, FAN = "50 digits", "a dense fan"
 SMOOTH = "DOP853, smooth profile"
 REPEATS = 5
 BATCH = 2e-3  # s: a search is timed on at least so much
@@ -48,7 +47,6 @@ def ray_accuracy(quick: bool = False) -> list[Row]:
         *_isovelocity(quick),
         *_gradients(quick),
         *_layered(quick),
-        *_integrated(quick),
         *_smooth(quick),
     ]
 
@@ -115,37 +113,20 @@ def _thinned(case: Case, rays: Rays) -> np.ndarray:
     return np.unique(np.linspace(0, count - 1, min(count, case.check)).astype(int))
 
 
-def _counted(case: Case, reference: str, refine: Callable[[Case, Eigenrays, Rays, np.ndarray], Rays]) -> Iterator[Row]:
-    """Rows of a reference that makes the rays found exact, and of the fan that counts them."""
-    eigenrays, cost = search(case)
-    rays = rays_of(eigenrays)
-    ends = (case.start, case.end, case.distance)
-    counts = count_rays(case.depth, case.speed, *ends, case.vertices, case.reflections)
-    wrong = miscounted(rays, counts)
-    yield Row(case.name, FAN, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(rays.pair)))
-    keep = _thinned(case, rays)
-    selected, trusted = rays.select(keep), _trusted(eigenrays)[keep]
-    exact = refine(case, eigenrays, selected, keep)
-    differing = sum(a != b for a, b in zip(selected.families, exact.families, strict=True))
-    yield Row(case.name, reference, "family", "wrong", 0.0, float(differing), cost, COST, _counts(case, len(keep)))
-    yield from _rows(case, reference, cost, selected, exact, trusted)
-
-
 def _layered(quick: bool) -> Iterator[Row]:
-    def refine(case: Case, eigenrays: Eigenrays, selected: Rays, keep: np.ndarray) -> Rays:
-        ends = (case.start, case.end, case.distance)
-        return exact_rays(Layers(case.depth, case.speed), selected, eigenrays.slowness[keep], *ends)
-
+    """Rows of the rays found, made exact, and of the fan that counts them."""
     for case in ray_cases.layered(quick):
-        yield from _counted(case, MANY_DIGITS, refine)
-
-
-def _integrated(quick: bool) -> Iterator[Row]:
-    def refine(case: Case, eigenrays: Eigenrays, selected: Rays, keep: np.ndarray) -> Rays:
-        return followed_rays(case.depth, case.speed, selected, case.start, case.end, case.distance)
-
-    for case in ray_cases.shot(quick):
-        yield from _counted(case, INTEGRATED, refine)
+        eigenrays, cost = search(case)
+        rays = rays_of(eigenrays)
+        ends = (case.start, case.end, case.distance)
+        wrong = miscounted(rays, count_rays(case.depth, case.speed, *ends, case.vertices, case.reflections))
+        yield Row(case.name, FAN, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(rays.pair)))
+        keep = _thinned(case, rays)
+        selected, trusted = rays.select(keep), _trusted(eigenrays)[keep]
+        exact = exact_rays(Layers(case.depth, case.speed), selected, eigenrays.slowness[keep], *ends)
+        differing = float(sum(a != b for a, b in zip(selected.families, exact.families, strict=True)))
+        yield Row(case.name, MANY_DIGITS, "family", "wrong", 0.0, differing, cost, COST, _counts(case, len(keep)))
+        yield from _rows(case, MANY_DIGITS, cost, selected, exact, trusted)
 
 
 def _smooth(quick: bool) -> Iterator[Row]:

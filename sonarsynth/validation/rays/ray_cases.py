@@ -128,18 +128,6 @@ def layered(quick: bool) -> Iterator[Case]:
     yield drawn("noisy cast", cast, 10.0, 1e3, many // 2, 3, reflections=2, bounds=LOOSE, check=few // 4)
 
 
-def shot(quick: bool) -> Iterator[Case]:
-    """Layers whose rays are integrated: a thermocline, a duct, jumps, and the canonical profile out to 50 km."""
-    many, few = (4, 3) if quick else (20, 40)
-    yield drawn("thermocline", thermocline(), 5.0, 300.0, many, 3, reflections=3, check=few)
-    yield drawn("duct", DUCT, 50.0, 3e3, many, 6, reflections=1, check=few)
-    yield drawn("jumps", JUMP, 10.0, 3e3, many, 4, reflections=2, check=few)
-    if not quick:
-        layers = munk_layers(1e-4)
-        ends = np.array([310.0, 800.0, 1310.0, 2000.0])
-        yield Case("Munk in layers", *layers, np.full(4, 1000.0), ends, np.full(4, 5e4), 6, 0, check=8)
-
-
 @dataclass(frozen=True, eq=False)
 class Approach:
     """A smooth sound speed and the layers that stand for it, to falling tolerances (s) at each turning point."""
