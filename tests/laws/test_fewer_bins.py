@@ -52,7 +52,7 @@ def test_noise_that_lasts_as_long_as_the_window_keeps_every_bin():
     np.testing.assert_array_equal(few, every)
 
 
-@pytest.mark.parametrize(("bins", "step"), [(344, 3), (345, 4), (100, 6), (35, 2)])
+@pytest.mark.parametrize(("bins", "step"), [(344, 3), (345, 4), (100, 6), (35, 2), (8003, 5)])
 def test_sums_of_cosines_are_those_over_all_bins(bins, step):
     """Spectra of short sound are sums of these, of short ones more; without weights the ends err over twice as much."""
     some, weight = weighted_bins(bins, step)
