@@ -9,8 +9,6 @@ from importlib import import_module
 BENCHMARKS = (
     "frame",
     "build",
-    "rays",
-    "reflections",
     "scheduling",
     "reading",
     "laws",

@@ -9,7 +9,6 @@ of tracing and synthesis. Two scenes are in no recipe: a fast target and a fast 
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 from same_numbers import harbour
 
+from benchmarks.timing import CONFIGS, once
 from sonarsynth.conventions import Floats
 from sonarsynth.frontiers.exact_frame import differences, each_hydrophone, golden, pressures, spread
 from sonarsynth.frontiers.image_knobs import imaged, off_by
@@ -29,7 +29,6 @@ from sonarsynth.receiver.subarrays import Subarray, with_rim
 from sonarsynth.recipe import reading
 from sonarsynth.recipe.scene import Frame
 
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 FAST = {
     "remus, target at 10 m/s": ("remus", "scene.world.targets.0.motion.duration=0.9 s", "scene.trajectory.frames=8"),
     "remus, sonar at 5 m/s": (
@@ -53,12 +52,8 @@ def without(arrivals: Arrivals, part: str) -> Arrivals:
 
 def fastest(work: Callable[[], Any]) -> tuple[Any, float]:
     """What it gives, and the least processor time (s) of a few runs."""
-    seconds = []
-    for _ in range(TIMES):
-        began = time.process_time()
-        found = work()
-        seconds.append(time.process_time() - began)
-    return found, min(seconds)
+    runs = [once(work) for _ in range(TIMES)]
+    return runs[-1][0], min(seconds for _, seconds in runs)
 
 
 def echoes_at(made: Plan, frame: Frame, arrivals: Arrivals, sensor: Any) -> tuple[Floats, Floats]:

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.frame import RECIPE
+from benchmarks.timing import RECIPE, gemm, markdown
 from sonarsynth import pipeline, planning, schedule, store
 from sonarsynth.planning import Plan
 from sonarsynth.recipe import reading
@@ -38,17 +38,6 @@ def different(first: Path, second: Path) -> list[str]:
         for name, array in arrays.items()
         if isinstance(array, zarr.Array) and np.asarray(array[...]).tobytes() != np.asarray(b[name][...]).tobytes()
     ]
-
-
-def gemm() -> float:
-    """Processor time (ms) of a product of two float32 matrices of 1024 by 1024: what this machine does just now."""
-    a = np.random.default_rng(0).random((1024, 1024), np.float32)
-    times = []
-    for _ in range(9):
-        began = time.process_time()
-        a @ a
-        times.append(time.process_time() - began)
-    return 1e3 * float(np.median(times))
 
 
 def one(plan: Plan, index: int) -> tuple[pipeline.Values, dict[str, float]]:
@@ -142,7 +131,7 @@ def bench() -> dict[str, Any]:
 def table(result: dict[str, Any]) -> str:
     """The result in Markdown."""
     stages, few, two = result["stages_ms"], result["stages_ms of image and cloud"], result["2 workers"]
-    rows = [("a frame of `configs/remus.yaml`, written, one core, ms", "all products", "image and cloud"), ("---",) * 3]
+    rows = [("a frame of `configs/remus.yaml`, written, one core, ms", "all products", "image and cloud")]
     rows += [(name, f"{ms:.1f}", f"{few[name]:.1f}" if name in few else "") for name, ms in stages.items()]
     whole = [sum(some.values()) for some in (stages, few)]
     rows.append(("all", *(f"{ms:.1f}" for ms in whole)))
@@ -154,7 +143,7 @@ def table(result: dict[str, Any]) -> str:
         )
     )
     return "\n".join([
-        *("| " + " | ".join(row) + " |" for row in rows),
+        *markdown(rows),
         "",
         f"64 frames by 2 workers: {two['frames_per_second']:.1f} frames/s, and {result['start_up_seconds']:.1f} s to "
         f"start; one frame alone {result['one_frame_seconds']:.1f} s, --help {result['help_seconds']:.2f} s, "

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from benchmarks.timing import RECIPE, cpu, once
 from sonarsynth import pipeline, planning
 from sonarsynth.frontiers.image_knobs import apart
 from sonarsynth.frontiers.peers import acoular_image, likeness, thesis_image, thesis_pulse
@@ -20,20 +19,8 @@ from sonarsynth.products import Arrivals, EnergyImage, Signals
 from sonarsynth.recipe import reading
 from sonarsynth.signals import DirectSum
 
-RECIPE = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
 PATHS = 2000
 THESIS_BEAMS = 150
-
-
-def cpu(function: Callable[[], Any], repeats: int = 7) -> tuple[Any, float]:
-    """Result and median CPU seconds of a call, after one call that compiles and fills caches."""
-    result = function()
-    seconds = []
-    for _ in range(repeats):
-        began = time.process_time()
-        result = function()
-        seconds.append(time.process_time() - began)
-    return result, float(np.median(seconds))
 
 
 def thin(arrivals: Arrivals, paths: int) -> Arrivals:
@@ -120,9 +107,7 @@ def synthesis_of_new_frames(plan: planning.Plan, warm: int = 8) -> float:
     for index in range(0, plan.recipe.frames, 2):
         full = pipeline.trace_frame(plan, index)
         traced = replace(full, arrivals=thin(full.arrivals, PATHS))
-        began = time.process_time()
-        pipeline.synthesise(plan, traced)
-        seconds.append(time.process_time() - began)
+        seconds.append(once(partial(pipeline.synthesise, plan, traced))[1])
     return float(np.median(seconds[warm:]))
 
 
@@ -133,9 +118,8 @@ def synthesis_error(plan: planning.Plan, traced: pipeline.TracedFrame) -> dict[s
     arguments = (some, traced.frame.moment.snaps, plan.elements, plan.scene.sonar, plan.absorption)
     window = (float(plan.windows.start[traced.frame.index]), plan.windows.samples)
     fast = plan.scene.physics.synthesis.signals(*arguments, *window).pressure
-    began = time.process_time()
-    exact = DirectSum().signals(*arguments, *window).pressure
-    seconds = time.process_time() - began
+    summed, seconds = once(lambda: DirectSum().signals(*arguments, *window))
+    exact = summed.pressure
     heard = traced.arrivals.delay[traced.arrivals.direct].min() - window[0]
     echo = slice(int((heard + plan.windows.echo_start) * plan.scene.sonar.sampling_frequency), None)
     return {

@@ -11,18 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.build import gemm, one
-from benchmarks.frame import RECIPE
+from benchmarks.build import one
+from benchmarks.timing import RECIPE, gemm, markdown
 from sonarsynth import planning
 from sonarsynth.planning import choosing
 from sonarsynth.recipe import reading
 
 FRAMES = range(30, 35)
 TARGET, SONAR = "scene.world.targets.0.shape", "scene.sonar"
+TRACING = "scene.physics.tracing={{kind: auto, bounces: {0}}}"
 LATTICE = "{{kind: planar_lattice, columns: {0}, rows: {0}, pitch: 5 cm}}"
 GROWTHS = {
     "facets": [(f"{TARGET}.edge={edge} mm",) for edge in (28, 18, 9)],
     "beams": [(f"{SONAR}.beams.azimuths={n}", f"{SONAR}.beams.elevations={n}") for n in (51, 101, 201)],
+    "families of paths a way": [(TRACING.format(bounces),) for bounces in (0, 1, 2)],
     "hydrophones": [(f"{SONAR}.array={LATTICE.format(n)}",) for n in (13, 26, 46, 64)],
 }
 """What grows, and the settings of each size."""
@@ -44,6 +46,7 @@ def measured(sets: tuple[str, ...]) -> dict[str, Any]:
         "facets": sum(len(mesh.faces) for mesh in plan.scene.meshes),
         "beams": beams.azimuths * beams.elevations,
         "hydrophones": plan.elements.count,
+        "families of paths a way": 1 + 2 * getattr(plan.scene.physics.tracing, "bounces", 0),
     }
     return {"sizes": sizes, "plan_seconds": planned, "stages_ms": stages, "frame_ms": sum(stages.values())}
 
@@ -67,12 +70,14 @@ def bench() -> dict[str, Any]:
 
 def table(result: dict[str, Any]) -> str:
     """The result in Markdown."""
-    lines = ["| | size | plan, s | frame, ms | its longest stage, ms |", "|---|---|---|---|---|"]
+    rows = [["", "size", "plan, s", "frame, ms", "its longest stage, ms"]]
     for what in GROWTHS:
         for row in result[what]["rows"]:
             stage, longest = max(row["stages_ms"].items(), key=lambda item: item[1])
-            sizes = f"{row['sizes'][what]} | {row['plan_seconds']:.1f} | {row['frame_ms']:.0f}"
-            lines.append(f"| {what} | {sizes} | {stage} {longest:.0f} |")
+            size, planned = f"{row['sizes'][what]}", f"{row['plan_seconds']:.1f}"
+            rows.append([what, size, planned, f"{row['frame_ms']:.0f}", f"{stage} {longest:.0f}"])
         plan, frame = result[what]["exponents"].values()
-        lines.append(f"| exponent | | {plan:.2f} | {frame:.2f} | |")
-    return "\n".join([*lines, "", f"A product of float32 matrices of 1024 by 1024: {result['gemm_ms']:.1f} ms"])
+        rows.append(["exponent", "", f"{plan:.2f}", f"{frame:.2f}", ""])
+    return "\n".join([
+        *markdown(rows), "", f"A product of float32 matrices of 1024 by 1024: {result['gemm_ms']:.1f} ms",
+    ])  # fmt: skip

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 import sonarsynth as ss
-from benchmarks.frame import RECIPE, cpu, relative
+from benchmarks.frame import relative
+from benchmarks.timing import RECIPE, cpu
 from sonarsynth import pipeline, planning
 from sonarsynth.pipeline import TracedFrame
 from sonarsynth.planning import Plan

@@ -20,10 +20,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.timing import RECIPE
+
 FACETS = (100_000, 1_000_000, 10_000_000)
 COUNTS = (10, 20, 50, 100, 200, 500, 1000)
 """Frames after which the memory of a worker is read."""
-RECIPE = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
 MB = 1e6
 
 

@@ -23,7 +23,7 @@ import numpy as np
 import xarray as xr
 import zarr
 
-from benchmarks.frame import RECIPE
+from benchmarks.timing import RECIPE, markdown
 from sonarsynth import planning, schedule
 from sonarsynth.loading import Frames
 from sonarsynth.recipe import reading
@@ -183,11 +183,12 @@ def bench(path: Path | None = None) -> dict[str, Any]:
 
 def table(result: dict[str, Any]) -> str:
     """The result in Markdown."""
-    lines = ["| frames/s (ms of processor a frame) | " + " | ".join(WAYS) + " |", "| --- |" + " --- |" * len(WAYS)]
+    rows = [["frames/s (ms of processor a frame)", *WAYS]]
     for what, by_how in result["read"].items():
         for how, by_way in by_how.items():
             cells = [f"{r['frames_per_second']:.0f} ({r['cpu_ms_a_frame']:.2f})" for r in by_way.values()]
-            lines.append(f"| {what}, {how} | " + " | ".join(cells) + " |")
+            rows.append([f"{what}, {how}", *cells])
+    lines = markdown(rows)
     opened = ", ".join(f"{way} {1e3 * seconds:.0f} ms" for way, seconds in result["opening_seconds"].items())
     lines += ["", f"opening the store: {opened}; load {result['load']:.1f}"]
     opened = ", ".join(f"{split} {seconds:.2f} s" for split, seconds in result["opening_1e5_seconds"].items())

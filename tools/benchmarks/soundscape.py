@@ -2,21 +2,21 @@
 grows with snaps, hydrophones and samples. One core; median CPU time of new frames; a table.
 
 Times are of this machine; `machine` is how much slower it is now than that of the costs in `planning.costs`, and
-`gemm` the float32 products a second of a matrix of 1024. Errors: of the chorus the largest error over the peak against
+`gemm` the time of a product of float32 matrices of 1024. Errors: of the chorus the largest error over the peak against
 a sum in float64, of correlated noise that of its coherence. Exponents are slopes of log time over log size, least
 squares.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from benchmarks.frame import RECIPE
+from benchmarks.timing import RECIPE, gemm, once
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.bubble import pulses
 from sonarsynth.equations.noise.filters import response
@@ -45,7 +45,7 @@ NOISES = {
 
 def bench() -> dict[str, Any]:
     """Measure each part."""
-    found: dict[str, Any] = {"machine": machine_factor(), "gemm_gflops": _gemm()}
+    found: dict[str, Any] = {"machine": machine_factor(), "gemm_ms": gemm()}
     found["noise"] = {name: _noise(_planned(f"scene.world.environment.noise={text}")) for name, text in NOISES.items()}
     default = _planned("scene.world.chorus={}")
     found["chorus, default"] = _chorus(default) | {"snaps_per_second": _often(default)}
@@ -67,7 +67,9 @@ def bench() -> dict[str, Any]:
 
 def table(found: dict[str, Any]) -> str:
     """Rows of part, ms and error."""
-    lines = [f"this machine: {found['machine']:.2f} times the reference, {found['gemm_gflops']:.0f} Gflop/s"]
+    lines = [
+        f"this machine: {found['machine']:.2f} times the reference, {found['gemm_ms']:.1f} ms for a product of matrices"
+    ]
     rows = {f"noise {name}": row for name, row in found["noise"].items()}
     rows |= {name: found[name] for name in ("chorus, default", "distant chorus")}
     rows |= {f"chorus, {name}": row for name, row in found["chorus"].items()}
@@ -110,13 +112,7 @@ def _often(made: Plan) -> float:
 
 def _timed(frames: Sequence[int], one: Callable[[int], object]) -> float:
     """Median CPU ms of calls after the first, which compiles and fills tables."""
-    one(frames[0])
-    spent = []
-    for frame in frames[1:]:
-        began = time.process_time()
-        one(frame)
-        spent.append(1e3 * (time.process_time() - began))
-    return float(np.median(spent))
+    return 1e3 * float(np.median([once(partial(one, frame))[1] for frame in frames][1:]))
 
 
 def _silence(made: Plan, times: int = 1) -> Signals:
@@ -199,14 +195,3 @@ def _error(made: Plan, most: int = 60) -> float:
     true = np.fft.irfft(exact, length, axis=1)[:, :samples] * rate
     middle = slice(200, samples - 200)
     return float(np.abs(got[which][:, middle] - true[:, middle]).max() / np.abs(true[:, middle]).max())
-
-
-def _gemm(size: int = 1024) -> float:
-    """Products and sums of float32 matrices, 1e9 a second of CPU time."""
-    a = np.ones((size, size), np.float32)
-    best = np.inf
-    for _ in range(5):
-        began = time.process_time()
-        a @ a
-        best = min(best, time.process_time() - began)
-    return 2.0 * size**3 / best / 1e9

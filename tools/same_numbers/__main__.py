@@ -15,7 +15,6 @@ import numpy as np
 import zarr
 
 from . import harbour
-from .as_format_3 import as_format_3
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -80,10 +79,8 @@ def _build(tree: Path, name: str, place: Path, frames: int) -> Path:
 def _compare(name: str, frames: int, old: Path, new: Path, renamed: Mapping[str, str]) -> bool:
     """Print what differs between the first frames of two stores, and what a frame costs in both. True where nothing
     does."""
-    stored, after = _arrays(old, frames), _arrays(new, frames)
-    if _format(old) == "2" and _format(new) == "3":
-        stored = as_format_3(stored, after["cloud/range"].shape[1] if "cloud/range" in after else 0)
-    before = {_renamed(path, renamed): array for path, array in stored.items()}
+    after = _arrays(new, frames)
+    before = {_renamed(path, renamed): array for path, array in _arrays(old, frames).items()}
     both = sorted(before.keys() & after.keys())
     different = {path: text for path in both if (text := _differs(before[path], after[path]))}
     print(
@@ -116,10 +113,6 @@ def _arrays(store: Path, frames: int) -> dict[str, np.ndarray]:
 def _of_frames(array: zarr.Array) -> bool:
     names = getattr(array.metadata, "dimension_names", None)
     return bool(names) and names[0] == "frame"
-
-
-def _format(store: Path) -> str:
-    return str(zarr.open_group(store, mode="r").attrs.get("sonarsynth_format"))
 
 
 def _differs(old: np.ndarray, new: np.ndarray) -> str:
