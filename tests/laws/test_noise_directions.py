@@ -142,6 +142,17 @@ def test_what_is_drawn_has_the_covariance_of_a_plain_sum(array: Elements, direct
     assert np.abs(measured - exact).max() < exact[0].real * (4.0 / np.sqrt(snapshots) + 5e-3)
 
 
+def test_what_is_drawn_is_gaussian_at_a_hydrophone_and_in_a_beam() -> None:
+    """Of a complex normal number <|x|^4> = 2 <|x|^2>^2, real and imaginary part alike and independent."""
+    f = np.linspace(60e3, 80e3, 20_000)
+    x = draw(IsotropicDirections(), FINE, TILTED, Sonar(), f, C, stream(2, "gaussian"))
+    for one in (x[0], x.mean(axis=0)):
+        power = np.mean(np.abs(one) ** 2)
+        assert np.mean(np.abs(one) ** 4) / power**2 == pytest.approx(2.0, abs=4.0 * np.sqrt(20.0 / f.size))
+        assert abs(np.mean(one**2)) < 4.0 * power / np.sqrt(f.size)
+        assert np.abs(one).max() ** 2 / power == pytest.approx(np.log(f.size), abs=5.0)  # of as many, the largest
+
+
 def test_noise_of_one_direction_gives_the_beam_pattern_of_the_array() -> None:
     array, pose = elements(PlanarLattice(columns=6, rows=4, pitch=0.02)), Pose(np.zeros(3), quaternion(0.5 * np.pi))
     wave = OneDirection(bearing=np.deg2rad(80.0), elevation=np.deg2rad(12.0))

@@ -12,7 +12,7 @@ from sonarsynth.receiver import BandPass, Elements, Sonar, stop_frequency
 from sonarsynth.signals.noise import lattice_noise, random_waves
 from sonarsynth.signals.noise.lattice_noise import TORUS, PeriodicField, lattice_of, periodic_field
 
-WAVE_SECONDS = 40e-9
+WAVE_SECONDS = 12e-9
 """Of one core to draw one wave of the periodic field in one bin."""
 LOWEST = 0.02
 """Of the highest frequency: below, the lattice is one point."""

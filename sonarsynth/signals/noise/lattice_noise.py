@@ -7,9 +7,9 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.fft import fft2, ifft, ifft2, next_fast_len
+from scipy.fft import fft2, ifft2, next_fast_len
 
-from sonarsynth.conventions import Bools, Floats
+from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.environment.noise.directions import NoiseDirections
 from sonarsynth.equations.noise.lattice_coherence import lag_covariance, periodic_powers
 from sonarsynth.equations.noise.wave_directions import quadrature
@@ -24,8 +24,10 @@ STEP = 0.75
 """rad: how much the phase over the lattice may change from one frequency that is worked out to the next."""
 POWERS = 1 << 28
 """Largest number of powers that are kept."""
-BLOCK = 1 << 20
+BLOCK = 1 << 16
 """Waves that are drawn at once."""
+HALF, UNIT, TURN = np.float32(0.5), np.float32(2.0**-32), np.float32(2.0 * np.pi)
+Complexes64 = npt.NDArray[np.complex64]
 
 
 @dataclass(frozen=True)
@@ -137,9 +139,7 @@ def _turn(up: Floats) -> Floats:
     return np.stack([across, np.cross(up, across), up])
 
 
-def draw(
-    field: PeriodicField, elements: Elements, frequency: Floats, random: np.random.Generator
-) -> npt.NDArray[np.complex64]:
+def draw(field: PeriodicField, elements: Elements, frequency: Floats, random: np.random.Generator) -> Complexes64:
     """Spectra (sensor, bin) at frequencies (bin,) Hz: of noise of 1 Pa2/Hz at a point, the power of the real part and
     that of the imaginary part are the sensor's own share, 1 at most."""
     knots, powers = field.frequency, field.powers
@@ -148,14 +148,35 @@ def draw(
     fraction = (position - low).astype(np.float32)[:, None, None]
     out = np.empty((elements.count, frequency.size), np.complex64)
     y, z = elements.columns - 1 - elements.column, elements.rows - 1 - elements.row  # y and z rise with them
-    scale = np.float32(np.sqrt(powers[0].size))  # of ifft
+    along_y, along_z = (_fourier(n, size) for n, size in zip(powers.shape[1:], (y, z), strict=True))
     many = max(1, BLOCK // powers[0].size)
     for first in range(0, frequency.size, many):
         bins = slice(first, first + many)
-        wave = random.standard_normal((fraction[bins].shape[0], *powers.shape[1:], 2), np.float32).view(np.complex64)[
-            ..., 0
-        ]
-        wave *= np.sqrt((1.0 - fraction[bins]) * powers[low[bins]] + fraction[bins] * powers[low[bins] + 1]) * scale
-        near = ifft(wave, axis=1)[:, : elements.columns]
-        out[:, bins] = ifft(near, axis=2)[:, y, z].T
+        below = powers[low[bins]]
+        power = below + fraction[bins] * (powers[low[bins] + 1] - below)
+        near = along_y @ (_normal_waves(power, random).reshape(-1, power.shape[2]) @ along_z.T).reshape(
+            power.shape[:2] + along_z.shape[:1]
+        )
+        out[:, bins] = near[:, y, z].T
     return out
+
+
+def _fourier(waves: int, places: Ints) -> Complexes64:
+    """Matrix (place, wave) of the sum of waves, of unit columns over all places that an FFT would make."""
+    turns = np.outer(np.arange(places.max() + 1), np.arange(waves)) % waves
+    return np.exp(2j * np.pi / waves * turns).astype(np.complex64) / np.float32(np.sqrt(waves))
+
+
+def _normal_waves(power: npt.NDArray[np.float32], random: np.random.Generator) -> Complexes64:
+    """Complex normal numbers (...) whose real and imaginary part have these powers (...) each.
+
+    On whole arrays: in a third of the generator's time. Source: Box and Muller (1958), Ann. Math. Statist. 29, 610.
+    """
+    even = random.integers(0, 1 << 64, power.shape, np.uint64)
+    radius, turn = (half.astype(np.uint32).astype(np.float32) for half in (even >> np.uint64(32), even))
+    size = np.sqrt(np.float32(-2.0) * power * np.log((radius + HALF) * UNIT))
+    turn *= TURN * UNIT
+    wave = np.empty(power.shape, np.complex64)
+    np.multiply(size, np.cos(turn), out=wave.real)
+    np.multiply(size, np.sin(turn), out=wave.imag)
+    return wave
