@@ -10,13 +10,14 @@ from sonarsynth.equations.reverberation.speckle import SINC, scatterers_per_puls
 from sonarsynth.planning.measured.reverberation_levels import reverberation_levels
 from sonarsynth.planning.noise_rows import NoiseRow
 from sonarsynth.planning.plan_tables import Omission
+from sonarsynth.signals.pulse_sums.reverberation_synthesis import path_error
 
 if TYPE_CHECKING:
     from sonarsynth.planning.plans import Plan
 
 REVERBERATION = "reverberation"
 """The stage."""
-PATH_SECONDS, SAMPLE_SECONDS, CELL_SECONDS = 25e-9, 12e-9, 8e-3
+PATH_SECONDS, SAMPLE_SECONDS, CELL_SECONDS = 6e-9, 7e-9, 8e-3
 """Of one core: a scatterer at a sensor, a sample of a sensor, the cells of a frame."""
 
 
@@ -30,7 +31,11 @@ def reverberation_rows(plan: Plan) -> list[NoiseRow]:
     why = f"{families or 'nothing'} re 1 uPa in the echo window; noise of a beam {levels.noise:.0f} dB"
     error = plan.recipe.accuracy.speckle
     per_pulse = scatterers_per_pulse(error, shape=SINC)
-    bound = f"{error:.2g} of the contrast at a hydrophone: {per_pulse:.2g} scatterers in 1/bandwidth; 3 % of each path"
+    of_path = 100.0 * path_error(plan.elements, plan.scene.sonar, float(plan.profile.speed.min()))
+    bound = (
+        f"{error:.2g} of the contrast at a hydrophone: {per_pulse:.2g} scatterers in 1/bandwidth; "
+        f"{of_path:.2g} % of each path"
+    )
     sizes = plan.sizes
     seconds = levels.scatterers * sizes["sensor"] * PATH_SECONDS + CELL_SECONDS
     seconds += sizes["sensor"] * sizes["sample"] * SAMPLE_SECONDS

@@ -59,7 +59,6 @@ def add_arrivals(
     rate: float,
     absorption: Floats,
     origin: float,
-    turn: float = TURN,
 ) -> None:
     """Add the pulses of arrivals, `louder` (path,) times as loud as their gains say, to flat (sensor in the order of
     blocks, `length` and one more), from `origin` (s) on at `rate` (Hz); absorption: dB/m at the frequencies of modes.
@@ -68,12 +67,11 @@ def add_arrivals(
 
     speed = arrivals.sound_speed
     order, levels = sensor_blocks(elements)
-    before = np.broadcast_to(arrivals.before, arrivals.delay.shape)
     source = arrivals.direction * arrivals.length[:, None]
     turns = np.pi * modes.frequency[0] * elements.face / speed
     level = np.zeros(len(arrivals.delay), int)
     for number, (_, _, radius) in enumerate(levels[:-1]):
-        level[turns * radius > turn * arrivals.length] = number + 1
+        level[turns * radius > TURN * arrivals.length] = number + 1
     position = elements.position[order].T.ravel()
     for number, (bounds, middle, _) in enumerate(levels):
         rows = np.flatnonzero(level == number)
@@ -84,8 +82,7 @@ def add_arrivals(
         towards = source[row] - middle[block]
         away = np.maximum(np.linalg.norm(towards, axis=1), CAVITY)
         shape = shape_of(
-            modes.frequency, towards / away[:, None], away + before[row], arrivals.delay_std[row], absorption,
-            elements.face, speed,
+            modes.frequency, towards / away[:, None], away, arrivals.delay_std[row], absorption, elements.face, speed,
         )  # fmt: skip
         weight = (louder * arrivals.gain)[row, None] * (shape @ modes.shapes.T)
         phase = arrivals.phase[row, None]

@@ -26,9 +26,9 @@ def gentle(chosen: Filter, rate: float) -> Fir:
     return Fir(max(low - 0.5 * width, 0.0), stop + 0.5 * width, width, GENTLE)
 
 
-def node_frequencies(sonar: Sonar, nodes: int = NODES) -> Floats:
+def node_frequencies(sonar: Sonar) -> Floats:
     """Frequencies (node,) in Hz that modes are made at: Chebyshev nodes over all that the gentle filter passes."""
     passing = gentle(sonar.antialias, sonar.sampling_frequency * grid_factor(sonar))
     low = max(passing.low - 0.5 * passing.transition, 0.0)
     high = passing.high + 0.5 * passing.transition
-    return 0.5 * (low + high) + 0.5 * (high - low) * chebyshev(nodes)
+    return 0.5 * (low + high) + 0.5 * (high - low) * chebyshev(NODES)

@@ -80,27 +80,24 @@ def shapes_of(nodes: Floats, band: float, face: float, speed: float, absorption:
     return shapes, np.abs(sampled @ shapes.T).max(axis=0)
 
 
-def tabulated(
-    bare: ComplexArray, samples: int, fine: float, nodes: Floats, basis: tuple[Floats, Floats], turned: bool = True
-) -> PulseModes:
+def tabulated(bare: ComplexArray, samples: int, fine: float, nodes: Floats, basis: tuple[Floats, Floats]) -> PulseModes:
     """The modes of a pulse of this spectrum (bin,), up to where that ends, on `samples` of a grid of `fine` (Hz).
 
-    basis: of `shapes_of`, at frequencies `nodes` (Hz); not turned: without Hilbert transforms.
+    basis: of `shapes_of`, at frequencies `nodes` (Hz).
     """
-    (shapes, weight), ways = basis, 1 + turned
+    shapes, weight = basis
     frequency = np.asarray(np.arange(len(bare)) * (fine / samples), float)
-    spectrum = np.zeros((1 + ways * len(shapes), samples // 2 + 1), complex)
+    spectrum = np.zeros((1 + 2 * len(shapes), samples // 2 + 1), complex)
     spectrum[0, : len(bare)] = bare
     spectrum[1 : 1 + len(shapes), : len(bare)] = bare * at_frequencies(frequency, nodes, shapes)
-    if turned:
-        spectrum[1 + len(shapes) :] = 1j * spectrum[1 : 1 + len(shapes)]
+    spectrum[1 + len(shapes) :] = 1j * spectrum[1 : 1 + len(shapes)]
     wave = np.roll(irfft(spectrum, samples, axis=1) * fine, samples // 2, axis=1)
     cut = TOLERANCE * np.abs(wave[0]).max()
-    loud = np.flatnonzero((np.abs(wave[1:]) * np.tile(weight, ways)[:, None] > cut).any(axis=0)) - samples // 2
+    loud = np.flatnonzero((np.abs(wave[1:]) * np.tile(weight, 2)[:, None] > cut).any(axis=0)) - samples // 2
     before = int(np.ceil(-loud[0] / FRACTIONS)) + 1
     taps = 8 * int(np.ceil((before + loud[-1] / FRACTIONS + 2) / 8))
     at = samples // 2 + FRACTIONS * (np.arange(taps) - before) + np.arange(FRACTIONS + 1)[:, None]
-    table = wave[1:, at].reshape(ways, len(shapes), -1)
+    table = wave[1:, at].reshape(2, len(shapes), -1)
     if len(shapes) % 2:  # the compiled loop takes two at a time
         table, shapes = np.pad(table, ((0, 0), (0, 1), (0, 0))), np.pad(shapes, ((0, 1), (0, 0)))
     return PulseModes(table.reshape(-1, table.shape[2]).astype(np.float32), before, shapes, nodes)
