@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import ASSUMED_SPEED, Floats, direction
-from sonarsynth.equations.arrays.beams import beam_spectra
-from sonarsynth.equations.arrays.gates import gated_spectra
+from sonarsynth.equations.arrays.apertures import focus_delay, live_gain
+from sonarsynth.equations.arrays.gates import gate_taper
 from sonarsynth.evaluation import beam_width
 from sonarsynth.pictures.figures.sheet import Beam
 from sonarsynth.pictures.store_reading import StoredFrame, beam_grid, needed, read
@@ -137,16 +137,19 @@ def steer(
     rate = float(needed(tree, "signals/sampling_frequency"))
     band = (float(tree.attrs["band_low"]), float(tree.attrs["band_high"]))
     first, count = _echo_window(tree, frame, pressure.shape[1], rate, start)
-    frequency, spectra = gated_spectra(pressure, rate, first, count, band)
-    gain, position = needed(tree, "signals/gain"), needed(tree, "signals/position")
+    weight, position = live_gain(needed(tree, "signals/gain")), needed(tree, "signals/position")
+    live = weight > 0.0
+    frequency = np.fft.rfftfreq(count, 1.0 / rate)
+    inside = (frequency >= band[0]) & (frequency <= band[1])
+    gate = pressure[live, first : first + count] * gate_taper(count, rate)
+    spectra = np.fft.rfft(gate, axis=1)[:, inside] * weight[live, None]
     focus = float(np.median(frame.true_range[frame.target >= 0]))
-    speed = assumed_speed(tree, frame.index)
-    steered = beam_spectra(spectra, frequency, position, gain, along, speed, focus)
-    samples = round(rate / float(frequency[1] - frequency[0]))
-    every = np.zeros((len(along), samples // 2 + 1), complex)
-    lowest = round(float(frequency[0]) * samples / rate)
-    every[:, lowest : lowest + len(frequency)] = steered
-    return start + (first + np.arange(count)) / rate, np.fft.irfft(every, samples, axis=1)[:, :count]
+    steered = np.zeros((len(along), len(frequency)), complex)
+    for beam, delay in zip(
+        steered, focus_delay(position[live], along, focus, assumed_speed(tree, frame.index)), strict=True
+    ):
+        beam[inside] = np.sum(spectra * np.exp(2j * np.pi * delay[:, None] * frequency[inside]), axis=0)
+    return start + (first + np.arange(count)) / rate, np.fft.irfft(steered, count, axis=1)
 
 
 def _echo_window(tree: xr.DataTree, frame: StoredFrame, samples: int, rate: float, start: float) -> tuple[int, int]:

@@ -7,7 +7,7 @@ import pytest
 
 from sonarsynth.equations.bubble.pulses import filtered
 from sonarsynth.equations.noise.filters import Fir
-from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View, Window
+from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View
 from sonarsynth.pictures.figures.outlines import CELLS, union_outline, view_outline
 from sonarsynth.pictures.figures.snap_comparison import compare_snaps
 from sonarsynth.pictures.figures.snap_figure import bandwidth, half_width, snap_figure
@@ -84,8 +84,9 @@ def test_a_bright_beam_to_port_and_up_is_drawn_to_the_left_and_up() -> None:
     azimuth, elevation = np.linspace(-25.0, 25.0, 21), np.linspace(-20.0, 20.0, 17)
     level = np.full((17, 21), -np.inf)
     level[15, 19] = 0.0  # elevation 17.5, azimuth 22.5
-    picture = FramePicture(azimuth, elevation, Window(half=np.ones(3)), "dB")
-    picture.show(View(title="", level=level, points=np.zeros((0, 3)), point_level=np.zeros(0), hulls=()))
+    view = View(title="", level=level, points=np.zeros((0, 3)), point_level=np.zeros(0), hulls=())
+    picture = FramePicture(azimuth, elevation, [view], "dB")
+    picture.show(view)
     shot = picture.pixels()[..., :3].astype(int)
     axes = picture.figure.axes[0]
     height = shot.shape[0]
@@ -102,7 +103,7 @@ def test_the_cloud_from_above_has_port_on_the_left_and_counts_what_it_does_not_s
     points = np.array([[10.0, 0.5, 0.0], [10.0, -0.5, 0.0], [50.0, 0.0, 0.0]])
     hull = Hull("ball", *sphere([10.0, 0.0, 0.0]))
     view = View(title="", level=None, points=points, point_level=np.zeros(3), hulls=(hull,))
-    picture = FramePicture(np.linspace(-5, 5, 5), np.linspace(-5, 5, 5), Window(half=np.ones(3)), "dB")
+    picture = FramePicture(np.linspace(-5, 5, 5), np.linspace(-5, 5, 5), [view], "dB")
     picture.show(view)
     plan = next(axes for axes in picture.figure.axes if "above" in axes.get_title(loc="left"))
     assert plan.xaxis_inverted()

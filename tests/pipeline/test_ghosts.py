@@ -15,7 +15,7 @@ from sonarsynth import schedule
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.grating_lobes import grating_lobes, lattice_pitch
 from sonarsynth.pictures import show
-from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View, Window
+from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View
 from sonarsynth.pictures.figures.ghost_rings import Ghost, place
 from sonarsynth.pictures.store_reading import FAINTEST, ghosts, opened, stored
 from sonarsynth.planning import plan
@@ -101,7 +101,7 @@ def test_labels_point_away_from_the_middle_where_there_is_room() -> None:
 
 @pytest.fixture(scope="module")
 def picture() -> FramePicture:
-    return FramePicture(AZIMUTH, ELEVATION, Window(half=np.ones(3)), "dB")
+    return FramePicture(AZIMUTH, ELEVATION, [view()], "dB")
 
 
 def view(*seen: Ghost) -> View:

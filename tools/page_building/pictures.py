@@ -16,7 +16,7 @@ import sonarsynth as ss
 from sonarsynth.frontiers.frontier_report import write
 from sonarsynth.pictures import _reference, _view
 from sonarsynth.pictures.compare import show_beside
-from sonarsynth.pictures.figures.frame_figure import FramePicture, window
+from sonarsynth.pictures.figures.frame_figure import FramePicture
 from sonarsynth.pictures.store_reading import beam_grid, opened, stored
 from tools.page_building.label_pictures import labels
 from tools.same_numbers import harbour
@@ -77,7 +77,7 @@ def ghosts(folder: Path, out: Path) -> None:
     tree = opened(path)
     one = stored(tree, GHOSTS)
     view = _view(tree, one, _reference([one]))
-    picture = FramePicture(*beam_grid(tree), window([view]), "energy re the brightest beam (dB)")
+    picture = FramePicture(*beam_grid(tree), [view], "energy re the brightest beam (dB)")
     picture.show(view)
     picture.figure.savefig(out / "ghosts.png", dpi=100, metadata={"Software": None})
 

@@ -19,7 +19,6 @@ from sonarsynth.evaluation.detectors.matching import match, nearness, overlap
 from sonarsynth.evaluation.detectors.measurement_errors import measurement_errors
 from sonarsynth.evaluation.detectors.precision_and_recall import average_precision, threshold_at
 from sonarsynth.evaluation.detectors.true_objects import TrueObjects, as_detections, category_names, true_objects
-from sonarsynth.labels.odds import binomial_band
 from sonarsynth.store import chosen_frames, open_store
 
 if TYPE_CHECKING:
@@ -85,6 +84,8 @@ class DetectorReport:
 
     def detected(self, wanted: np.ndarray, false_alarms: float) -> dict[str, float]:
         """Share of the wanted objects (row,) that are found at so many false alarms a frame, with a band of 95 %."""
+        from sonarsynth.labels.odds import binomial_band  # with labels come the kernels of all that can be seen
+
         matched = self.by_distance[NEAR]
         least = threshold_at(self.detections.score, matched >= 0, false_alarms * self.frames)
         hit_objects = matched[(matched >= 0) & (self.detections.score >= least)]

@@ -98,17 +98,17 @@ def window(views: list[View], margin: float = 0.35) -> Window:
 class FramePicture:
     """A figure laid out once, in which `show` draws one frame after another."""
 
-    def __init__(self, azimuth: Floats, elevation: Floats, space: Window, unit: str) -> None:
-        """Lay out for a beam grid (deg, ascending); `unit` says what levels are relative to."""
+    def __init__(self, azimuth: Floats, elevation: Floats, views: list[View], unit: str) -> None:
+        """Lay out for a beam grid (deg, ascending) and all that will be shown; `unit`: what levels are relative to."""
         self.figure: Figure = figure(11.0, 5.6, "none", dpi=100)
-        self.window = space
+        self.window = window(views)
         self._title: Text = self.figure.suptitle(" ", x=0.01, y=0.99, ha="left", fontsize=11, color=INK)
         self._moment: Text = self.figure.text(0.0, 0.0, "", fontsize=11, color=INK, va="top")
         sky = placed(self.figure, 0.77, 0.45, 4.6, 4.6)
         self._image: AxesImage = image_axes(sky, azimuth, elevation)
         self._outlines: PolyCollection = outline_artist(sky)
         self._ghosts = GhostMarks(sky)
-        legend(sky)
+        legend(sky, *(any(getattr(view, of) for view in views) for of in ("hulls", "ghosts", "lobes")))
         colour_bar(sky, self._image, unit)
         self._clouds = [
             CloudPanel(placed(self.figure, 7.17, 3.1, 3.13, 1.95), PLAN, "from above"),

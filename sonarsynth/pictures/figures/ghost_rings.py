@@ -56,12 +56,14 @@ class GhostMarks:
         lobes, outlines: lines (point, azimuth and elevation) in deg. The axes must have their final place: labels are
         laid out on it. A ghost outside is an arrow at the edge.
         """
+        from matplotlib.collections import LineCollection
+
         for artist in self.drawn:
             artist.remove()
         axes = self._axes
         self.drawn = []
-        for line in lobes:
-            self.drawn += axes.plot(*line.T, **LOBE)
+        if lobes:
+            self.drawn.append(axes.add_collection(LineCollection(lobes, **LOBE), autolim=False))
         point = axes.figure.dpi / 72.0  # in pixels
         frame = np.asarray(axes.get_window_extent().extents)
         inside = frame + GAP * point * np.array([1.0, 1.0, -1.0, -1.0])
@@ -106,8 +108,8 @@ class GhostMarks:
         return ring, text
 
 
-def legend(axes: Axes, ghosts: bool = True, lobes: bool = True) -> None:
-    """What outline, rings (of ghosts) and lines (of lobes) mean, over the axes of an image."""
+def legend(axes: Axes, outlines: bool, ghosts: bool, lobes: bool) -> None:
+    """What outlines, rings (of ghosts) and lines (of lobes) mean, where they are drawn, over the axes of an image."""
     from matplotlib.lines import Line2D
 
     ring: dict[str, Any] = {
@@ -117,7 +119,7 @@ def legend(axes: Axes, ghosts: bool = True, lobes: bool = True) -> None:
         "markerfacecolor": "none",
         "color": OUTLINES[0],
     }
-    handles = [Line2D([], [], color=OUTLINES[0], label="true outline")]
+    handles = [Line2D([], [], color=OUTLINES[0], label="true outline")] if outlines else []
     handles += [Line2D([], [], label="ghost by surface or bottom", **ring)] if ghosts else []
     handles += [Line2D([], [], label="grating lobe", **LOBE)] if lobes else []
     location: dict[str, Any] = {
@@ -127,7 +129,8 @@ def legend(axes: Axes, ghosts: bool = True, lobes: bool = True) -> None:
         "borderaxespad": 0.9,
         "columnspacing": 1.2,
     }
-    axes.legend(handles=handles, fontsize=7.5, labelcolor="white", facecolor=BACKDROP, framealpha=1.0, **location)
+    if handles:
+        axes.legend(handles=handles, fontsize=7.5, labelcolor="white", facecolor=BACKDROP, framealpha=1.0, **location)
 
 
 def box_of(points: Floats, margin: float) -> Floats:

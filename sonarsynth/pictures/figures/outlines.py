@@ -35,8 +35,6 @@ def union_outline(points: npt.ArrayLike, faces: npt.ArrayLike, cells: int = CELL
     """
     from contourpy import contour_generator
 
-    from sonarsynth.pictures.figures.painting_kernel import paint
-
     at, corners = np.asarray(points, float), np.asarray(faces)
     used = np.zeros(len(at), bool)
     used[corners] = True
@@ -48,7 +46,39 @@ def union_outline(points: npt.ArrayLike, faces: npt.ArrayLike, cells: int = CELL
     if cell <= 0.0:
         return []
     size = np.ceil((high - low) / cell).astype(int) + 5  # two empty cells all round: every line closes
-    mask = np.zeros((size[1], size[0]), np.uint8)
-    paint((at - low) / cell + 2.0, corners, mask)
+    mask = _painted((at - low) / cell + 2.0, corners, (int(size[1]), int(size[0])))
     x, y = (low[axis] + (np.arange(size[axis]) - 2.0) * cell for axis in (0, 1))
-    return [np.asarray(line) for line in contour_generator(x, y, mask.astype(float)).lines(0.5)]
+    return [np.asarray(line) for line in contour_generator(x, y, mask).lines(0.5)]
+
+
+def _painted(points: Floats, faces: npt.NDArray[np.integer], shape: tuple[int, int]) -> Floats:
+    """1 in the cells (row, column) that triangles (facet, 3) of points (point, column and row) touch, 0 elsewhere.
+
+    A triangle covers one span of each row that it touches; all spans are laid down at once, by their two ends.
+    """
+    x, y = (axis[faces.T] for axis in points.T)  # (corner, facet)
+    there = np.isfinite(x + y).all(axis=0)
+    x, y = x[:, there], y[:, there]
+    first = np.rint(y.min(axis=0)).astype(int)
+    rows = np.rint(y.max(axis=0)).astype(int) - first + 1
+    facet = np.repeat(np.arange(len(rows)), rows)
+    row = np.arange(len(facet)) + np.repeat(first - np.cumsum(rows) + rows, rows)
+    left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        steep = y[b] - y[a]
+        start = row - y[a, facet]  # where a side enters and leaves the row, in parts of its length
+        with np.errstate(divide="ignore", invalid="ignore"):
+            low, high = (start - 0.5) / steep[facet], (start + 0.5) / steep[facet]
+        level = steep[facet] == 0.0
+        enters = np.where(level, 0.0, np.minimum(low, high))
+        leaves = np.where(level, 1.0, np.maximum(low, high))
+        beside = (enters > 1.0) | (leaves < 0.0) | (level & (np.abs(start) > 0.5))
+        along = (x[b] - x[a])[facet]
+        for end in (enters, leaves):
+            at = x[a, facet] + np.clip(end, 0.0, 1.0) * along
+            left = np.where(beside, left, np.minimum(left, at))
+            right = np.where(beside, right, np.maximum(right, at))
+    width = shape[1] + 1
+    cells = [row * width + np.rint(end).astype(int) for end in (left, right + 1.0)]
+    starts, ends = (np.bincount(cell, minlength=shape[0] * width) for cell in cells)
+    return (np.cumsum((starts - ends).reshape(shape[0], width)[:, :-1], axis=1) > 0).astype(float)

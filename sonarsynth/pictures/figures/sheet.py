@@ -84,7 +84,7 @@ def draw_image(axes: Axes, azimuth: Floats, elevation: Floats, view: View, unit:
     if view.level is not None:
         image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
     outlines = set_outlines(outline_artist(axes), view.hulls)
-    legend(axes, bool(view.ghosts), bool(view.lobes))
+    legend(axes, bool(view.hulls), bool(view.ghosts), bool(view.lobes))
     colour_bar(axes, image, unit)
     return outlines
 
