@@ -229,3 +229,18 @@ def format_bytes(count: float) -> str:
             return f"{count:.3g} {unit}"
         count /= 1000
     return f"{count:.3g} TB"
+
+
+CONFIDENCE: Final = 1.959964
+"""Standard deviations of a band of 95 %."""
+
+
+def binomial_band(hits: int, trials: int) -> tuple[float, float]:
+    """Bounds of the probability, with 95 % confidence. Source: Wilson (1927), JASA 22, 209."""
+    if trials == 0:
+        return float("nan"), float("nan")
+    p, z2 = hits / trials, CONFIDENCE**2
+    middle = (p + 0.5 * z2 / trials) / (1.0 + z2 / trials)
+    half = CONFIDENCE * np.sqrt(p * (1.0 - p) / trials + 0.25 * z2 / trials**2) / (1.0 + z2 / trials)
+    low, high = min(middle - half, p), max(middle + half, p)  # whatever rounds, p is inside
+    return float(max(low, 0.0)), float(min(high, 1.0))

@@ -6,7 +6,6 @@ Exit status: 0 done, 1 our fault, 2 bad input, 3 finished, but some frames faile
 
 from __future__ import annotations
 
-import gc
 import json
 import time
 from contextlib import ExitStack
@@ -67,7 +66,6 @@ ALL_PRODUCTS = "signals,image,cloud"
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its status."""
-    gc.set_threshold(50_000, 20, 50)  # what libraries make when they are imported stays: a tenth of a short command
     raise SystemExit(run(app, arguments))
 
 

@@ -8,10 +8,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Bools, Floats, counted
+from sonarsynth.conventions import Bools, Floats, binomial_band, counted
 
-CONFIDENCE: Final = 1.959964
-"""Standard deviations of a band of 95 %."""
 PEAKS: Final = 3
 """Brightest peaks of an image that are looked at."""
 
@@ -71,15 +69,3 @@ def odds(energy: Floats, beam_target: npt.NDArray[np.int16], clutter: Bools, snr
     on_target = near.ravel()[best] & np.isfinite(peaks[best])
     ratios = snr[~clutter & np.isfinite(snr)]
     return Odds(1, int(on_target[0]), int(on_target.any()), float(near.mean()), tuple(ratios.tolist()))
-
-
-def binomial_band(hits: int, trials: int) -> tuple[float, float]:
-    """Bounds of the probability, with 95 % confidence. Source: Wilson (1927), JASA 22, 209."""
-    if trials == 0:
-        return float("nan"), float("nan")
-    p, z2 = hits / trials, CONFIDENCE**2
-    middle = (p + 0.5 * z2 / trials) / (1.0 + z2 / trials)
-    half = CONFIDENCE * np.sqrt(p * (1.0 - p) / trials + 0.25 * z2 / trials**2) / (1.0 + z2 / trials)
-    return float(min(max(middle - half, 0.0), p)), float(
-        max(min(middle + half, 1.0), p)
-    )  # whatever rounds, p is inside

@@ -71,8 +71,8 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def page(store: Path) -> Page:
-    assert run(app, ["report", str(store)]) == 0
-    return Page(store.with_name("s.zarr.report.html").read_text())
+    assert run(app, ["report", str(store), "--out", str(store.with_name("page.v2"))]) == 0
+    return Page(store.with_name("page.v2.html").read_text())
 
 
 def test_the_numbers_of_the_page_are_those_of_the_store(store: Path, page: Page) -> None:

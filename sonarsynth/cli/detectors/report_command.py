@@ -11,7 +11,8 @@ import typer
 def report(
     store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Where to write. Default: <store>.report.html.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Where to write: a file or a folder. Default: <store>.report.html."),
     ] = None,
 ) -> None:
     """Write a page about a store: film, contents by split, leaks between splits, errors, baselines, hardest frames."""

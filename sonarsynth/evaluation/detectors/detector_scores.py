@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sonarsynth.conventions import Ints
+from sonarsynth.conventions import Ints, binomial_band
 from sonarsynth.description import FieldError
 from sonarsynth.detection import Detections, read
 from sonarsynth.detection.detection_method import angle_at
@@ -84,8 +84,6 @@ class DetectorReport:
 
     def detected(self, wanted: np.ndarray, false_alarms: float) -> dict[str, float]:
         """Share of the wanted objects (row,) that are found at so many false alarms a frame, with a band of 95 %."""
-        from sonarsynth.labels.odds import binomial_band  # with labels come the kernels of all that can be seen
-
         matched = self.by_distance[NEAR]
         least = threshold_at(self.detections.score, matched >= 0, false_alarms * self.frames)
         hit_objects = matched[(matched >= 0) & (self.detections.score >= least)]

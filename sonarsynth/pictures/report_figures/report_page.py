@@ -43,7 +43,8 @@ def report(
     """Write a page about a store: film, what is in it by split, whether splits are apart, errors against predicted
     errors, baseline detectors, the hardest frames.
 
-    out: the file, `<store>.report.html` where it is left out. The page holds plotly.js (5 MB) and its own numbers as
+    out: the file, which gets the ending .html where it has another, or a folder that is there; `<store>.report.html`
+    where it is left out. The page holds plotly.js (5 MB) and its own numbers as
     JSON (the element `numbers`). Returns the file and the numbers. Raises NothingToDraw where no frame is built.
     """
     folder = folder_of(store)
@@ -52,7 +53,11 @@ def report(
         raise NothingToDraw(f"{folder}: no frame has been built")
     numbers = numbers_of(tree, warnings_of(folder), progress)
     beside = named_after(folder)
-    file = Path(out) if out is not None else beside.with_name(f"{beside.name}.report.html")
+    file = beside.with_name(f"{beside.name}.report.html")
+    if out is not None:
+        chosen = Path(out)
+        ending = "" if chosen.suffix.lower() in (".html", ".htm") else ".html"
+        file = chosen / file.name if chosen.is_dir() else chosen.with_name(chosen.name + ending)
     from sonarsynth.pictures.report_figures import report_plots as plots
 
     figures = [
