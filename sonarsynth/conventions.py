@@ -162,7 +162,6 @@ Seconds = Annotated[float, *_in("s")]
 Hertz = Annotated[float, *_in("Hz")]
 Radians = Annotated[float, *_in("rad")]
 MetresPerSecond = Annotated[float, *_in("m/s")]
-RadiansPerSecond = Annotated[float, *_in("rad/s")]
 Pascals = Annotated[float, *_in("Pa")]
 Decibels = Annotated[float, *_in("dB")]
 KilogramsPerCubicMetre = Annotated[float, *_in("kg/m3")]
@@ -204,17 +203,6 @@ def picked(mask: Bools) -> Ints | slice:
     """The rows that a mask (row,) picks; where it picks all, a slice, which copies nothing."""
     rows = np.flatnonzero(mask)
     return slice(None) if len(rows) == len(mask) else rows
-
-
-def level(pressure: npt.ArrayLike) -> Floats:
-    """Level in dB re 1 uPa of a pressure in Pa (-inf for silence)."""
-    with np.errstate(divide="ignore"):
-        return np.asarray(20.0 * np.log10(np.abs(np.asarray(pressure, float)) / REFERENCE_PRESSURE))
-
-
-def pressure(level_db: npt.ArrayLike) -> Floats:
-    """Pressure in Pa of a level in dB re 1 uPa: the inverse of `level`."""
-    return np.asarray(REFERENCE_PRESSURE * 10.0 ** (np.asarray(level_db, float) / 20.0))
 
 
 def counted(number: int, noun: str) -> str:

@@ -10,7 +10,6 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
-from sonarsynth.equations.scattering.facet_size import FIVE_PERCENT
 from sonarsynth.geometry.curvature import bend
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.surfaces import longest_edge, volume
@@ -24,6 +23,7 @@ MOST_FACETS: Final = 2_000_000
 """No shape is refined beyond; what is missing then is reported."""
 MOST_CUT: Final = 100_000
 """Facets that a shape is cut into, where nobody says how far: a frame then takes a second or two."""
+FIVE_PERCENT: Final = 0.05  # of the echo: 0.4 dB
 ERROR: Final = 0.02
 """Expected error that shapes are refined to: rigid spheres of 0.25 m are then within 0.2 dB, of 0.5 m within 0.1 dB."""
 SHADOW: Final = 48

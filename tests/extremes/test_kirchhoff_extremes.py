@@ -15,7 +15,7 @@ from sonarsynth.equations.scattering.kirchhoff_integral import (
     shadow_taper,
     triangle_integral,
 )
-from sonarsynth.equations.scattering.kirchhoff_kernels import facet_amplitudes, mesh_amplitude
+from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 from sonarsynth.equations.scattering.modal_series import (
     Fluid,
     cylinder_amplitude,
@@ -45,7 +45,7 @@ def test_no_wave_gives_the_area_and_no_echo() -> None:
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     np.testing.assert_allclose(triangle_integral(corners, np.zeros(3)), area, rtol=1e-15)
     assert abs(facet_amplitude(corners, UP, UP, 300.0)).max() == 0.0  # straight on: no change of direction
-    assert abs(facet_amplitudes(corners, UP, DOWN, [0.0])).max() == 0.0
+    assert abs(mesh_amplitude(corners, UP, DOWN, np.zeros(1))).max() == 0.0
 
 
 def test_the_integral_never_exceeds_the_area_and_falls_with_the_wave() -> None:

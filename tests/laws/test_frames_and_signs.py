@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sonarsynth.conventions import Unit, azimuth_elevation, depth, direction, level, pressure
+from sonarsynth.conventions import Unit, azimuth_elevation, depth, direction
 from sonarsynth.geometry import Pose, quaternion, quaternion_product, rotation_matrix
 from sonarsynth.geometry.motion import Circle, Line, Still, Waypoint, Waypoints, pose, velocity
 from sonarsynth.randomness import stream
@@ -48,12 +48,6 @@ def test_a_pose_there_and_back_is_the_identity() -> None:
     half = quaternion(0.1)
     product = rotation_matrix(quaternion_product(half, place.orientation))
     assert product == pytest.approx(rotation_matrix(half) @ matrix)
-
-
-def test_levels_are_re_one_micropascal() -> None:
-    assert level(1.0) == pytest.approx(120.0)
-    assert pressure(level(3.7)) == pytest.approx(3.7)
-    assert level(0.0) == -np.inf
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from scipy.signal import hilbert
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble.snap_pressure import Bubble, ComplexArray
-from sonarsynth.equations.noise import filters
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import LowPass, PositionTable, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
@@ -27,6 +26,7 @@ from sonarsynth.signals.pulse_shapes import shape_modes
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.state import Emission
+from tests.filtered import filtered_pulse
 from tests.laws.test_synthesis import FACES, MODEL, SHARP, SNAPS, SONAR, absorption, arrivals, error, some_of, target_at
 
 LOW = Sonar(filter=LowPass(cutoff=60e3, attenuation=140), sampling_frequency=250e3)
@@ -83,7 +83,7 @@ def test_a_blur_is_a_gaussian_in_time() -> None:
     t, got = alone(SHARP, delay_std=delay_std)
     near = np.abs(t) < 3e-4
     x, w = np.polynomial.hermite_e.hermegauss(24)
-    delayed = [filters.filtered_pulse(t[near] - delay_std * late, MODEL.bubble, fir(SHARP.antialias)) for late in x]
+    delayed = [filtered_pulse(t[near] - delay_std * late, MODEL.bubble, fir(SHARP.antialias)) for late in x]
     expected = w @ delayed / w.sum()
     assert error(got[near], expected) < 1e-8
 
@@ -96,7 +96,7 @@ def test_a_stretched_snap_is_that_of_a_slower_bubble(doppler: float) -> None:
     longer = 1.0 + doppler
     slower = Bubble(one.a, one.k / longer, one.m * longer, one.q / longer, one.density)
     near = np.abs(t) < 3e-4
-    expected = longer**2 * filters.filtered_pulse(t[near], slower, fir(SHARP.antialias))
+    expected = longer**2 * filtered_pulse(t[near], slower, fir(SHARP.antialias))
     assert error(got[near], expected) < 1e-7
 
 

@@ -10,7 +10,6 @@ import pytest
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import element_directivity
-from sonarsynth.equations.noise import filters
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import BandPass, Elements, LowPass, PositionTable, Romanis, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
@@ -20,6 +19,7 @@ from sonarsynth.signals.gridded.nodes import chebyshev, interpolation, nodes_for
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.state import Emission
+from tests.filtered import filtered_pulse
 
 MODEL = LogarithmicBubble()
 SNAPS = (Emission(np.zeros(3), 0.0, MODEL, None),)
@@ -150,7 +150,7 @@ def test_exact_sum_is_the_filtered_snap_at_the_exact_delays() -> None:
             far = np.linalg.norm(source - q)
             late = of.delay[e] + (far - of.radius[e]) / C
             near = np.abs(t - late) < 1e-3
-            wave = filters.filtered_pulse(t[near] - late, MODEL.bubble, fir(SHARP.antialias))
+            wave = filtered_pulse(t[near] - late, MODEL.bubble, fir(SHARP.antialias))
             expected[s, near] += of.amplitude[e] * of.radius[e] / far * wave
     assert error(got, expected) < 1e-7
 
@@ -161,7 +161,7 @@ def test_exact_sum_with_the_default_filter_leaves_out_what_would_fold() -> None:
     start, samples = window(of, SONAR, array)
     got, _ = exact_signals(of, SNAPS, array, SONAR, None, start, samples)
     t = start + np.arange(samples) / SONAR.sampling_frequency - 0.01
-    exact = filters.filtered_pulse(t, MODEL.bubble, fir(SONAR.antialias))
+    exact = filtered_pulse(t, MODEL.bubble, fir(SONAR.antialias))
     assert 1e-8 < error(got[0], exact) < 2e-5  # 80 dB down and beyond half the sampling frequency
 
 

@@ -19,6 +19,7 @@ from sonarsynth.sources.recordings import read_recording
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
 from sonarsynth.sources.snap_pulses import largest_scales, scales
+from tests.filtered import filtered_pulse
 
 MODEL = LogarithmicBubble()
 BUBBLE = Bubble(MODEL.a, MODEL.k, MODEL.m, MODEL.q, MODEL.density)
@@ -27,26 +28,38 @@ FREQUENCY = np.linspace(0.0, 200e3, 1601)
 EVERY = (MODEL, KellerMiksis(), Ricker(frequency=40e3), Gabor(frequency=50e3, cycles=3.0))
 
 
+def ricker_spectrum(f: np.ndarray | float, frequency: float, peak: float) -> np.ndarray:
+    u2 = (np.asarray(f) / frequency) ** 2
+    return peak * 2.0 / np.sqrt(np.pi) / frequency * u2 * np.exp(-u2)
+
+
+def gabor_spectrum(f: np.ndarray | float, frequency: float, cycles: float, peak: float) -> np.ndarray:
+    s = cycles / frequency / np.sqrt(8.0 * np.log(2.0))
+    both = [np.exp(-2.0 * (np.pi * s * (np.asarray(f) - sign * frequency)) ** 2) for sign in (1.0, -1.0)]
+    return peak * s * np.sqrt(np.pi / 2.0) * (both[0] + both[1])
+
+
 def test_logarithmic_bubble_is_that_of_its_own_module() -> None:
     got = MODEL.pulse(5.0, 200e3)
     own = snap_pressure.spectrum(FREQUENCY, BUBBLE)
     assert np.abs(pulses.spectrum(FREQUENCY, got) - own).max() < 1e-13 * np.abs(own).max()
     heard = MODEL.pulse(5.0, pulses.reach(FIR))
     t = np.linspace(-3e-4, 5e-5, 60)
-    exact = filters.filtered_pulse(t, BUBBLE, FIR)
+    exact = filtered_pulse(t, BUBBLE, FIR)
     assert np.abs(pulses.filtered(t, heard, FIR) - exact).max() < 1e-6 * np.abs(exact).max()
     for a, b in zip(pulses.support(heard, FIR), filters.pulse_support(BUBBLE, FIR), strict=True):
         assert a == pytest.approx(b, abs=5e-6)
-    assert pulses.gain_for_level(heard, 187.0) == pytest.approx(snap_pressure.gain_for_level(BUBBLE, 187.0), rel=1e-12)
+    gain = pulses.gain_for_level(heard, 187.0)
+    assert 20 * np.log10(gain * snap_pressure.peak(BUBBLE)[1] / 1e-6) == pytest.approx(187.0, abs=1e-9)
 
 
 def test_ricker_and_gabor_have_their_exact_spectra() -> None:
     for frequency in (1e3, 40e3, 300e3):
-        exact = waveforms.ricker_spectrum(FREQUENCY, frequency, 2.0)
+        exact = ricker_spectrum(FREQUENCY, frequency, 2.0)
         got = pulses.spectrum(FREQUENCY, waveforms.ricker(frequency, 2.0, 200e3))
         assert np.abs(got - exact).max() < 1e-13 * 2.0 / frequency
         for cycles in (0.3, 3.0, 50.0):
-            exact = waveforms.gabor_spectrum(FREQUENCY, frequency, cycles, 2.0)
+            exact = gabor_spectrum(FREQUENCY, frequency, cycles, 2.0)
             got = pulses.spectrum(FREQUENCY, waveforms.gabor(frequency, cycles, 2.0, 200e3))
             assert np.abs(got - exact).max() < 1e-13 * 2.0 * cycles / frequency
 
@@ -62,8 +75,8 @@ def test_exact_spectra_are_integrals_of_the_waveforms() -> None:
 
     for f in (0.0, 30e3, 55e3):
         for wave, exact in (
-            (ricker, waveforms.ricker_spectrum(f, 40e3, 1.0)),
-            (gabor, waveforms.gabor_spectrum(f, 40e3, 3.0, 1.0)),
+            (ricker, ricker_spectrum(f, 40e3, 1.0)),
+            (gabor, gabor_spectrum(f, 40e3, 3.0, 1.0)),
         ):
             integral = quad(lambda t, f=f, wave=wave: wave(t) * np.cos(2 * np.pi * f * t), -3e-4, 3e-4, limit=400)[0]
             assert complex(exact) == pytest.approx(integral, abs=1e-12)
@@ -139,7 +152,7 @@ def test_a_recording_of_a_known_pulse_has_its_spectrum(tmp_path: Path, highest: 
     u = (np.pi * 40e3 * time) ** 2
     model = written(tmp_path / "snap.csv", rate, 3e-3 * (1 - 2 * u) * np.exp(-u))
     got = pulses.spectrum(FREQUENCY, model.pulse(5.0, highest))
-    exact = waveforms.ricker_spectrum(FREQUENCY, 40e3, 6.0)
+    exact = ricker_spectrum(FREQUENCY, 40e3, 6.0)
     assert np.abs(got - exact).max() < 1e-7 * np.abs(exact).max()
     if highest > rate:
         above = pulses.spectrum(np.array([300e3, 700e3]), model.pulse(5.0, highest))

@@ -79,18 +79,3 @@ def lattice_beam_spectra(
     return lattice_sums(
         spectra, places, weight, delay, step[:, 2], step[:, 1], odd=odd, frequency=first, spacing=spacing
     )
-
-
-def beam_energy(beams: npt.NDArray[np.complexfloating], spacing: float, sampling_frequency: float) -> Floats:
-    """Energy (...) in Pa2 s of beams (..., bin) whose bins are `spacing` (Hz) apart, by Parseval.
-
-    (2 df/fs^2) sum |B|^2, which is int p^2 dt for a wave p(t) whose spectrum lies inside the bins.
-    """
-    return np.asarray(
-        spectrum_energy(spacing, sampling_frequency) * np.sum(np.abs(beams.astype(np.complex128)) ** 2, axis=-1)
-    )
-
-
-def spectrum_energy(spacing: float, sampling_frequency: float) -> float:
-    """Energy (Pa2 s) of a real signal whose rfft is 1 (Pa) in one bin, bins `spacing` (Hz) apart: 2 df/fs^2."""
-    return 2.0 * spacing / sampling_frequency**2

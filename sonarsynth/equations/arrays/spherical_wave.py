@@ -186,30 +186,3 @@ def envelope_peak(
             break
     power = np.broadcast_to(np.asarray(noise, float), f.shape)
     return time, float(np.sqrt(0.5 * np.sum(((omega - carrier) * taper) ** 2 * power)) / abs(curve))
-
-
-def delay_bound(energy_to_noise: npt.ArrayLike, bandwidth: npt.ArrayLike) -> Floats:
-    """Cramer-Rao bound (s) on the standard error of a delay: 1/(2 pi beta d), d^2 = `energy_to_noise` = 2 E/N0.
-
-    bandwidth beta (Hz) is the root mean square frequency of the known pulse, about zero where the carrier phase is
-    known, about the centroid where it is not (`rms_bandwidth`). Source: Van Trees (2002), section 8.2; Kay (1993),
-    section 3.11.
-    """
-    return np.asarray(1 / (2 * np.pi * np.asarray(bandwidth, float) * np.sqrt(np.asarray(energy_to_noise, float))))
-
-
-def rms_bandwidth(frequency: npt.ArrayLike, spectrum: npt.ArrayLike, *, centred: bool = False) -> float:
-    """Root mean square frequency (Hz) of a spectrum, about zero or about its centroid: sqrt(int f^2|S|^2/int |S|^2)."""
-    f, power = np.asarray(frequency, float), np.abs(np.asarray(spectrum)) ** 2
-    mean = float(f @ power / power.sum()) if centred else 0.0
-    return float(np.sqrt((f - mean) ** 2 @ power / power.sum()))
-
-
-def direction_bound(position: npt.ArrayLike, delay_error: float, sound_speed: float) -> Floats:
-    """Cramer-Rao bound (3, 3) on the covariance of a plane wave's direction from delays of equal error (s).
-
-    Unknown emission time: (c delay_error)^2 times the (pseudo-)inverse of sum (q - mean q)(q - mean q)^T.
-    """
-    q = np.asarray(position, float)
-    spread = q - q.mean(axis=0)
-    return np.asarray((sound_speed * delay_error) ** 2 * np.linalg.pinv(spread.T @ spread, hermitian=True))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
 from sonarsynth.equations.bubble.bubble_collapse import SETTLED, SINGULAR, Collapse, Motion, moving, stretched
@@ -51,21 +51,6 @@ def peak(collapse: Collapse) -> tuple[float, float]:
 def source_level(collapse: Collapse) -> float:
     """Peak source level (dB re 1 uPa at 1 m) before any filter."""
     return float(20.0 * np.log10(peak(collapse)[1] / REFERENCE_PRESSURE))
-
-
-def width(collapse: Collapse, fraction: float = 0.5) -> float:
-    """Time (s) for which the pressure is over a fraction of its peak, around it; 0 for a point, NaN for none."""
-    if collapse.flag in {SINGULAR, SETTLED}:
-        return 0.0 if collapse.flag == SINGULAR else np.nan
-    top, size = _peak(collapse)
-    s = np.unique(np.append(np.linspace(collapse.steps[:-1], collapse.steps[1:], 5), top))
-    under = moving(s, collapse).pressure < fraction * size
-    i, j = s[under & (s < top)][-1], s[under & (s > top)][0]
-    ends = [brentq(lambda u: _pressure(u, collapse) - fraction * size, *sorted((u, top)), xtol=1e-14) for u in (i, j)]
-    node, weight = np.polynomial.legendre.leggauss(64)
-    clock = 0.5 * (ends[0] + ends[1]) + 0.5 * (ends[1] - ends[0]) * node  # finer than times can tell
-    rate = moving(clock, collapse).rate
-    return float(0.5 * (ends[1] - ends[0]) * (rate @ weight))
 
 
 def _gate(moved: Motion, begins: tuple[float, float], ends: tuple[float, float]) -> Floats:

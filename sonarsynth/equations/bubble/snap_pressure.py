@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import erfc
 
-from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
+from sonarsynth.conventions import Floats
 
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -89,16 +89,6 @@ def peak(bubble: Bubble) -> tuple[float, float]:
         lambda y: -float(pressure(-y, bubble)), bounds=(x[i - 1], x[i + 1]), method="bounded", options={"xatol": 1e-13}
     )
     return -float(minimum.x), -float(minimum.fun)
-
-
-def source_level(bubble: Bubble) -> float:
-    """Peak source level (dB re 1 uPa at 1 m)."""
-    return float(20.0 * np.log10(peak(bubble)[1] / REFERENCE_PRESSURE))
-
-
-def gain_for_level(bubble: Bubble, level: float | None) -> float:
-    """Factor on the pressure that gives the peak a source level (dB re 1 uPa at 1 m); 1 for None."""
-    return 1.0 if level is None else float(10.0 ** ((level - source_level(bubble)) / 20.0))
 
 
 @lru_cache(maxsize=64)

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble import snap_pressure
 from sonarsynth.equations.bubble.pulses import Pulse
-from sonarsynth.equations.bubble.snap_pressure import Bubble, ComplexArray
+from sonarsynth.equations.bubble.snap_pressure import Bubble
 
 MOST_SAMPLES = 1 << 24
 """Samples of a recording that is made denser."""
@@ -70,13 +70,6 @@ def ricker(frequency: float, peak: float, highest: float) -> Pulse:
     return Pulse(time, peak * (1.0 - 2.0 * u2) * np.exp(-u2) * step, float(time[0]), float(time[-1]), abs(peak))
 
 
-def ricker_spectrum(f: npt.ArrayLike, frequency: float, peak: float) -> ComplexArray:
-    """The Ricker wavelet's spectrum (Pa s) at frequencies (Hz): peak (2/sqrt pi) u^2 exp(-u^2)/frequency, u =
-    f/frequency."""
-    u2 = (np.asarray(f, float) / frequency) ** 2
-    return np.asarray(peak * 2.0 / np.sqrt(np.pi) / frequency * u2 * np.exp(-u2), complex)
-
-
 def gabor(frequency: float, cycles: float, peak: float, highest: float) -> Pulse:
     """A tone in a Gaussian, peak cos(2 pi frequency t) exp(-t^2/(2 s^2)), with so many cycles in its width at half its
     height. Source: Gabor (1946), J. IEE 93, 429."""
@@ -84,13 +77,6 @@ def gabor(frequency: float, cycles: float, peak: float, highest: float) -> Pulse
     time, step = _grid(SPREAD * np.sqrt(2.0) * s, highest + frequency + SPREAD / (np.sqrt(2.0) * np.pi * s))
     p = peak * np.cos(2.0 * np.pi * frequency * time) * np.exp(-0.5 * (time / s) ** 2)
     return Pulse(time, p * step, float(time[0]), float(time[-1]), abs(peak))
-
-
-def gabor_spectrum(f: npt.ArrayLike, frequency: float, cycles: float, peak: float) -> ComplexArray:
-    """The Gabor pulse's spectrum (Pa s) at frequencies (Hz): a Gaussian at either sign of its frequency."""
-    s, w = _deviation(frequency, cycles), np.asarray(f, float)
-    both = [np.exp(-2.0 * (np.pi * s * (w - sign * frequency)) ** 2) for sign in (1.0, -1.0)]
-    return np.asarray(peak * s * np.sqrt(np.pi / 2.0) * (both[0] + both[1]), complex)
 
 
 def _deviation(frequency: float, cycles: float) -> float:

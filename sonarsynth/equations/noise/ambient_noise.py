@@ -57,8 +57,3 @@ def quantisation_density(quantum: float, sampling_frequency: float) -> float:
     """One-sided power spectral density (Pa2/Hz) of rounding to whole counts: q^2/12 spread over half the sampling
     rate."""
     return quantum**2 / (6.0 * sampling_frequency)
-
-
-def quantisation_ratio(bits: int) -> float:
-    """Power of a full-scale sine over that of the rounding error (dB): 6.0206 bits + 1.7609."""
-    return float(20.0 * bits * np.log10(2.0) + 10.0 * np.log10(1.5))

@@ -50,17 +50,6 @@ def _fit(alpha: float, scale: float) -> StableFit:
     return StableFit(min(float(alpha), 2.0), float(scale))
 
 
-def samples(alpha: float, shape: tuple[int, ...], random: np.random.Generator) -> Floats:
-    """Numbers (shape) of scale 1. Source: Chambers, Mallows and Stuck (1976), J. Am. Stat. Assoc. 71, 340."""
-    _check(alpha)
-    v, w = random.uniform(-0.5 * np.pi, 0.5 * np.pi, shape), random.exponential(size=shape)
-    if alpha == 1.0:
-        return np.asarray(np.tan(v))
-    return np.asarray(
-        np.sin(alpha * v) / np.cos(v) ** (1.0 / alpha) * (np.cos((1.0 - alpha) * v) / w) ** ((1.0 - alpha) / alpha)
-    )
-
-
 def exceedance(x: Floats, alpha: float) -> Floats:
     """Probability (...) that the magnitude of a number of scale 1 is above x (...), 0 or more.
 

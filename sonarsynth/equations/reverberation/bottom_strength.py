@@ -10,7 +10,6 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import gamma
 
 from sonarsynth.conventions import Floats
@@ -51,11 +50,6 @@ class Angles(NamedTuple):
     sine_in: Floats  # of the grazing angle
     sine_out: Floats
     forward: Floats  # cosine of the azimuth between the directions of travel: 1 forward, -1 back
-
-    @property
-    def swapped(self) -> Angles:
-        """The way back."""
-        return Angles(self.sine_out, self.sine_in, self.forward)
 
     @property
     def level(self) -> Floats:
@@ -129,12 +123,3 @@ def _kirchhoff(level: Floats, upright: Floats, k: float, strength: float, bottom
     below = (level ** (2.0 * a) + wide * q**2 * upright**4) ** ((1.0 + a) / (2.0 * a))
     shape = np.divide(total**2 * (1.0 + 100.0 * level**2), below, out=np.zeros_like(total), where=below > 0.0)
     return np.asarray(mirrored / (8.0 * np.pi) * b * q * shape)
-
-
-def albedo(strength: npt.ArrayLike, sine_out: Floats, solid_angle: Floats, sine_in: float) -> float:
-    """Share of the power that arrives at grazing angle asin(sine_in) which is scattered: int sigma dOmega/sin q_i.
-
-    strength (direction,) 1/sr towards directions of weights `solid_angle` (direction,) sr; sine_out says which of them
-    are in the water.
-    """
-    return float(np.sum(np.where(sine_out > 0.0, strength, 0.0) * solid_angle) / sine_in)

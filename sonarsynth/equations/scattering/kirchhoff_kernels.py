@@ -40,25 +40,6 @@ def mesh_amplitude(
     return out
 
 
-def facet_amplitudes(
-    corners: npt.ArrayLike,
-    incident: npt.ArrayLike,
-    scattered: npt.ArrayLike,
-    wavenumber: npt.ArrayLike,
-    weight: npt.ArrayLike = 1.0,
-    roughness: npt.ArrayLike = 0.0,
-) -> Complexes:
-    """Far-field amplitudes f (facet, frequency) (m) one by one; arguments as in `mesh_amplitude`.
-
-    Where source or receiver are near, each facet has its own directions: give its corners from its own middle, and
-    multiply by what spreading and delay make of the ways to that.
-    """
-    args = _prepared(corners, incident, scattered, wavenumber, weight, roughness)
-    out = np.zeros((len(args[0]), args[3].size), complex)
-    _each(out, *args)
-    return out
-
-
 def _prepared(
     corners: npt.ArrayLike,
     incident: npt.ArrayLike,
@@ -86,16 +67,6 @@ def _add(
         if weight[facet] != 0.0:
             _facet(row, corners[facet], incident[facet], scattered[facet], k, weight[facet], height[facet], room, pace)
             out += row
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _each(
-    out: Complexes, corners: Floats, incident: Floats, scattered: Floats, k: Floats, weight: Complexes, height: Floats
-) -> None:
-    room, pace = np.empty((2, ROOM)), spacing(k)
-    for at in range(len(corners)):
-        if weight[at] != 0.0:
-            _facet(out[at], corners[at], incident[at], scattered[at], k, weight[at], height[at], room, pace)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

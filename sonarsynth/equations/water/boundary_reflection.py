@@ -76,33 +76,18 @@ def rayleigh(
     return np.asarray(np.where(nothing, (m - 1.0) / (m + 1.0), top / np.where(nothing, 1.0, bottom)))
 
 
-def critical_grazing(speed_ratio: npt.ArrayLike) -> Floats:
-    """Grazing angle (rad) below which a lossless bottom of that speed ratio reflects all; NaN for a slow bottom."""
-    ratio = np.asarray(speed_ratio, float)
-    return np.asarray(np.arccos(np.where(ratio >= 1.0, 1.0 / ratio, np.nan)))
-
-
 def pressure_release(grazing: npt.ArrayLike) -> Complexes:
     """Reflection coefficient of the flat sea surface: -1 at every angle."""
     return np.full(np.shape(grazing), -1.0 + 0j)
 
 
-def eckart(wavenumber: npt.ArrayLike, rms_height: npt.ArrayLike, grazing: npt.ArrayLike) -> Floats:
-    """Coherent part of the reflection from a rough boundary over that of the flat one: exp(-g^2/2), g = 2 k h sin q.
-
-    wavenumber k (rad/m), rms height h (m), grazing angle q (rad). The rest of the energy is scattered, not lost. For
-    heights of normal distribution and slopes gentler than q, so that nothing lies in shadow.
-    Source: Eckart (1953), JASA 25, 566.
-    """
-    k, h, q = (np.asarray(x, float) for x in (wavenumber, rms_height, grazing))
-    return np.asarray(np.exp(-0.5 * (2.0 * k * h * np.sin(q)) ** 2))
-
-
 def roughness_blur(rms_height: npt.ArrayLike, grazing: npt.ArrayLike, sound_speed: npt.ArrayLike) -> Floats:
-    """Time (s) that stands for a rough reflection at every frequency: `eckart` is exp(-(2 pi f delay_std)^2/2).
+    """Time (s) that stands for a rough reflection at every frequency: exp(-(2 pi f delay_std)^2/2) of it is coherent.
 
     delay_std = 2 h sin q/c: the rms of the delay from boundary that is a height h nearer or farther, with the sound
-    speed c (m/s) at the boundary. Roughness that differs from bounce to bounce adds its squares.
+    speed c (m/s) at the boundary. Roughness that differs from bounce to bounce adds its squares. For heights of normal
+    distribution and slopes gentler than q, so that nothing lies in shadow; the rest of the energy is scattered, not
+    lost. Source: Eckart (1953), JASA 25, 566: exp(-g^2/2), g = 2 k h sin q.
     """
     h, q, c = (np.asarray(x, float) for x in (rms_height, grazing, sound_speed))
     return np.asarray(2.0 * h * np.abs(np.sin(q)) / c)
