@@ -20,15 +20,19 @@ Shading = Literal["uniform", "hann"]
 """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
 
 
-def snapshots_of(signals: Signals, sonar: Sonar, start: float, stop: float) -> Snapshots:
-    """Spectra of the window from start to stop (s, clock of the signals) in the sonar's band.
+def snapshots_of(
+    signals: Signals, sonar: Sonar, start: float, stop: float, *, lasting: float | None = None
+) -> Snapshots:
+    """Spectra of the window from start to stop (s, clock of the signals) in the sonar's band; lasting (s): how long
+    sound is taken to last in it, where that is not asked of the signals.
 
     Raises ValueError when the window reaches outside the signals, or is too short to resolve the band.
     """
     rate = signals.sampling_frequency
     first, count = gate_samples(start, stop, signals.start, rate, signals.pressure.shape[1])
     frequency, spectra = gated_spectra(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
-    lasting = _lasting(signals.pressure[:, first : first + count]) / rate
+    if lasting is None:
+        lasting = _lasting(signals.pressure[:, first : first + count]) / rate
     spacing, begin = frequency_spacing(count, rate), signals.start + first / rate
     return Snapshots(frequency, spacing, spectra, begin, count, rate, lasting)
 

@@ -142,7 +142,8 @@ class _Look:
         if pressure is None:
             return 0.0
         if id(pressure) not in self._made:
-            prepared = snapshots_of(replace(self.signals, pressure=pressure), self.sonar, *self.window)
+            heard = replace(self.signals, pressure=pressure)
+            prepared = snapshots_of(heard, self.sonar, *self.window, lasting=self.window[1] - self.window[0])
             self._made[id(pressure)] = pressure, prepared  # kept, so that no other has its id
         _, snapshots = self._made[id(pressure)]
         steered = self.method.steer(snapshots, self.elements, self.sonar, self.grid[beams])

@@ -6,9 +6,11 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.sparse import csr_array
 
+from sonarsynth.conventions import Bools
 from sonarsynth.equations.noise.filters import kaiser_bessel
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Elements
@@ -16,6 +18,8 @@ from sonarsynth.receiver.sensor_errors import DrawnErrors, Overload, SensorError
 
 BLEND = 256
 """Samples over which the end of a window goes over into its start, so that a filter finds no step there."""
+TOGETHER = 32
+"""Sensors at once."""
 TAPS, SHAPE = 64, 10.0
 """Of the interpolation from the samples of an even clock to those of a real one, and of its Kaiser window."""
 
@@ -23,10 +27,8 @@ TAPS, SHAPE = 64, 10.0
 def respond(signals: Signals, drawn: DrawnErrors, sound_speed: float) -> Signals:
     """Signals after gain, phase and delay of each channel; dead ones are silent. Windows are taken for periodic: the
     ends are wrong for as long as the delay."""
-    alive = np.where(drawn.state == SensorState.DEAD, 0.0, 1.0)
-    spectrum, samples = _spectrum(signals)
-    response = _response(drawn, samples, signals.sampling_frequency, sound_speed)
-    return _filtered(signals, spectrum * response * alive[:, None], samples)
+    response = _response(drawn, _length(signals), signals.sampling_frequency, sound_speed)
+    return _filtered(signals, response, drawn.state != SensorState.DEAD)
 
 
 def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_speed: float) -> Signals:
@@ -34,29 +36,36 @@ def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_
     if errors.known == "none":
         return signals
     works = (drawn.state == SensorState.WORKING) | (drawn.state == SensorState.NOISY)
-    spectrum, samples = _spectrum(signals)
-    response = _response(drawn, samples, signals.sampling_frequency, sound_speed, errors.known == "all")
-    return _filtered(signals, spectrum / response * works[:, None], samples)
+    response = _response(drawn, _length(signals), signals.sampling_frequency, sound_speed, errors.known == "all", True)
+    return _filtered(signals, response, works)
 
 
 @lru_cache(maxsize=4)
-def _response(drawn: DrawnErrors, samples: int, rate: float, sound_speed: float, phases: bool = True) -> np.ndarray:
-    """As `DrawnErrors.response`, at the frequencies of so many samples: the same in all frames of a sequence."""
-    return drawn.response(rfftfreq(samples, 1.0 / rate), sound_speed, phases)
+def _response(
+    drawn: DrawnErrors, samples: int, rate: float, sound_speed: float, phases: bool = True, inverse: bool = False
+) -> npt.NDArray[np.complex64]:
+    """As `DrawnErrors.response`, or one over it, at the frequencies of so many samples: the same in all frames of a
+    sequence."""
+    response = drawn.response(rfftfreq(samples, 1.0 / rate), sound_speed, phases)
+    return (1.0 / response if inverse else response).astype(np.complex64)
 
 
-def _spectrum(signals: Signals) -> tuple[np.ndarray, int]:
-    """Spectra (sensor, bin) of the window, made periodic, and its samples so."""
-    p = signals.pressure
-    length = next_fast_len(p.shape[1] + BLEND, real=True)
+def _length(signals: Signals) -> int:
+    """Samples of the window, made periodic."""
+    return int(next_fast_len(signals.pressure.shape[1] + BLEND, real=True))
+
+
+def _filtered(signals: Signals, response: npt.NDArray[np.complex64], works: Bools) -> Signals:
+    """Signals times a response (sensor, bin), silent where they do not work (sensor,); a few at once."""
+    p, length = signals.pressure, _length(signals)
     down = np.linspace(1.0, 0.0, length - p.shape[1] + 2, dtype=np.float32)[1:-1]
-    periodic = np.concatenate([p, p[:, -1:] * down + p[:, :1] * (1.0 - down)], axis=1)
-    return rfft(periodic, axis=1), length
-
-
-def _filtered(signals: Signals, spectrum: np.ndarray, length: int) -> Signals:
-    pressure = irfft(spectrum, length, axis=1)[:, : signals.pressure.shape[1]]
-    return replace(signals, pressure=pressure.astype(np.float32))
+    out = np.empty(p.shape, np.float32)
+    for first in range(0, len(p), TOGETHER):
+        rows = slice(first, first + TOGETHER)
+        periodic = np.concatenate([p[rows], p[rows, -1:] * down + p[rows, :1] * (1.0 - down)], axis=1)
+        spectrum = rfft(periodic.astype(np.float32, copy=False), axis=1) * response[rows]
+        out[rows] = irfft(spectrum, length, axis=1)[:, : p.shape[1]] * works[rows, None]
+    return replace(signals, pressure=out)
 
 
 def talk(signals: Signals, elements: Elements, level: float) -> Signals:

@@ -15,6 +15,7 @@ BENCHMARKS = (
     "memory",
     "cloud",
     "odds",
+    "reef",
     "soundscape",
     "growth",
     "ablation",
