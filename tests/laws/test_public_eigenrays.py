@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import doctest
 from typing import Any
 
 import numpy as np
 import pytest
 
-import sonarsynth.propagation.eigenrays
 from sonarsynth import (
     Isovelocity,
     Linear,
@@ -85,16 +83,6 @@ def test_arguments_broadcast_and_pairs_number_them() -> None:
             np.testing.assert_array_equal(getattr(mine, name), getattr(alone, name), err_msg=name)
 
 
-def test_the_depth_of_the_bed_broadcasts_too() -> None:
-    bottom_depth = np.array([25.0, 20.0, 25.0])
-    rays = eigenrays(LAYERS, bottom_depth, 4.0, 12.0, 50.0)
-    assert rays.pair.tolist() == sorted(rays.pair.tolist())
-    for pair in range(3):
-        alone, mine = eigenrays(LAYERS, bottom_depth[pair], 4.0, 12.0, 50.0), rays.select(rays.pair == pair)
-        np.testing.assert_array_equal(mine.travel_time, alone.travel_time)
-        np.testing.assert_array_equal(mine.departure, alone.departure)
-
-
 @pytest.mark.parametrize("water", [WATER, LAYERS], ids=lambda w: w.kind)
 def test_rays_in_space_agree_with_those_in_a_section_and_turn_with_the_ends(water: SoundSpeed) -> None:
     rng = np.random.default_rng(3)
@@ -116,14 +104,6 @@ def test_rays_in_space_agree_with_those_in_a_section_and_turn_with_the_ends(wate
     np.testing.assert_allclose(turned.travel_time, rays.travel_time, rtol=1e-13)
     np.testing.assert_allclose(turned.departure, rays.departure @ turn.T, atol=1e-12)
     np.testing.assert_allclose(turned.arrival, rays.arrival @ turn.T, atol=1e-12)
-
-
-def test_positions_broadcast() -> None:
-    source, receiver = np.array([1.0, 2.0, -3.0]), np.array([[[5.0, 5.0, -8.0]], [[9.0, 2.0, -8.0]]])
-    rays = eigenrays_between(WATER, 20.0, source, receiver, vertices=0)
-    assert rays.pair.tolist() == [0, 1]
-    ahead = receiver.reshape(2, 3) - source
-    np.testing.assert_allclose(rays.departure, ahead / np.linalg.norm(ahead, axis=1)[:, None], rtol=1e-13)
 
 
 def test_vertical_rays_and_coincident_ends_in_space() -> None:
@@ -158,11 +138,6 @@ def test_the_product_is_frozen_and_prints_a_short_table() -> None:
     assert repr(rays.select(np.array([0]))).splitlines()[0] == "1 ray"
     passed = rays.select(rays.flag == 3)
     assert len(passed) and "passed a caustic" in str(passed)
-
-
-def test_the_examples_in_the_docstrings_are_true() -> None:
-    tried = doctest.testmod(sonarsynth.propagation.eigenrays)
-    assert tried.attempted >= 4 and tried.failed == 0
 
 
 @pytest.mark.parametrize(

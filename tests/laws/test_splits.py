@@ -74,30 +74,6 @@ def test_each_value_of_the_stratifying_name_is_split_in_the_shares() -> None:
     assert all(abs(found[kind, s] - (20, 10, 10)[s]) <= 1 for kind, s in product(("sphere", "box"), range(3)))
 
 
-def test_no_scene_mesh_pose_or_snap_is_shared_by_splits() -> None:
-    made = recipe(
-        grid=(HULLS,),
-        variations=VARIED,
-        repeats=12,
-        splits=Splits(train=0.6, validation=0.2, test=0.2, stratify="hull"),
-    )
-    held: dict[str, dict[object, set[int]]] = {"scene": {}, "pose": {}, "snap": {}}
-    for index in range(made.frames):
-        scene, frame = made.frame(index)
-        split = made.split(index)
-        body = frame.moment.bodies[0]
-        held["scene"].setdefault(scene, set()).add(split)
-        pose = (body.mesh.digest, *body.pose.position, *body.pose.orientation)
-        held["pose"].setdefault(pose, set()).add(split)
-        for snap in frame.moment.snaps:
-            held["snap"].setdefault(tuple(snap.position), set()).add(split)
-    assert set(splits(made)) == {0, 1, 2}
-    for what, found in held.items():
-        assert len(found) >= made.sequences, what
-        assert all(len(some) == 1 for some in found.values()), what
-    assert not any("in more than one split" in note for note in plan(made).warnings)
-
-
 def test_what_splits_share_is_noted() -> None:
     made = recipe(variations=VARIED[2:], repeats=6, splits=Splits(train=0.5, test=0.5))
     (note,) = [note for note in plan(made).warnings if "more than one split" in note]

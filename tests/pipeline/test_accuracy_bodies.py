@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import mpmath as mp
 import numpy as np
 import pytest
-import typer
 from scipy.integrate import quad
 from scipy.special import j1
 
-from sonarsynth.cli.accuracy_command import HELP, accuracy
-from sonarsynth.cli.running import run
 from sonarsynth.equations.scattering.modal_series import Fluid, cylinder_amplitude, sphere_amplitude
 from sonarsynth.pictures.accuracy_figures.bodies_figure import Curve, Panel, RefinementCurve, bodies_figure
 from sonarsynth.validation import REFERENCES, Row
 from sonarsynth.validation.bodies.body_cases import BAND, SOUND_SPEED, Point, order, trade_rows, wavenumber
 from sonarsynth.validation.bodies.facet_integral import triangle_rows
-from sonarsynth.validation.bodies.plate import DOWN, SIDES, UP, echoes, points_echo, polygon, rectangle, split, tiles
 from sonarsynth.validation.references.cylinder_integral import lit_cylinder
 from sonarsynth.validation.references.front_echo import front_echo
 from sonarsynth.validation.references.triangle_integral import exact_triangle
@@ -53,14 +48,6 @@ def test_echoes_of_facets_are_within_every_bound(rows: dict[str, list[Row]], nam
         assert len(trade) >= 3
         facets = [row.counts["facets"] for row in trade]
         assert facets == sorted(facets)
-
-
-@pytest.mark.long
-def test_facets_get_better_as_they_get_smaller(rows: dict[str, list[Row]]) -> None:
-    for name, body in (("sphere", "rigid sphere, 0.25 m"), ("cylinder", "rigid cylinder, 0.1 by 0.8 m, broadside")):
-        errors = [row.got for row in rows[name] if row.knob == body]
-        assert errors == sorted(errors, reverse=True)
-        assert errors[0] > 4 * errors[-1] > 0
 
 
 def test_triangles_of_many_digits_are_those_of_closed_forms() -> None:
@@ -102,24 +89,6 @@ def test_the_front_echo_of_a_sphere_as_heavy_as_can_be_is_that_of_a_rigid_one(aw
     assert np.abs(front / whole - 1).max() < 0.03
     through = front_echo(BAND, away, 0.25, Fluid(1.0, 1.0), SOUND_SPEED)
     assert np.abs(through).max() < 1e-9
-
-
-def test_plates_are_cut_without_loss_and_points_become_facets() -> None:
-    rng = np.random.default_rng(1)
-    pieces = split(split(rectangle(), rng), rng)
-    assert len(pieces) == 18
-    for corners in (pieces, tiles(5)):
-        doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        assert (doubled[:, 2] > 0).all()
-        assert doubled[:, 2].sum() == pytest.approx(2 * np.prod(SIDES), rel=1e-13)
-    assert 0.5 * np.cross(*np.moveaxis(polygon(6)[:, 1:], 1, 0))[:, 2].sum() == pytest.approx(1.5 * 3**0.5 * 0.09)
-    into, out = DOWN[None], np.array([[0.3, 0.4, np.sqrt(0.75)]])
-    whole = echoes(rectangle(), into, out, BAND)
-    off = [np.abs(points_echo(tiles(n), into, out, BAND) - whole).max() for n in (40, 80, 160)]
-    assert off[0] > 3.5 * off[1] > 12 * off[2] > 0
-    np.testing.assert_allclose(
-        points_echo(rectangle(), into, UP[None], BAND), echoes(rectangle(), into, UP[None], BAND)
-    )
 
 
 def points(power: float, factor: float) -> list[Point]:
@@ -172,37 +141,3 @@ def test_rows_and_picture_are_written(rows: dict[str, list[Row]], tmp_path: Path
     assert {"case", "quantity", "expected", "got", "ok", "cost", "cost_unit", "facets", "knob"} <= set(answer[0])
     assert files[1].stat().st_size > 30_000
     assert set(REFERENCES) - set(PICTURES) == {"bubble"}
-
-
-def test_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    app = typer.Typer()
-    app.command()(accuracy)
-    good = Row("a case", "a reference", "level", "dB", 0.3, 0.1, 2.0, "ms an aspect", {"facets": 9}, note="a note")
-    bad = replace(good, got=0.4, counts={"facets": 9, "values": 7}, note="")
-    for name in BODIES:
-        assert name in HELP
-        monkeypatch.setitem(PICTURES, name, lambda rows: None)
-        monkeypatch.setitem(REFERENCES, name, lambda quick: [good, bad])
-        assert run(app, ["--reference", name, "--out", str(tmp_path)]) == 1
-        out = capfd.readouterr().out
-        assert "ok (1)" in out
-        assert "(1) a note" in out
-        assert "2 ms an aspect" in out
-        assert "2 rows, 1 failed" in out
-        assert str(tmp_path / f"{name}.json") in out
-        assert f"{name}.png" not in out
-        monkeypatch.setitem(REFERENCES, name, lambda quick: [good])
-        assert run(app, ["--reference", name, "--out", str(tmp_path), "--json"]) == 0
-        assert json.loads(capfd.readouterr().out)[0]["facets"] == 9
-
-
-def test_without_mpmath_one_line_says_how_to_get_it(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    app = typer.Typer()
-    app.command()(accuracy)
-    monkeypatch.setattr("sonarsynth.validation.bodies.facet_integral.find_spec", lambda name: None)
-    assert run(app, ["--reference", "sphere", "--out", str(tmp_path)]) == 2
-    said = capfd.readouterr().err
-    assert said.count("\n") == 1
-    assert "pip install 'sonarsynth[accuracy]'" in said

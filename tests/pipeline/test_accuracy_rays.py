@@ -131,11 +131,14 @@ def test_rows_and_picture_are_written(rows: list[Row], tmp_path: Path) -> None:
 def test_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     app = typer.Typer()
     app.command()(accuracy)
-    good = Row("a case", "a reference", "time", "s", 1e-13, 1e-15, 0.7, "us a ray", {"pairs": 3, "rays": 9})
+    good = Row(
+        "a case", "a reference", "time", "s", 1e-13, 1e-15, 0.7, "us a ray", {"pairs": 3, "rays": 9}, note="a note"
+    )
     monkeypatch.setitem(REFERENCES, "rays", lambda quick: [good])
     assert run(app, ["--reference", "rays", "--out", str(tmp_path)]) == 0
     out = capfd.readouterr().out
     assert "a case" in out
+    assert "ok (1)" in out and "(1) a note" in out
     assert "1 rows, all within their bounds" in out
     assert str(tmp_path / "rays.png") in out
     monkeypatch.setitem(REFERENCES, "rays", lambda quick: [good, replace(good, got=1e-12)])

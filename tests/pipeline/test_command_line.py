@@ -182,18 +182,6 @@ def test_the_schema_is_json(command: Command) -> None:
     assert json.loads(answer.out)["title"] == "Recipe"
 
 
-def test_help_names_the_commands_and_loads_nothing_heavy() -> None:
-    code = (
-        "import sys\nfrom sonarsynth.cli import main\n"
-        "try:\n    main(['--help'])\nfinally:\n    print(*sys.modules, file=sys.stderr)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=HERE)
-    for name in ("build", "plan", "verify", "show", "schema"):
-        assert f" {name} " in done.stdout
-    loaded = {name.partition(".")[0] for name in done.stderr.split()}
-    assert loaded & {"numpy", "pydantic", "zarr", "xarray", "dask", "distributed", "numba", "scipy", "ruamel"} == set()
-
-
 def test_frames_and_products_are_read() -> None:
     assert frame_numbers(None, 9) is None
     assert frame_numbers("0:3, 8,7:", 9) == (0, 1, 2, 7, 8)

@@ -199,13 +199,6 @@ def test_plan_says_what_is_spanned(spanning: Path, capfd: pytest.CaptureFixture[
     assert made["splits"] == {"train": 4, "validation": 0, "test": 4}
 
 
-def test_the_schema_covers_the_grid() -> None:
-    schema = reading.schema()
-    assert {"grid", "variations", "repeats", "splits"} <= schema["properties"].keys()
-    assert {"Axis", "Zip", "Uniform", "Normal", "Choice", "Sobol", "Splits"} <= schema["$defs"].keys()
-    assert all("description" in schema["$defs"][name] for name in ("Axis", "Sobol", "Splits"))
-
-
 START, SHAPE = "scene.world.targets.0.motion.start", "scene.world.targets.0.shape"
 WRONG = [
     ("[9 m, 1100 cm]", "[9 m, 11 kHz]", f"18: grid.0.values.1: {START}.0: has unit 'kHz'; use one of m, km"),

@@ -198,21 +198,6 @@ def test_yaml_is_1_2() -> None:
     assert (recipe.title, recipe.seed, recipe.scene.world.environment.depth) == ("no", 10, 100.0)
 
 
-def test_the_schema_keeps_units_kinds_and_descriptions() -> None:
-    schema = reading.schema()
-    assert schema["title"] == "Recipe"
-    named = schema["$defs"]
-    assert {"Scene", "Tabulated", "Romanis", "Box"} <= named.keys()
-    assert named["Environment"]["properties"]["depth"]["description"].startswith("Depth of the bottom")
-    assert named["Box"]["properties"]["kind"]["const"] == "box"
-    assert named["World"]["description"] == "What there is."
-    depth, text = named["Environment"]["properties"]["depth"]["anyOf"]
-    assert (depth["description"], depth["exclusiveMinimum"], depth["maximum"]) == ("in m", 0, 12e3)
-    assert "km" in text["pattern"]
-    acidity = named["Absorption"]["properties"]["ph"]
-    assert (acidity["minimum"], acidity["maximum"]) == (0, 14)
-
-
 numbers = st.floats(-1e3, 1e3, allow_subnormal=False)
 positive = st.floats(1e-3, 1e3)
 angles = st.floats(-7, 7)

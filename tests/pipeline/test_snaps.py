@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.random import default_rng
-from ruamel.yaml import YAML
 
 from sonarsynth import schedule
 from sonarsynth.cli import app
@@ -170,13 +169,3 @@ def test_snaps_that_cannot_be_are_refused_in_one_line(tmp_path: Path, snap: str,
             plan(reading.recipe_of(source))
     assert isinstance(caught.value, (reading.RecipeError, FieldError))
     assert "\n" not in str(caught.value)
-
-
-def test_the_schema_knows_every_kind() -> None:
-    jsonschema = pytest.importorskip("jsonschema")
-    check = jsonschema.Draft202012Validator(reading.schema())
-    for snap in SNAPS.values():
-        data = YAML(typ="safe", pure=True).load(TEXT.replace("SNAP", snap))
-        assert not list(check.iter_errors(data))
-    data["scene"]["world"]["sources"][0]["snap"]["kinds"] = 1
-    assert list(check.iter_errors(data))

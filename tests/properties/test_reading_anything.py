@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -19,13 +18,10 @@ from sonarsynth.recipe.reading import RecipeError
 from sonarsynth.recipe.reading.yaml_source import read_file, read_text
 from sonarsynth.sources.recordings import RecordingError, read_recording
 from sonarsynth.sources.snap_models import RecordedSnap
-from sonarsynth.targets.meshes import MeshError, mesh_of
-from sonarsynth.targets.shapes import MeshFile
 
 few = settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 RECIPE = (Path(__file__).parents[2] / "configs" / "grid.yaml").read_text()
 CAST = "% Start latitude,-36.2\nDepth (m),Temperature (C),Salinity (psu)\n0.5,20.1,35\n4,19.7,35.1\n20,15,35.2\n"
-SNAP = "time (us),pressure (Pa)\n" + "".join(f"{t},{p}\n" for t, p in enumerate((0, 0, 1, 9, -3, 1, 0, 0)))
 
 cell = st.one_of(
     st.floats().map(repr),
@@ -58,16 +54,6 @@ def test_any_text_is_read_as_a_recipe_or_refused(text: str) -> None:
         assert re.match(r"x\.yaml:\d+: ", str(error))
     else:
         raise AssertionError("no recipe is so short")
-
-
-@few
-@given(st.binary(max_size=100))
-def test_any_bytes_are_read_as_a_recipe_or_refused(tmp_path: Path, data: bytes) -> None:
-    file = tmp_path / "x.yaml"
-    file.write_bytes(data)
-    with pytest.raises(RecipeError) as error:
-        reading.load(file)
-    one_line(error.value, file)
 
 
 @few
@@ -121,52 +107,6 @@ def test_a_cast_with_one_other_number_is_a_profile_of_water_or_refused(tmp_path:
     else:
         assert np.isfinite(profile.speed).all() and (np.diff(profile.depth) >= 0).all()
         assert (profile.speed > 1300).all() and (profile.speed < 1700).all() and profile.depth.max() <= 12e3
-
-
-@few
-@given(st.integers(0, 99), cell)
-def test_a_recording_with_one_other_number_is_a_pulse_or_refused(tmp_path: Path, where: int, value: str) -> None:
-    file = tmp_path / "snap.csv"
-    file.write_text(exchanged(SNAP, where, value))
-    try:
-        recording = read_recording(RecordedSnap(path=str(file)))
-    except RecordingError as error:
-        one_line(error, file)
-    else:
-        assert np.isfinite(recording.pressure).all() and recording.pressure.any()
-        assert 0 <= recording.zero <= recording.pressure.size - 1 and recording.sampling_frequency > 0
-
-
-@few
-@given(st.sampled_from(["stl", "obj", "ply", "off", "glb"]), st.binary(max_size=150), st.booleans())
-def test_any_bytes_are_no_mesh(tmp_path: Path, ending: str, data: bytes, begun: bool) -> None:
-    start = {
-        "stl": b"solid facet",
-        "obj": b"v 0 0 0\nf ",
-        "ply": b"ply\nformat ascii 1.0\n",
-        "off": b"OFF\n",
-        "glb": b"glTF",
-    }
-    file = tmp_path / f"x.{ending}"
-    file.write_bytes((start[ending] if begun else b"") + data)
-    with pytest.raises(MeshError) as error:
-        mesh_of(MeshFile(path=str(file)))
-    one_line(error.value, file)
-
-
-@few
-@given(st.sampled_from(["stl_ascii", "obj", "off"]), st.integers(0, 10_000), cell)
-def test_a_mesh_with_one_other_number_is_usable_or_refused(tmp_path: Path, kind: str, where: int, value: str) -> None:
-    text = str(trimesh.creation.box((1, 1, 1)).export(file_type=kind))
-    file = tmp_path / f"x.{kind.partition('_')[0]}"
-    file.write_text(exchanged(text, where, value))
-    try:
-        mesh = mesh_of(MeshFile(path=str(file)))
-    except MeshError as error:
-        one_line(error, file)
-    else:
-        assert np.isfinite(mesh.vertices).all() and mesh.area.min() > 0
-        assert 1e-3 <= np.ptp(mesh.box, axis=0).max() <= 1e4
 
 
 def test_a_recipe_is_read_from_a_plain_file(tmp_path: Path) -> None:
