@@ -151,10 +151,11 @@ def build(
     chosen = product_names(products)
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
+    with reading.locating(source):
+        wanted = chosen_frames(frames, sequences, made_from.spanned.first_frames.tolist())
+    stores.try_writing(stores.folder_of(store))
     with reading.locating(source), printing.planning():
         plan = planning.plan(made_from, chosen)
-    wanted = chosen_frames(frames, sequences, made_from.spanned.first_frames.tolist())
-    stores.try_writing(stores.folder_of(store))
     prediction = None
     if predicting and scheduler is None and (restart or stores.missing(store, plan, wanted)):
         with printing.planning("timing frames"):

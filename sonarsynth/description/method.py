@@ -19,6 +19,7 @@ class Demand:
     error: Callable[[Any], float]  # what a method errs by against the exact one of the family, measured in some frames
     elements: Any = None  # of the array
     off_bottom: bool = False  # some source is not on the bottom
+    reflected: bool = False  # sound is reflected by surface and bottom
 
 
 @dataclass(frozen=True)

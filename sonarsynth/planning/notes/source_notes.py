@@ -23,7 +23,8 @@ def standing_off(scene: Scene) -> tuple[str, ...]:
 
 def locator(scene: Scene) -> LocatingMethod:
     """How the sonar locates sources, knowing what it is told of where they stand."""
-    demand = Demand(0.0, False, lambda method: 0.0, off_bottom=bool(standing_off(scene)))
+    off_bottom, reflected = bool(standing_off(scene)), scene.physics.tracing.bounces > 0
+    demand = Demand(0.0, False, lambda method: 0.0, off_bottom=off_bottom, reflected=reflected)
     locating: LocatingMethod = scene.processing.locating.resolve(demand)[0]
     return locating
 

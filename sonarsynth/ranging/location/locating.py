@@ -81,6 +81,7 @@ def locate(
     gradient: float = 0.0,
     kink: float = 0.0,
     on_bottom: bool = True,
+    bottom_reflects: bool = False,
 ) -> SourceEstimates:
     """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`. bottom: its depth (m).
 
@@ -101,7 +102,9 @@ def locate(
     loud = pulse_times.loudness(signals, live, width)
     rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
     quiet = pulse_times.quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
-    knowledge = SonarKnowledge(elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink)
+    knowledge = SonarKnowledge(
+        elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, bottom_reflects
+    )
     track, candidates = loud.track.copy(), Candidates(knowledge)
     for _ in range(4 * snaps):
         top = _loudest(track, candidates, signals, snaps)

@@ -11,7 +11,7 @@ from sonarsynth.state import Emission, Receiver, Survey, Trigger
 
 
 class LocatingMethod(Method):
-    """Finds where snaps are from what the array hears. `Demand.off_bottom` tells `resolve` of the recipe's sources."""
+    """Finds where snaps are from what the array hears. `Demand` tells `resolve` of the recipe's sources and paths."""
 
     def locate(self, signals: Signals, receiver: Receiver, survey: Survey, snaps: int) -> SourceEstimates:
         """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found."""

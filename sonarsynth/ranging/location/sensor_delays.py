@@ -35,10 +35,16 @@ class SensorDelays(LocatingMethod):
     """Whether sources are known to be on the bottom. True: its depth is used where the wavefront agrees;
     false (pingers, vehicles, fish): places are those of the wavefront alone. Left out: as the sources of the recipe."""
 
+    bottom_reflects: bool | None = None
+    """Whether a source on the bottom is heard with its reflection there, which turns its phase by its angle and so
+    moves where the source is heard, up or down, by about half a wavelength (Goos and Haenchen 1947): predicted errors
+    then hold that. Left out: as the paths of the recipe."""
+
     def resolve(self, demand: Demand) -> tuple[SensorDelays, float]:
-        """With what the recipe says of its sources, where this is left out."""
-        told = self if self.on_bottom is not None else replace(self, on_bottom=not demand.off_bottom)
-        return told, UNSTATED
+        """With what the recipe says of its sources and paths, where this is left out."""
+        on_bottom = not demand.off_bottom if self.on_bottom is None else self.on_bottom
+        reflects = demand.reflected if self.bottom_reflects is None else self.bottom_reflects
+        return replace(self, on_bottom=on_bottom, bottom_reflects=reflects), UNSTATED
 
     def nearest(self, elements: Elements) -> float:
         """As `LocatingMethod.nearest`: there is no wavefront over an array that its source is in."""
@@ -62,4 +68,5 @@ class SensorDelays(LocatingMethod):
         return locate(
             signals, receiver, survey.bottom, snaps, bend=bend, gradient=0.0 if bend else gradient,
             kink=kink(profile, own, aperture) if aperture else 0.0, on_bottom=self.on_bottom is not False,
+            bottom_reflects=self.bottom_reflects is True,
         )  # fmt: skip

@@ -30,6 +30,11 @@ KINKED = 3 / 16
 """A sphere fitted to a wavefront through a kink at the middle of an array of radius a, where the gradient of the sound
 speed changes by dg, is tilted by 3 dg a/(16 c): least squares of z|z| by z over -a..a."""
 
+REFLECTED = 0.5
+"""Wavelengths at the band centre, up or down, by which a source on the bottom is heard elsewhere for its reflection:
+over a fluid sediment the phase turns by up to 8 rad per rad of grazing angle (Brekhovskikh and Lysanov 2003, section
+3.1), and half of that is left in the sum with the direct pulse."""
+
 ACCEPTED, SILENT, ARRAY, BAND, UNFIT, UNRESOLVED, OUTSIDE, ECHO, RANGE = range(len(REASONS))
 
 
@@ -66,6 +71,7 @@ class SonarKnowledge:
     quiet: float  # (Pa s)^2: power in a bin of the noise at a sensor
     on_bottom: bool = True  # whether sources may be taken to be on the bottom, where the wavefront agrees
     kink: float = 0.0  # 1/s: change of the gradient of the sound speed over the array
+    bottom_reflects: bool = False  # whether a source on the bottom is heard with its reflection there
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,12 +111,10 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
     elements, sonar, pose = knowledge.elements, knowledge.sonar, knowledge.pose
     bent = bent or wave
     timing = lag_variance(wave, pulse, elements, knowledge.rounding) * wave.covariance
-    full = timing + np.outer(wave.by_sound_speed, wave.by_sound_speed) * sonar.sound_speed_error**2
-    if not np.isfinite(full[2, 2]):  # too few sensors to tell the curvature: anything outside the array
-        full[2, 2] = 1 / elements.aperture**2
     fall = -knowledge.bottom_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
     slope, by_angle = float(pose.rotation[2] @ wave.direction), wave.tangents @ pose.rotation[2]
     from_depth = fall / slope if slope * fall > 0 else np.nan
+    full = _straight_covariance(wave, timing, by_angle / from_depth, knowledge)
     tilt = by_angle * (KINKED * knowledge.kink * elements.aperture / sonar.assumed_sound_speed)
     straight, spread = full, full[:2, :2] + np.outer(tilt, tilt)
     around = spread[0, 0] / max(1 - bent.direction[2] ** 2, 1e-300)
@@ -152,6 +156,21 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
         chord=wave.direction,
         amplitude=float(np.sqrt(np.sum(np.abs(pulse.template) ** 2))),
     )
+
+
+def _straight_covariance(wave: Wavefront, timing: Floats, by_height: Floats, knowledge: SonarKnowledge) -> Floats:
+    """Covariance (4, 4) of a wavefront's parameters along straight rays, from that of its delays.
+
+    by_height (2,): change of its tangents with the height of a source on the bottom, 1/m; NaN where that is not seen.
+    """
+    sonar = knowledge.sonar
+    full = timing + np.outer(wave.by_sound_speed, wave.by_sound_speed) * sonar.sound_speed_error**2
+    if not np.isfinite(full[2, 2]):  # too few sensors to tell the curvature: anything outside the array
+        full[2, 2] = 1 / knowledge.elements.aperture**2
+    if knowledge.on_bottom and knowledge.bottom_reflects and np.isfinite(by_height).all():
+        moved = by_height * (REFLECTED * sonar.assumed_sound_speed / sonar.band.centre)
+        full[:2, :2] += np.outer(moved, moved)
+    return full
 
 
 def _fuse(wave: Wavefront, covariance: Floats, fall: float, knowledge: SonarKnowledge) -> Fix:
@@ -240,21 +259,8 @@ def refused(reason: int) -> SourceFix:
     """A row of which nothing is known but why."""
     none, pair = np.full(3, np.nan), (np.nan, np.nan)
     return SourceFix(
-        np.nan,
-        np.nan,
-        none,
-        none[:2],
-        pair,
-        pair,
-        none,
-        np.full((3, 3), np.nan),
-        np.nan,
-        -1,
-        reason,
-        pair,
-        none,
-        np.nan,
-    )
+        np.nan, np.nan, none, none[:2], pair, pair, none, np.full((3, 3), np.nan), np.nan, -1, reason, pair, none, np.nan,
+    )  # fmt: skip
 
 
 def as_estimates(rows: list[SourceFix], snaps: int, reason: int = SILENT) -> SourceEstimates:
