@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonarsynth.equations.reverberation.speckle import SINC
 from sonarsynth.frontiers.exact_frame import Pressures, differences, golden, pressures
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
@@ -24,8 +23,6 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis, Synthesis
 from sonarsynth.signals.auto_synthesis import PRECISIONS, deposit_for
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.gridded_synthesis import kernel_error
-from sonarsynth.tracing.reverberation.families import STEP
-from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
 
 WIDEST = 14
 OVER_KERNEL = (1.0, 10.0, 100.0)
@@ -180,19 +177,10 @@ def speckle_points(plan: Plan, frame: Frame, signals: Signals) -> Iterator[Point
             stage="reverberation",
             knob="speckle",
             setting=f"{speckle:g}",
-            error=contrast_error(arrivals, band.high - band.low),
+            error=arrivals.contrast_error(band.high - band.low),
             unit="of the contrast",
             allowed=chosen,
             seconds=seconds,
             chosen=speckle == chosen,
             also={"scatterers": float(len(arrivals.delay)), "level_db": level},
         )
-
-
-def contrast_error(arrivals: ReverberationArrivals, bandwidth: float) -> float:
-    """By what part <I^2>/<I>^2 of scatterers heard with this bandwidth (Hz) is over that of very many, 2: J/(2 n), n
-    the scatterers within 1/bandwidth that their energies are as good as, in steps of time weighed by their energy."""
-    steps = np.floor(arrivals.delay / STEP).astype(np.int64)
-    _, step = np.unique(steps, return_inverse=True)
-    energy, squares = (np.bincount(step, arrivals.energy**power) for power in (1, 2))
-    return float(0.5 * SINC * bandwidth * STEP * (squares / energy).sum() / energy.sum())

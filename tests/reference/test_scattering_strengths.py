@@ -38,12 +38,12 @@ def albedo(strength: np.ndarray, sine_out: np.ndarray, solid_angle: np.ndarray, 
     return float(np.sum(np.where(sine_out > 0.0, strength, 0.0) * solid_angle) / sine_in)
 
 
-def hemisphere(zeniths: int = 400, azimuths: int = 480) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sines of grazing angles, cosines of azimuths and weights (sr) of directions of equal solid angle."""
-    sine = (np.arange(zeniths) + 0.5) / zeniths
-    forward = np.cos((np.arange(azimuths) + 0.5) * 2.0 * np.pi / azimuths)
-    s, f = (a.ravel() for a in np.meshgrid(sine, forward))
-    return s, f, np.full(s.size, 2.0 * np.pi / s.size)
+def hemisphere(zeniths: int = 160, azimuths: int = 160) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sines of grazing angles, cosines of azimuths and weights (sr) of directions: denser near grazing and forward."""
+    (x, wx), (t, wt) = (np.polynomial.legendre.leggauss(n) for n in (zeniths, azimuths))
+    x, t = 0.5 * (x + 1.0), 0.5 * (t + 1.0)
+    s, f = (a.ravel() for a in np.meshgrid(x**2, np.cos(np.pi * t**2)))
+    return s, f, np.outer(2.0 * np.pi * t * wt, x * wx).ravel()
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
@@ -112,33 +112,19 @@ def test_a_table_gives_back_no_more_than_arrives(grazing: float) -> None:
     assert share == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.mark.parametrize("wind", [0.0, 0.5, 3.0, 10.0])
-def test_facets_give_back_what_the_coherent_reflection_lost(wind: float) -> None:
-    """Of waves that are far higher than the wavelength all that arrives from steeply above, of a smooth sea nothing."""
+@pytest.mark.parametrize("height", [None, 0.0, 0.2e-3, 1e-3, 3e-3, 1.0])
+@pytest.mark.parametrize("wind", [0.0, 1.0, 3.0, 5.0, 20.0])
+def test_facets_and_coherent_reflection_give_back_all_and_never_more(wind: float, height: float | None) -> None:
+    """Eckart's coherent power and the albedo of facets, at any grazing angle: none of a smooth sea, all of waves far
+    higher than the wavelength. height: rms in m; none: that of the wind. Waves that hide each other keep some."""
     sine, forward, weight = hemisphere()
-    angles = Angles(np.full(sine.size, np.sin(np.deg2rad(70.0))), sine, forward)
-    whole = albedo(facets(angles, WAVENUMBER, wind, 1.0), sine, weight, float(np.sin(np.deg2rad(70.0))))
-    assert whole == pytest.approx(1.0, abs=0.06)
-    height = 0.3 / (2.0 * WAVENUMBER * np.sin(np.deg2rad(70.0)))
-    some = albedo(facets(angles, WAVENUMBER, wind, height), sine, weight, float(np.sin(np.deg2rad(70.0))))
-    assert some == pytest.approx(1.0 - np.exp(-0.09), rel=0.08)
-    assert not facets(angles, WAVENUMBER, wind, 0.0).any()
-
-
-@pytest.mark.parametrize("wind", [1.0, 3.0, 5.0, 20.0])
-def test_facets_and_coherent_reflection_give_back_all_and_never_more(wind: float) -> None:
-    """Eckart's coherent power and the albedo of facets; near grazing, waves hide each other and less comes back.
-
-    Below about 3 degrees the lobe gives back up to half as much again: it has steeper ways out than in."""
-    sine, forward, weight = hemisphere()
-    height = 0.00533 * wind**2  # Pierson and Moskowitz
-    for grazing in (5.0, 10.0, 20.0, 45.0, 80.0):
+    height = 0.00533 * wind**2 if height is None else height  # Pierson and Moskowitz
+    for grazing in (0.1, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 45.0, 80.0):
         down = float(np.sin(np.deg2rad(grazing)))
         coherent = np.exp(-((2.0 * WAVENUMBER * height * down) ** 2))
         angles = Angles(np.full(sine.size, down), sine, forward)
         whole = coherent + albedo(facets(angles, WAVENUMBER, wind, height), sine, weight, down)
-        assert whole < 1.03, grazing
-        assert whole > (0.93 if grazing >= 20.0 else 0.7), grazing
+        assert (0.91 if grazing >= 45.0 else 0.84) < whole < 1.01, grazing
 
 
 def test_no_angle_and_no_wind_makes_a_missing_number() -> None:

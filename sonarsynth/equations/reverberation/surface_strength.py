@@ -21,18 +21,21 @@ def slope_variance(wind_speed: float) -> float:
 
 
 def facets(angles: Angles, wavenumber: float, wind_speed: float, rms_height: float) -> Floats:
-    """Of the facets of waves (...) in 1/sr: the lobe of slopes times 1 - exp(-g^2), g = k h (sin q_i + sin q_s).
+    """Of the facets of waves (...) in 1/sr: the lobe of slopes times 1 - exp(-g^2), g = 2 k h sin q of the direction
+    that is nearer to grazing.
 
-    What they give back is what the coherent reflection lost (Eckart): exp(-g^2) of the power is left to that. The lobe
-    is that of Barrick (1968), `lobes.slope_lobe`; slopes by `slope_variance`; waves hide each other near grazing, or
-    more would come back than arrives (`unshadowed`).
+    What they give back is what the coherent reflection lost (Eckart), exp(-g^2) of the power is left to that. By the
+    mean of both sines steep ways out would take more from a wave near grazing than it lost, up to 1.8 times what
+    arrives. The lobe is that of Barrick (1968), `lobes.slope_lobe`; slopes by `slope_variance`; waves hide each other
+    near grazing (`unshadowed`).
     """
     level, upright = angles.half
     spread = slope_variance(wind_speed)
     steep = np.maximum(upright, 1e-9)
     lobe = np.exp(-level / (steep**2 * spread)) * ((level + steep**2) / steep**2) ** 2 / (4.0 * np.pi * spread)
     lobe *= unshadowed(angles, spread)
-    return np.asarray(-np.expm1(-((2.0 * wavenumber * rms_height * upright) ** 2)) * lobe)
+    nearer = np.minimum(angles.sine_in, angles.sine_out)
+    return np.asarray(-np.expm1(-((2.0 * wavenumber * rms_height * nearer) ** 2)) * lobe)
 
 
 def unshadowed(angles: Angles, spread: float) -> Floats:

@@ -29,6 +29,10 @@ GRAZING = np.sin(np.deg2rad(np.arange(5.0, 86.0, 5.0)))
 """Sines of the grazing angles at which strengths are compared."""
 
 
+COUNTED = 0.1
+"""Error of the contrast, at least, at which scatterers are counted for what they make it."""
+
+
 @dataclass(frozen=True)
 class ReverberationLevels:
     """What a frame has of reverberation."""
@@ -94,9 +98,26 @@ def noise_power(scene: Scene) -> float:
     return density * (band.high - band.low)
 
 
+@lru_cache(maxsize=16)
+def _spread(plan: Plan) -> float:
+    """How many times the error of the contrast is what scatterers that are alike would make it: counted in the first
+    frame of the sequence of a plan, whose energies differ within cells and within steps of time."""
+    frame, coarse = (
+        plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1],
+        max(COUNTED, plan.recipe.accuracy.speckle),
+    )
+    band = plan.scene.sonar.band
+    arrivals = _scatterers(plan, frame, frame_start(plan, frame), coarse, 1.0)
+    return arrivals.contrast_error(band.high - band.low) / coarse if len(arrivals.delay) else 1.0
+
+
 def frame_scatterers(plan: Plan, frame: Frame, start: float) -> ReverberationArrivals:
     """The reverberation of a frame whose record begins at `start` (s); `plan` is that of its sequence. Raises
     ValueError where a boundary has no strength, or scatterers are too many."""
+    return _scatterers(plan, frame, start, plan.recipe.accuracy.speckle, _spread(plan))
+
+
+def _scatterers(plan: Plan, frame: Frame, start: float, speckle: float, spread: float) -> ReverberationArrivals:
     scene, snaps = plan.scene, frame.moment.snaps
     described = scene.world.reverberation
     assert described is not None
@@ -106,7 +127,8 @@ def frame_scatterers(plan: Plan, frame: Frame, start: float) -> ReverberationArr
         start - before,
         start + plan.windows.samples / sonar.sampling_frequency + after,
         sonar.band.high - sonar.band.low,
-        plan.recipe.accuracy.speckle,
+        speckle,
+        spread,
         sent_energy(snaps, scene),
         noise_power(scene) / plan.elements.count,
     )

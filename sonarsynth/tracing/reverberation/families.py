@@ -33,6 +33,7 @@ class ReverberationWindow(NamedTuple):
     stop: float
     bandwidth: float  # Hz
     speckle: float  # error of the contrast that is allowed
+    spread: float  # how many times as many scatterers that takes as if those that arrive together were alike
     sent: Floats  # (snap,) Pa2 s: energy of each pulse in the band at 1 m
     noise: float  # Pa2: power of the noise of a beam in the band
 
@@ -152,7 +153,7 @@ def expected_counts(families: list[Family], listening: ReverberationWindow, bins
     As the root of what it sends, so that those of quiet directions are quiet too. Of so many (i) with energies e the
     spread of intensities is sum e^1.5 sum e^0.5/(sum e)^2: those that arrive together are as many as that takes.
     """
-    many = scatterers_per_pulse(listening.speckle) * listening.bandwidth * STEP
+    many = scatterers_per_pulse(listening.speckle, listening.spread) * listening.bandwidth * STEP
     which = [time_bins(f.paths.delay, listening, bins) for f in families]
     total, steep = np.zeros(bins), np.zeros(bins)
     for f, b in zip(families, which, strict=True):

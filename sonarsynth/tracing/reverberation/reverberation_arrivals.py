@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.environment.reverberation import Reverberation
+from sonarsynth.equations.reverberation.speckle import SINC
 from sonarsynth.products.pulse_arrivals import PulseArrivals
 from sonarsynth.randomness import number
 from sonarsynth.sources.sound_source import Emission
@@ -54,6 +55,13 @@ class ReverberationArrivals(PulseArrivals):
     def before(self) -> Floats:
         """As `PulseArrivals.before`."""
         return self.lit_from
+
+    def contrast_error(self, bandwidth: float) -> float:
+        """By what part <I^2>/<I>^2 at a hydrophone of this bandwidth (Hz) is over that of very many, 2: J/(2 n), n the
+        scatterers within 1/bandwidth that their energies are as good as, in steps of time weighed by their energy."""
+        _, step = np.unique(np.floor(self.delay / STEP).astype(np.int64), return_inverse=True)
+        energy, squares = (np.bincount(step, self.energy**power) for power in (1, 2))
+        return float(0.5 * SINC * bandwidth * STEP * (squares / energy).sum() / energy.sum())
 
     @staticmethod
     def _whole() -> tuple[str, ...]:
