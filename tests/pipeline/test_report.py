@@ -162,13 +162,14 @@ def test_a_browser_without_a_network_draws_the_page(store: Path, page: Page, tmp
     options = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'browser'}"]
     options += ["--enable-logging=stderr", "--virtual-time-budget=20000", "--dump-dom"]
     nowhere = "--host-resolver-rules=MAP * ~NOTFOUND"
-    file = store.with_name("s.zarr.report.html").resolve().as_uri()
+    file = store.with_name("page.v2.html").resolve().as_uri()
     done = subprocess.run([CHROMIUM, *options, nowhere, file], capture_output=True, text=True, timeout=120, check=True)
     drawn = Page(done.stdout)
     classes = [str(attributes.get("class")) for _, attributes in drawn.elements]
     figures = sum("js-plotly-plot" in name.split() for name in classes)
     written = sum("plotly-graph-div" in str(attributes.get("class")) for _, attributes in page.elements)
     assert figures == written >= 4
+    assert any(tag == "image" for tag, _ in drawn.elements), "the film shows no image"
     assert sum(name == "main-svg" for name in classes) >= figures
     assert json.loads(drawn.numbers) == json.loads(page.numbers) and drawn.rows[: len(page.rows)] == page.rows
     bars = sum(name == "point" for name in classes)

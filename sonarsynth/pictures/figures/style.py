@@ -33,6 +33,9 @@ MARKS = RAYS[:3]
 
 WINDS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
 
+PAGE_CONFIG = {"displaylogo": False, "responsive": True, "showSendToCloud": False, "plotlyServerURL": ""}
+"""Nothing leads out of a page: plotly 7 has a button that sends it away."""
+
 INK = "#222222"
 PALE = "#8a8a8a"
 

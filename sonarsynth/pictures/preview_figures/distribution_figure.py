@@ -117,7 +117,7 @@ def _field_of_view(row: Sequence[Axes], name: str, sampled: SampledGeometry) -> 
         for sign in (-1.0, 1.0):
             axes.axvline(sign * _half_span(name, sampled), color=PALE, linewidth=1.0, linestyle="-.")
         axes.annotate(
-            "dash-dotted: field of view", (0.99, 0.9), xycoords="axes fraction", ha="right", fontsize=7, color=PALE
+            "dash-dotted: field of view", (0.96, 0.9), xycoords="axes fraction", ha="right", fontsize=7, color=PALE
         )
 
 

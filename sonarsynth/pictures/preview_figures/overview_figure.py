@@ -13,8 +13,6 @@ from sonarsynth.conventions import Floats
 from sonarsynth.pictures.figures.style import INK, PALE, RAYS, compass, figure, grid, label, settle
 from sonarsynth.pictures.ray_figures.scene_drawing import (
     AXES,
-    BOTTOM,
-    SURFACE,
     TRACK,
     VIEW,
     bodies_in_space,
@@ -195,7 +193,6 @@ def _legend(fig: Figure, overview: Overview) -> None:
     from matplotlib.lines import Line2D
 
     handles = [Line2D([], [], color=VIEW, linestyle="-.", label="field of view on its two planes")]
-    handles += [Line2D([], [], color=c, label=name) for name, c in (("surface", SURFACE), ("bottom", BOTTOM))]
     names = list(overview.boxes)
     for name in names[:MOST_NAMED]:
         track = ", track" if name in overview.geometry.tracks else ""

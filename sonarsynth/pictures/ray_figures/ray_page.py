@@ -11,7 +11,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.pictures.figures.frame_figure import Hull
 from sonarsynth.pictures.figures.outlines import union_outline
-from sonarsynth.pictures.figures.style import ERROR_MAP, INK, compass
+from sonarsynth.pictures.figures.style import ERROR_MAP, INK, PAGE_CONFIG, compass
 from sonarsynth.pictures.ray_figures.ray_styles import FAN, Look, Style, drawing_order, highest_coefficient, styles
 from sonarsynth.pictures.ray_figures.scene_drawing import AXES, BOTTOM, SURFACE, TRACK, VIEW
 from sonarsynth.pictures.ray_figures.scene_geometry import SceneGeometry
@@ -24,8 +24,6 @@ MOST_FACETS = 20_000
 EXAGGERATIONS = (1, 2, 5, 10)
 EVERY = "all paths"
 GREY = "#b8b8b8"
-CONFIG = {"displaylogo": False, "responsive": True, "showSendToCloud": False, "plotlyServerURL": ""}
-"""Nothing leads out of the page: plotly 7 has a button that sends it away."""
 HERE = "<br>here: %{customdata[0]:.4f} ms, %{customdata[1]:.3f} m along, %{customdata[2]:.2f} deg up<extra></extra>"
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title></head>
@@ -41,7 +39,7 @@ def page(rays: Mapping[str, Any], looks: Sequence[Look], geometry: SceneGeometry
     plotly.js is in the page (5 MB), so that it is one file and needs no network.
     """
     drawn = page_figure(rays, looks, geometry).to_html(
-        full_html=False, include_plotlyjs=True, div_id="rays", config=CONFIG
+        full_html=False, include_plotlyjs=True, div_id="rays", config=PAGE_CONFIG
     )
     return PAGE.format(title=escape(rays["title"]), figure=drawn)
 
@@ -144,8 +142,9 @@ def _section(rays: Mapping[str, Any], geometry: SceneGeometry) -> Iterator[Any]:
         for line in union_outline(geometry.on_plane(hull.vertices), hull.faces):
             shade = {"fill": "toself", "fillcolor": GREY, "mode": "lines", "line_color": INK, "line_width": 1}
             yield go.Scatter(x=line[:, 0], y=line[:, 1], name=escape(hull.name), **shade, **quiet)
-    x, y = geometry.on_plane(np.array(list(geometry.places.values()))).T
-    words = {"text": list(geometry.places), "mode": "markers+text", "textposition": "top center"}
+    places = geometry.places | {escape(h.name): h.vertices[h.vertices[:, 2].argmax()] for h in geometry.hulls}
+    x, y = geometry.on_plane(np.array(list(places.values()))).T
+    words = {"text": list(places), "mode": "markers+text", "textposition": "top center", "cliponaxis": False}
     yield go.Scatter(x=x, y=y, marker_color=INK, name="", zorder=1, **words, **quiet)
 
 
@@ -202,7 +201,7 @@ def _lay_out(
     menus = [{"buttons": taller, "x": 0.0}, {"buttons": chosen, "x": 0.16}]
     axes = {f"{axis}axis": {"title": name} for axis, name in zip("xyz", AXES, strict=True)}
     angle = geometry.bearing - 0.5 * np.pi + 0.4
-    eye = {"x": 1.3 * np.cos(angle), "y": 1.3 * np.sin(angle), "z": 0.6}
+    eye = {"x": 1.75 * np.cos(angle), "y": 1.75 * np.sin(angle), "z": 0.8}  # no name of an axis is cut off
     subtitle = f"frame {rays['frame']}, {len(rays['rays'])} rays"
     fig.update_layout(
         title={"text": f"{escape(rays['title'])}: {subtitle}", "font": {"size": 15}},
@@ -210,13 +209,22 @@ def _lay_out(
         height=900,
         margin={"l": 60, "r": 20, "t": 90, "b": 50},
         updatemenus=[{**menu, "y": 1.0, "yanchor": "bottom", "xanchor": "left"} for menu in menus],
-        scene={**axes, "aspectmode": "manual", "aspectratio": shape[0], "camera": {"eye": eye}},
+        scene={
+            **axes,
+            "aspectmode": "manual",
+            "aspectratio": shape[0],
+            "camera": {"eye": eye, "center": {"x": 0, "y": 0, "z": -0.12}},
+        },
         hoverlabel={"align": "left"},
         uirevision="same",  # menus leave the view as it was turned
     )
     fig.update_xaxes(title="sound speed (m/s)", tickformat=".6~g", nticks=4, row=2, col=1)
     fig.update_yaxes(title="up, z (m)", row=2, col=1)
-    fig.update_xaxes(title=f"distance from the array towards {compass(geometry.bearing)} (m)", row=2, col=2)
+    fig.update_xaxes(
+        title=f"distance from the array towards {compass(geometry.bearing)} (m); heights on a scale of their own",
+        row=2,
+        col=2,
+    )
     if strongest:
         scale = {"colorscale": ERROR_MAP, "cmin": 0.0, "cmax": strongest, "color": [0.0], "showscale": True}
         bar = {"title": "coefficient", "len": 0.4, "y": 0.35}

@@ -20,9 +20,11 @@ AXES = ("east, x (m)", "north, y (m)", "up, z (m)")
 
 
 def surface_and_bottom(axes: Axes, bottom: float) -> None:
-    """Lines at the surface and at the depth of the bottom (m)."""
-    for z, colour in ((0.0, SURFACE), (-bottom, BOTTOM)):
+    """Lines at the surface and at the depth of the bottom (m), with their names at the right."""
+    for name, z, colour, side in (("surface", 0.0, SURFACE, "bottom"), ("bottom", -bottom, BOTTOM, "top")):
         axes.axhline(z, color=colour, linewidth=1.5)
+        style: dict[str, Any] = {"color": colour, "fontsize": 8, "ha": "right", "va": side, "clip_on": True}
+        axes.text(0.995, z, name, transform=axes.get_yaxis_transform(), **style)
 
 
 def vertical_scale(axes: Axes) -> float:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from sonarsynth.evaluation import warnings as warnings_of
+from sonarsynth.pictures.figures.style import PAGE_CONFIG
 from sonarsynth.pictures.report_figures.report_numbers import numbers_of
 from sonarsynth.pictures.store_reading import NothingToDraw
 from sonarsynth.store import Folder, built_frames, folder_of, named_after, open_store
@@ -17,8 +18,6 @@ from sonarsynth.store import Folder, built_frames, folder_of, named_after, open_
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-CONFIG: Final = {"displaylogo": False, "responsive": True, "showSendToCloud": False, "plotlyServerURL": ""}
-"""Nothing leads out of the page."""
 PAGE: Final = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
 <style>
@@ -80,7 +79,7 @@ def report(
 
 
 def _drawn(figure: Figure, script: bool) -> str:
-    return str(figure.to_html(full_html=False, include_plotlyjs=script, config=CONFIG))
+    return str(figure.to_html(full_html=False, include_plotlyjs=script, config=PAGE_CONFIG, auto_play=False))
 
 
 def _as_json(numbers: dict[str, Any]) -> str:

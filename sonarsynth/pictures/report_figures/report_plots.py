@@ -41,7 +41,7 @@ def film(tree: xr.DataTree, frames: Ints) -> Figure | None:
         level = 10.0 * np.log10(np.maximum(energy / brightest, 10.0 ** (FAINTEST / 10.0)))
         heat = go.Heatmap(
             x=azimuth, y=elevation, z=np.rint(level).astype(np.int8), zmin=FAINTEST, zmax=0, colorscale="Inferno",
-            colorbar={"title": {"text": "dB"}},
+            colorbar={"title": {"text": "dB re the brightest beam", "side": "right"}},
         )  # fmt: skip
         shown.append(go.Frame(data=[heat, _boxes(objects, frame, azimuth, elevation, names)], name=str(frame)))
         label = f"{frame}: sequence {sequence[frame]}, step {step[frame]}"
@@ -50,9 +50,10 @@ def film(tree: xr.DataTree, frames: Ints) -> Figure | None:
     figure = go.Figure(data=shown[0].data, frames=shown)
     figure.update_layout(
         height=560,
-        xaxis={"title": {"text": "azimuth (deg), port on the left"}, "autorange": "reversed"},
-        yaxis={"title": {"text": "elevation (deg)"}, "scaleanchor": "x"},
-        sliders=[{"steps": steps, "currentvalue": {"prefix": "frame "}}],
+        margin={"t": 20},
+        xaxis={"title": {"text": "azimuth (deg), port on the left"}, "autorange": "reversed", "constrain": "domain"},
+        yaxis={"title": {"text": "elevation (deg)"}, "scaleanchor": "x", "constrain": "domain"},
+        sliders=[{"steps": steps, "currentvalue": {"prefix": "frame "}, "pad": {"t": 40}}],
         showlegend=False,
     )
     return figure
