@@ -36,6 +36,7 @@ class _Tally:
     misses: list[float] = field(default_factory=list)  # m
     useless: int = 0
     strays: int = 0  # accepted, and come from no snap
+    mirrored: int = 0  # accepted, and come from behind the array
     strangers: int = 0  # of the chorus, or of other sources of noise
     rows: int = 0
     unheard: int = 0  # snaps that reach the array, and were not found
@@ -58,7 +59,8 @@ class _Tally:
 def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """Each estimate is within three predicted errors of the snap that it came from, in 95 %; each quantity by its own.
 
-    Positions by their Mahalanobis distance. An estimate that is accepted and comes from no snap counts as a miss. A
+    Positions by their Mahalanobis distance. An estimate that is accepted and comes from no snap counts as a miss, but
+    for the mirror image of one behind the array: a planar array cannot tell its sides apart, and that is a warning. A
     snap that reaches the array and is not found, and errors as large as what is sought, are honest but of no use: a
     warning.
     """
@@ -72,7 +74,9 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
         result = f"none of {tally.unheard} found" if tally.unheard else "no snap reaches the array"
         return Check(NAME, EXPECTED, result, None, {"found": 0}, numbered(sorted(tally.frames)), _warning(tally))
     if not (tally.strays or any(tally.within.values())):
-        result = f"none of {tally.unheard} found, {tally.strangers} of other snaps"
+        result = f"none of {tally.unheard} found"
+        result += f", {tally.strangers} of other snaps" if tally.strangers else ""
+        result += f", {tally.mirrored} mirror images" if tally.mirrored else ""
         return Check(NAME, EXPECTED, result, None, {"found": tally.rows}, (), _warning(tally))
     shares = {name: float(np.mean(good + [False] * tally.strays)) for name, good in tally.within.items() if good}
     worst = min(shares, key=lambda name: shares[name]) if shares else "position"
@@ -108,23 +112,32 @@ def _frame(block: SmallVariables, i: int, tally: _Tally) -> None:
     true = pose.to_body(truth["position"])
     for row in estimates:
         emission = int(column["emission"][row])
+        estimate = {name: values[row] for name, values in column.items()}
+        if emission < 0 and any(all(_within(estimate, truth, n, True).values()) for n in range(len(truth["arrival"]))):
+            tally.mirrored += 1
+            continue
         if emission < 0:
             tally.add_stray(i, bool(STRANGERS & set(other_sounds(block.tree))))
             continue
-        estimate = {name: values[row] for name, values in column.items()}
-        turned = (estimate["azimuth"] - truth["azimuth"][emission] + 180.0) % 360.0 - 180.0
-        raised = estimate["elevation"] - truth["elevation"][emission]
-        within = {
-            "azimuth": bool(abs(turned) <= 3 * estimate["azimuth_error"]),
-            "elevation": bool(abs(raised) <= 3 * estimate["elevation_error"]),
-            "time": bool(abs(estimate["time"] - truth["arrival"][emission]) <= 3 * estimate["time_error"]),
-        }
+        within = _within(estimate, truth, emission)
         if np.isfinite(estimate["position"]).all():
             error = estimate["position"] - true[emission]
             tally.misses.append(float(np.linalg.norm(error)))
             within["position"] = bool(error @ np.linalg.solve(estimate["position_covariance"], error) <= NEAR)
         tally.add(i, within)
         tally.useless += _useless(block.tree, estimate)
+
+
+def _within(
+    estimate: dict[str, np.ndarray], truth: dict[str, np.ndarray], emission: int, mirrored: bool = False
+) -> dict[str, bool]:
+    """Whether direction and time are within three predicted errors of a snap's; `mirrored`: of its image in front."""
+    azimuth = 180.0 - truth["azimuth"][emission] if mirrored else truth["azimuth"][emission]
+    turned = (estimate["azimuth"] - azimuth + 180.0) % 360.0 - 180.0
+    raised = estimate["elevation"] - truth["elevation"][emission]
+    late = estimate["time"] - truth["arrival"][emission]
+    errors = {"azimuth": turned, "elevation": raised, "time": late}
+    return {name: bool(abs(error) <= 3 * estimate[f"{name}_error"]) for name, error in errors.items()}
 
 
 def _useless(tree: xr.DataTree, row: dict[str, np.ndarray]) -> bool:
@@ -142,6 +155,8 @@ def _warning(tally: _Tally) -> str:
     if tally.unheard:
         why = ", ".join(f"{name} {count}" for name, count in tally.reasons.most_common(3))
         warnings.append(f"{tally.unheard} snaps that reach the array were not located" + (f" ({why})" if why else ""))
+    if tally.mirrored:
+        warnings.append(f"{tally.mirrored} snaps behind the array were located at their mirror images in front of it")
     if tally.useless:
         warnings.append(f"{tally.useless} of {tally.rows} estimates are useless: their predicted errors are too large")
     return "; ".join(warnings)

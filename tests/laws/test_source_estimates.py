@@ -277,6 +277,13 @@ def test_each_quantity_is_verified_by_its_own_errors() -> None:
     assert snap_located(store(spread=0.01), frames).ok is False
 
 
+def test_the_mirror_image_of_a_snap_behind_the_array_is_a_warning() -> None:
+    """A planar array cannot tell its sides apart; from anywhere else, an estimate of no snap is a miss."""
+    check = snap_located(store(emission=-1, azimuth=160.01), np.arange(2))
+    assert check.ok is None and "2 snaps behind the array" in check.warning
+    assert snap_located(store(emission=-1, azimuth=160.05), np.arange(2)).ok is False
+
+
 @pytest.mark.parametrize("useless", [{"spread": 9.0}, {"azimuth_error": 20.0}, {"time_error": 1.0}])
 def test_errors_as_large_as_what_is_sought_are_a_warning(useless: dict[str, float]) -> None:
     check = snap_located(store(**useless), np.arange(2))

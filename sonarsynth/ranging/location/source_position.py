@@ -259,7 +259,8 @@ def refused(reason: int) -> SourceFix:
     """A row of which nothing is known but why."""
     none, pair = np.full(3, np.nan), (np.nan, np.nan)
     return SourceFix(
-        np.nan, np.nan, none, none[:2], pair, pair, none, np.full((3, 3), np.nan), np.nan, -1, reason, pair, none, np.nan,
+        np.nan, np.nan, none, none[:2], pair, pair, none, np.full((3, 3), np.nan),
+        np.nan, -1, reason, pair, none, np.nan,
     )  # fmt: skip
 
 
