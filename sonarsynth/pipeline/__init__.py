@@ -19,7 +19,6 @@ from sonarsynth.pipeline.frame_chorus import clear_values, frame_chorus, soundsc
 from sonarsynth.pipeline.frame_reverberation import frame_reverberation, with_reverberation
 from sonarsynth.pipeline.labelled_estimates import emission_values, estimate_truth, heard_directly
 from sonarsynth.pipeline.labelling import band_of, expansion_error, frame_values, isolated_levels, point_labels
-from sonarsynth.pipeline.padded_axes import in_slots, which_values
 from sonarsynth.pipeline.requested_rays import follow_rays
 from sonarsynth.pipeline.signal_to_noise import SoundParts, snr_values
 from sonarsynth.pipeline.stage_times import STAGES, mark_stage, stage_timer
@@ -29,10 +28,12 @@ from sonarsynth.pipeline.stored_values import (
     cloud_values,
     echo_values,
     image_values,
+    in_slots,
     link_budget_values,
     signal_values,
     source_estimate_values,
     truth_values,
+    which_values,
 )
 from sonarsynth.pipeline.synthesis import Hearing, digitise, frame_signals, known_elements, known_signals, told_nothing
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, frame_tree, variables

@@ -22,9 +22,8 @@ from sonarsynth.planning.plan_tables import Omission, Stage
 from sonarsynth.planning.plans import Errors, Plan, Windows
 from sonarsynth.receiver import elements
 from sonarsynth.recipe import Recipe
-from sonarsynth.recipe.emission_slots import most_emissions
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.recipe.sequence_checks import check_spanned
+from sonarsynth.recipe.sequence_checks import check_spanned, most_emissions
 
 __all__ = [
     "ALL_PRODUCTS",

@@ -24,7 +24,7 @@ from sonarsynth.recipe.splits import Splits
 from sonarsynth.recipe.tolerance import Accuracy
 from sonarsynth.recipe.variation.grid import Axis, Zip, entry_tag
 from sonarsynth.recipe.variation.mesh_variants import mesh_number, target_meshes
-from sonarsynth.recipe.variation.named_paths import numbered, numbered_variations
+from sonarsynth.recipe.variation.named_paths import listed_values, numbered, numbered_variations
 from sonarsynth.recipe.variation.random_variations import (
     Choice,
     Integers,
@@ -160,7 +160,7 @@ class Recipe:
         """What targets are called, in the order of the recipe."""
         world = self.described.world
         names = [target.category for target in world.targets]
-        names += [str(v) for _, entry in self.spanned.entries for v in _listed(entry) if _sets(entry, "category")]
+        names += [str(v.value) for _, e in self.spanned.entries for v in listed_values(e) if _sets(e, "category")]
         names += [p.category(n) for p in world.populations for n in range(len(p.models))]
         return tuple(dict.fromkeys(names))
 
@@ -195,12 +195,6 @@ class Recipe:
 def _sets(entry: Axis | Variation, field: str) -> bool:
     """Whether what varies sets a field of this name."""
     return any(path.endswith(f".{field}") for path in entry.path)
-
-
-def _listed(entry: Axis | Variation) -> list[Any]:
-    """The values of what varies, where they are listed."""
-    values = entry.taken if isinstance(entry, Axis) else entry.values if isinstance(entry, Choice) else ()
-    return [plain.value for plain in values]
 
 
 def _by_content(value: Any) -> Any:

@@ -1,13 +1,18 @@
-"""What is refused of what a recipe spans, before any scene is looked at."""
+"""What is refused of what a recipe spans, before any scene is looked at; and how many emissions a frame may have."""
 
 from __future__ import annotations
+
+from itertools import product
+from math import prod
 
 from sonarsynth.description import FieldError
 from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences, name_of
 from sonarsynth.recipe.variation.grid import Axis
+from sonarsynth.recipe.variation.named_paths import listed_values
 from sonarsynth.recipe.variation.random_variations import Choice, NumberVariation, Sobol
+from sonarsynth.recipe.variation.setting import Setting, plain_scene, with_settings
 from sonarsynth.recipe.variation.sobol_points import OF_VARIATIONS
-from sonarsynth.recipe.variation.values import MOST_FRAMES, Where
+from sonarsynth.recipe.variation.values import MOST_FRAMES, Where, where
 
 RESERVED = ("frame", "trajectory", "step", "time", "split", "repeat")
 """Names of the store that no entry can have."""
@@ -65,3 +70,29 @@ def _check_name(spanned: Sequences, at: Where, name: str) -> None:
         raise FieldError(at, f"'{name}' names nothing that varies; known: {', '.join(divides) or 'nothing varies'}")
     if not divides[name]:
         raise FieldError(at, f"'{name}' has another value in each sequence: name an entry of the grid or a choice")
+
+
+MOST_COMBINATIONS = 1000
+"""Combinations of values that are looked at for one source."""
+
+
+def most_emissions(spanned: Sequences) -> int:
+    """Most emissions of a frame of any sequence: the store has room for so many.
+
+    Of each source the most times that any values give it of what sets these, whether or not they come together with
+    the most of another. Raises FieldError for values that cannot be.
+    """
+    scene = spanned.described(0)
+    plain, count = plain_scene(scene), 0
+    for i, source in enumerate(scene.world.sources):
+        times = ("scene", "world", "sources", i, source.times_field)
+        setting = [
+            [Setting(at, name_of(entry), entry.path, value) for value in listed_values(entry)]
+            for at, entry in spanned.entries
+            if any(where(path) == times[: len(where(path))] for path in entry.path)
+        ]
+        if prod(map(len, setting)) > MOST_COMBINATIONS:
+            raise FieldError(times, f"has more than {MOST_COMBINATIONS} combinations of what sets it")
+        several = [with_settings(scene, plain, combination) for combination in product(*setting) if combination]
+        count += max(len(described.world.sources[i].times) for described in (scene, spanned.base, *several))
+    return count

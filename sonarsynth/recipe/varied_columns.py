@@ -13,7 +13,8 @@ import numpy as np
 from sonarsynth.conventions import Unit
 from sonarsynth.recipe.sequences import NOTHING, Sequences, name_of
 from sonarsynth.recipe.variation.grid import Axis
-from sonarsynth.recipe.variation.random_variations import Choice, Variation
+from sonarsynth.recipe.variation.named_paths import listed_values
+from sonarsynth.recipe.variation.random_variations import Variation
 from sonarsynth.recipe.variation.setting import unit_at, value_at
 from sonarsynth.recipe.variation.values import Plain
 
@@ -47,7 +48,7 @@ def columns(sequences: Sequences) -> tuple[Column, ...]:
 
 def _column(sequences: Sequences, entry: Axis | Variation, values: Sequence[Plain]) -> Column:
     path = entry.path[0]
-    listed = entry.taken if isinstance(entry, Axis) else entry.values if isinstance(entry, Choice) else ()
+    listed = listed_values(entry)
     applying = next((n for n, plain in enumerate(values) if plain != NOTHING), None)
     unit: Unit | None = None
     value: Any = 0.0

@@ -24,7 +24,6 @@ from sonarsynth.pipeline import attributes, coordinates
 from sonarsynth.recipe.reading import RecipeError, dump
 from sonarsynth.recipe.reading.yaml_source import read_text
 from sonarsynth.store.array_metadata import fixed_array, framed_array
-from sonarsynth.store.code_digest import code_digest
 from sonarsynth.store.files.place import Folder, Opened, absolute, read, record, records, upload
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.scratch import clear, hidden, made, sweep
@@ -32,7 +31,7 @@ from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.layout import Layout, layout_of
 from sonarsynth.store.marks import LAYOUT, MANIFESTS, Damage, Mark, all_files, load_layout, marked, save_mark
 from sonarsynth.store.opening import check_format
-from sonarsynth.store.provenance import begun, made_of, other_versions
+from sonarsynth.store.provenance import begun, code_digest, made_of, other_versions
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan

@@ -26,6 +26,7 @@ from sonarsynth.recipe import FILE_KINDS
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
     from sonarsynth.recipe.reading import Source
+import hashlib
 
 PROVENANCE: Final = "provenance"
 """The attribute of the root that differs between two builds of one plan."""
@@ -227,3 +228,29 @@ def _finite(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(name): _finite(inner) for name, inner in value.items()}
     return [_finite(inner) for inner in value] if isinstance(value, list | tuple) else value
+
+
+APART: Final = (
+    "frontiers",
+    "cli",
+    "evaluation",
+    "pictures",
+    "schedule",
+    "store/cards",
+    "validation",
+    "__main__.py",
+    "__init__.py",
+)
+"""Parts of the package that change no stored number."""
+
+
+@cache
+def code_digest() -> str:
+    """SHA-256 of the sources, with their paths within the package."""
+    package = Path(__file__).resolve().parent.parent
+    digest = hashlib.sha256()
+    for file in sorted(package.rglob("*.py")):
+        inside = file.relative_to(package).as_posix()
+        if not any(inside == folder or inside.startswith(f"{folder}/") for folder in APART):
+            digest.update(f"{inside}\n".encode() + hashlib.sha256(file.read_bytes()).digest())
+    return digest.hexdigest()

@@ -14,7 +14,7 @@ from sonarsynth.conventions import binomial_band
 from sonarsynth.detection import Detections, from_rows
 from sonarsynth.evaluation.detectors import DetectorReport, TrueObjects, as_detections
 from sonarsynth.evaluation.detectors.detector_scores import OVERLAPS
-from sonarsynth.evaluation.detectors.precision_and_recall import average_precision, threshold_at
+from sonarsynth.evaluation.detectors.matching import average_precision, threshold_at
 
 
 def objects(frame: Any, box: Any, category: Any = 0, **more: Any) -> TrueObjects:

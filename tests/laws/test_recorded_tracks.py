@@ -10,8 +10,8 @@ import sonarsynth as ss
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.geometry import rotation_matrix
-from sonarsynth.geometry.local_plane import east_north
 from sonarsynth.geometry.motion import Circle, Line, RecordedTrack, Track, pose, spin, velocity
+from sonarsynth.geometry.recorded_track import east_north
 from sonarsynth.geometry.track_files import TrackError
 from sonarsynth.recipe.reading import load, loads
 

@@ -16,10 +16,9 @@ from sonarsynth.equations.scattering.modal_series import Fluid, cylinder_amplitu
 from sonarsynth.pictures.accuracy_figures.bodies_figure import Curve, Panel, RefinementCurve, bodies_figure
 from sonarsynth.validation import REFERENCES, Row
 from sonarsynth.validation.bodies.body_cases import BAND, SOUND_SPEED, Point, order, trade_rows, wavenumber
-from sonarsynth.validation.bodies.facet_integral import triangle_rows
-from sonarsynth.validation.references.cylinder_integral import lit_cylinder
-from sonarsynth.validation.references.front_echo import front_echo
-from sonarsynth.validation.references.triangle_integral import exact_triangle
+from sonarsynth.validation.bodies.cylinder import lit_cylinder
+from sonarsynth.validation.bodies.facet_integral import exact_triangle, triangle_rows
+from sonarsynth.validation.bodies.sphere import front_echo
 from sonarsynth.validation.report import PICTURES, write
 
 BODIES = ("sphere", "cylinder", "plate")

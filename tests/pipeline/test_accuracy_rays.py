@@ -14,8 +14,8 @@ import typer
 from sonarsynth.cli.accuracy_command import accuracy
 from sonarsynth.cli.running import run
 from sonarsynth.validation import REFERENCES, Row, ray_accuracy
+from sonarsynth.validation.rays.eigenray_checks import image_rays
 from sonarsynth.validation.rays.ray_matching import Bounds, Rays, errors, matched, miscounted, nearest
-from sonarsynth.validation.references.rays.image_rays import image_rays
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
 from sonarsynth.validation.references.rays.one_gradient import Gradient, gradient_rays
 from sonarsynth.validation.references.rays.shooting import munk, shooting_rays

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import sonarsynth as ss
 from sonarsynth.cli import app
 from sonarsynth.cli.authoring import shipped_recipes
-from sonarsynth.cli.authoring.questions import ask
+from sonarsynth.cli.authoring.init_command import ask
 from sonarsynth.cli.authoring.recipe_text import SHAPES, Answers, recipe_text
 from sonarsynth.cli.running import run
 from tools.same_numbers import harbour

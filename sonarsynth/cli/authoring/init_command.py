@@ -1,15 +1,86 @@
-"""`sonarsynth init`: a first recipe."""
+"""`sonarsynth init`: a first recipe, copied or made of answers to questions."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from sonarsynth.cli.authoring.recipe_text import DEFAULTS, SHAPES, Answers, array_of, positive
 from sonarsynth.cli.authoring.shipped_recipes import copy_beside, text_of
 from sonarsynth.cli.running import BadOption
+
+
+def ask(folder: Path) -> Answers:
+    """Ask for a first recipe that will be in a folder; a question is asked again until its answer can be used."""
+    d = DEFAULTS
+    try:
+        return Answers(
+            title=_asked("Title", d.title, _printable),
+            depth=_asked("Depth of the water (m)", d.depth, positive),
+            water=_asked("Sound speed (m/s), or a cast file in this folder", d.water, _number_or_file(folder)),
+            target=_asked(f"Target: {', '.join(SHAPES)}, or a mesh file in this folder", d.target, _shape(folder)),
+            range=_asked("Range of the target (m)", d.range, positive),
+            array=_asked("Array: romanis (508 hydrophones), or columns x rows 5 cm apart", "20x16", array_of),
+            frames=_asked("Frames", d.frames, _whole(1)),
+            seed=_asked("Seed of everything that is drawn at random", d.seed, _whole(0)),
+        )
+    except typer.Abort:
+        raise KeyboardInterrupt from None
+
+
+def _asked(question: str, default: object, read: Callable[[str], Any]) -> Any:
+    def value(text: str) -> Any:
+        try:
+            return read(str(text))
+        except ValueError as error:
+            raise typer.BadParameter(f"'{text}' cannot be used: {error}") from None
+
+    shown = f"{default:g}" if isinstance(default, float) else str(default)
+    return typer.prompt(question, default=shown, value_proc=value)
+
+
+def _printable(text: str) -> str:
+    if not text.strip() or not text.isprintable():
+        raise ValueError("a line of text is needed")
+    return text.strip()
+
+
+def _whole(least: int) -> Callable[[str], int]:
+    def read(text: str) -> int:
+        if int(text) < least:
+            raise ValueError(f"{least} at least")
+        return int(text)
+
+    return read
+
+
+def _file(text: str, folder: Path) -> str:
+    """A file as the recipe names it: relative to its folder, which it must be in."""
+    path = Path(text.strip()).expanduser()
+    if not (path := folder / path).is_file():
+        raise ValueError(f"there is no such file in {folder.absolute()}")
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise ValueError(f"a recipe names files in its own folder: copy it to {folder.absolute()}")
+    return path.resolve().relative_to(folder.resolve()).as_posix()
+
+
+def _number_or_file(folder: Path) -> Callable[[str], float | str]:
+    def read(text: str) -> float | str:
+        try:
+            return positive(text)
+        except ValueError:
+            return _file(text, folder)
+
+    return read
+
+
+def _shape(folder: Path) -> Callable[[str], str]:
+    return lambda text: text.strip() if text.strip() in SHAPES else _file(text, folder)
+
 
 NAMES = "remus, grid, crowd, harbour, boat, deep, tank, thermocline, l_shape."
 
@@ -26,7 +97,6 @@ def init(
 
     Without --from and without a terminal: a small one of a REMUS-100 that crosses ahead.
     """
-    from sonarsynth.cli.authoring.questions import ask
     from sonarsynth.cli.authoring.recipe_text import DEFAULTS, recipe_text
     from sonarsynth.recipe import reading
 

@@ -15,9 +15,14 @@ from sonarsynth.conventions import Ints, binomial_band
 from sonarsynth.description import FieldError
 from sonarsynth.detection import Detections, read
 from sonarsynth.detection.detection_method import angle_at
-from sonarsynth.evaluation.detectors.matching import match, nearness, overlap
-from sonarsynth.evaluation.detectors.measurement_errors import measurement_errors
-from sonarsynth.evaluation.detectors.precision_and_recall import average_precision, threshold_at
+from sonarsynth.evaluation.detectors.matching import (
+    average_precision,
+    match,
+    measurement_errors,
+    nearness,
+    overlap,
+    threshold_at,
+)
 from sonarsynth.evaluation.detectors.true_objects import TrueObjects, as_detections, category_names, true_objects
 from sonarsynth.store import chosen_frames, open_store
 

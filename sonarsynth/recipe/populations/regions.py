@@ -12,6 +12,7 @@ from pydantic import model_validator
 from sonarsynth.conventions import Floats, Metres, NonNegativeMetres, Number, Position, PositiveMetres, direction
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.geometry import Pose
+from sonarsynth.recipe.populations.drawn_tracks import between
 
 Heights = tuple[Metres, Metres]
 """Lowest and highest z, negative under the surface."""
@@ -101,7 +102,7 @@ class Annulus:
         """As `FieldOfView.place`."""
         radius = np.sqrt(self.inner**2 + (self.outer**2 - self.inner**2) * draws[0])
         x, y = np.array(self.centre) + radius * np.array([np.cos(2 * np.pi * draws[1]), np.sin(2 * np.pi * draws[1])])
-        return np.array([x, y, _between(self.heights, draws[2])])
+        return np.array([x, y, between(self.heights, draws[2])])
 
 
 @description
@@ -131,14 +132,10 @@ class PolygonRegion:
         with np.errstate(divide="ignore", invalid="ignore"):
             right = x < ax + (y - ay) / (by - ay) * (bx - ax)
         inside = np.count_nonzero(crosses & right) % 2 == 1
-        return np.array([x, y, _between(self.heights, draws[2])]) if inside else None
+        return np.array([x, y, between(self.heights, draws[2])]) if inside else None
 
 
 Region = Annotated[FieldOfView | BoxRegion | Annulus | PolygonRegion, BY_KIND]
-
-
-def _between(bounds: tuple[float, float], fraction: float) -> float:
-    return float(bounds[0] + (bounds[1] - bounds[0]) * fraction)
 
 
 def _check_heights(heights: Heights) -> None:

@@ -8,8 +8,8 @@ from typing import TypeVar
 from sonarsynth.description import FieldError
 from sonarsynth.recipe.scene import World
 from sonarsynth.recipe.variation.grid import Axis, Zip
-from sonarsynth.recipe.variation.random_variations import Variation
-from sonarsynth.recipe.variation.values import Where
+from sonarsynth.recipe.variation.random_variations import Choice, Variation
+from sonarsynth.recipe.variation.values import Plain, Where
 
 Entry = TypeVar("Entry", bound=Axis | Variation)
 LISTS = ("targets", "sources", "noise_sources", "populations")
@@ -45,3 +45,8 @@ def _by_number(world: World, path: str, at: Where) -> str:
         listed = ", ".join(names) or "there are none"
         raise FieldError(at, f"'{path}': none of scene.world.{keys[2]} is called '{keys[3]}'; known: {listed}")
     return ".".join([*keys[:3], str(names.index(keys[3])), *keys[4:]])
+
+
+def listed_values(entry: Axis | Variation) -> tuple[Plain, ...]:
+    """The values of what varies, where they are listed."""
+    return entry.taken if isinstance(entry, Axis) else entry.values if isinstance(entry, Choice) else ()

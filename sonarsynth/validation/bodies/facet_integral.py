@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +13,35 @@ from sonarsynth.equations.scattering.kirchhoff_integral import triangle_integral
 from sonarsynth.randomness import stream
 from sonarsynth.validation.bodies.body_cases import SEED, timed
 from sonarsynth.validation.rays.ray_matching import worst
-from sonarsynth.validation.references.triangle_integral import exact_triangle
 from sonarsynth.validation.validation_rows import Row
+
+DIGITS = 50
+APART = 45
+"""Equal phases are moved apart by ten to minus this."""
+
+
+def exact_triangle(corners: Floats, wave: Floats) -> tuple[complex, float]:
+    """Integral (m2) of exp(i w.x) over a triangle with corners (3, xyz) (m), for a wave w (xyz) (rad/m), and its area.
+
+    2 A sum_j exp(z_j)/prod_(m != j) (z_j - z_m), z_j = i w.x_j: 0/0 where phases agree, so they are moved apart, and
+    the digits that this costs are added.
+    """
+    import mpmath as mp
+
+    with mp.workdps(DIGITS + 2 * APART + 10):
+        x = [[mp.mpf(float(number)) for number in corner] for corner in corners]
+        phase = [_dot(corner, [mp.mpf(float(number)) for number in wave]) for corner in x]
+        z = [mp.mpc(0, phase[j] + j * mp.mpf(10) ** -APART) for j in range(3)]
+        first, second = ([x[j][i] - x[0][i] for i in range(3)] for j in (1, 2))
+        square = _dot(first, first) * _dot(second, second) - _dot(first, second) ** 2
+        twice = mp.sqrt(square)
+        difference = sum(mp.exp(z[j]) / ((z[j] - z[j - 1]) * (z[j] - z[j - 2])) for j in range(3))
+        return complex(twice * difference), float(0.5 * twice)
+
+
+def _dot(a: list[Any], b: list[Any]) -> Any:
+    return sum(x * y for x, y in zip(a, b, strict=True))
+
 
 HEIGHTS = (1.0, 1e-3, 1e-6, 1e-9)
 """Of triangles with a base of 1: from fat ones to needles."""

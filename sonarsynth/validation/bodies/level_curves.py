@@ -10,7 +10,7 @@ from sonarsynth.pictures.accuracy_figures.bodies_figure import Curve, Panel
 from sonarsynth.scattering import Kirchhoff
 from sonarsynth.validation.bodies import cylinder, plate, sphere
 from sonarsynth.validation.bodies.body_cases import SOUND_SPEED, decibels, wavenumber
-from sonarsynth.validation.references.cylinder_integral import lit_cylinder
+from sonarsynth.validation.bodies.cylinder import lit_cylinder
 
 MIDDLE = 50e3  # Hz: where levels are drawn over angle
 STRENGTH = "target strength (dB re 1 m2)"

@@ -21,7 +21,6 @@ from sonarsynth.equations.rays.ray_solutions import CAUSTIC
 from sonarsynth.validation.rays import ray_cases
 from sonarsynth.validation.rays.ray_cases import Case
 from sonarsynth.validation.rays.ray_matching import Rays, errors, matched, miscounted, nearest, rays_of, worst
-from sonarsynth.validation.references.rays.image_rays import image_rays
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
 from sonarsynth.validation.references.rays.one_gradient import gradient_rays
 from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
@@ -30,6 +29,42 @@ from sonarsynth.validation.validation_rows import Row
 
 if TYPE_CHECKING:
     from sonarsynth.equations.rays.ray_solutions import Eigenrays
+from sonarsynth.conventions import Floats
+
+
+def image_rays(speed: float, bottom_depth: float, start: Floats, end: Floats, distance: Floats, bounces: int) -> Rays:
+    """Every ray with up to `bounces` reflections between depths start and end (pair,) m at distances (pair,) m.
+
+    The receiver is mirrored in the boundaries that the ray meets, the last one first (e.g. Jensen, Kuperman, Porter and
+    Schmidt 2011, Computational Ocean Acoustics, section 2.4.4). speed in m/s, bottom in m.
+    """
+    rows = []
+    for down_first in (True, False):
+        for count in range(bounces + 1):
+            if count == 0 and not down_first:
+                continue
+            at_bottom = (np.arange(count) % 2 == 0) == down_first
+            image = np.array(end, float)
+            for bottom_hit in at_bottom[::-1]:
+                image = 2.0 * bottom_depth - image if bottom_hit else -image
+            rise = start - image
+            length = np.hypot(distance, rise)
+            angle = np.arctan2(rise, distance)
+            last = angle if count % 2 == 0 else -angle
+            rows.append(
+                [
+                    length / speed,
+                    angle,
+                    last,
+                    1.0 / length,
+                    *(np.full(len(rise), np.sum(hits)) for hits in (~at_bottom, at_bottom)),
+                ]
+            )
+    time, first, last, amplitude, surface, bottom = (np.concatenate(column) for column in zip(*rows, strict=True))
+    none = np.zeros(len(time), int)
+    pair = np.tile(np.arange(len(start)), len(rows))
+    return Rays(pair, time, first, last, amplitude, surface.astype(int), bottom.astype(int), none, none)
+
 
 IMAGES, CIRCLES = "image sources", "circles, 40 digits"
 MANY_DIGITS, FAN = "50 digits", "a dense fan"
