@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import time
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -193,7 +192,7 @@ def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_P
         planned = planning.plan(made_from, chosen)
     with printing.planning("timing frames"):
         prediction = schedule.predict(planned, prepared=time.process_time())
-    planned = replace(planned, stages=prediction.rows(planned))
+    planned = prediction.tried(planned)
     if as_json:
         _print_json({**planned.as_json(), **prediction.as_json()})
     else:

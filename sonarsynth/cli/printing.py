@@ -181,8 +181,8 @@ def plan_report(plan: Plan, prediction: Prediction) -> None:
         f"a worker takes up to {format_bytes(plan.memory_bytes)} of memory"
     )
     out.print(f"estimated from {p.basis}", markup=False)
-    if p.odds.line:
-        out.print(f"in these: {p.odds.line}", markup=False)
+    if plan.odds:
+        out.print(f"in these: {plan.odds}", markup=False)
 
 
 def _spanned(plan: dict[str, Any]) -> Iterator[str]:

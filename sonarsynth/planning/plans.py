@@ -20,6 +20,7 @@ from sonarsynth.planning.measured.chorus_reach import band_frequencies, chorus_r
 from sonarsynth.planning.measured.distant_chorus import DistantChorus, distant_chorus
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.measured.thinned_profile import thinned
+from sonarsynth.planning.noise_rows import sound_parts
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
 from sonarsynth.planning.plan_tables import Omission, Stage, as_html, as_text
 from sonarsynth.propagation import Propagation
@@ -87,6 +88,7 @@ class Plan:
     shard_frames: int = 1
     thinning: float = 0.0  # error of signals, relative, of the layers that stand for a measured profile
     sequence: int = 0  # whose scene, profile and propagation these are
+    odds: str = ""  # of finding targets in frames that were tried; "": none were, or no target is in view
 
     @property
     def scene(self) -> Scene:
@@ -196,6 +198,10 @@ class Plan:
     def _printed(self) -> tuple[str, tuple[Stage, ...], tuple[Omission, ...], list[str]]:
         lines = [f"note: {warning}" for warning in self.warnings]
         lines.append(", ".join(counted(count, name) for name, count in self.sizes.items()))
+        if self.odds:
+            lines.append(f"in frames that were tried: {self.odds}")
+        elif "image" in self.products and sound_parts(self.scene):
+            lines.append("odds of finding targets: schedule.predict(plan).tried(plan) makes some frames and says them")
         return self.recipe.title, self.stages, self.left_out, lines
 
     def as_json(self) -> dict[str, Any]:

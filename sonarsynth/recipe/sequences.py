@@ -28,8 +28,8 @@ from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import Splits, assign
 from sonarsynth.recipe.variation.grid import Axis, Zip, axes
 from sonarsynth.recipe.variation.random_variations import Choice, Sobol, Variation
-from sonarsynth.recipe.variation.setting import Setting, plain_scene, with_settings
-from sonarsynth.recipe.variation.values import FRAMES, MOST_FRAMES, Plain, Where, default_name, where
+from sonarsynth.recipe.variation.setting import Setting, Stamps, file_stamps, mesh_files, plain_scene, with_settings
+from sonarsynth.recipe.variation.values import FRAMES, MOST_FRAMES, Plain, Where, default_name, leads_through, where
 
 MOST_SEQUENCES = 1_000_000
 NOTHING = Plain.of(None)
@@ -131,7 +131,7 @@ class Sequences:
             else:
                 partner = None if variation.like is None else paths[variation.like]
                 value = variation.at(variation.share(self.seed, key, partner))
-            applies = variation.when is None or _has(values[variation.when.entry], variation.when.value)
+            applies = variation.when is None or values[variation.when.entry].fits(variation.when.value)
             values[name_of(variation)] = value if applies else NOTHING
             set_at = variation.path if applies else ()
             settings.append(Setting(("variations", i), name_of(variation), set_at, values[name_of(variation)]))
@@ -161,6 +161,16 @@ class Sequences:
         return plain_scene(self.base)
 
     @cached_property
+    def _files(self) -> tuple[str, ...]:
+        lists = [e.taken if isinstance(e, Axis) else e.values if isinstance(e, Choice) else () for _, e in self.entries]
+        return mesh_files([self._plain, *(plain.value for values in lists for plain in values)])
+
+    @property
+    def stamps(self) -> Stamps:
+        """Of the files of meshes and grids, as they are now: what is kept of scenes is kept until one changes."""
+        return file_stamps(self._files)
+
+    @cached_property
     def _mesh_speed(self) -> float | None:
         """Slowest sound speed (m/s) that any sequence assumes; None where all assume the same."""
         setting_speed = [(at, entry) for at, entry in self.entries if ASSUMED_SPEED in entry.path]
@@ -177,7 +187,8 @@ class Sequences:
 
     def scene(self, sequence: int) -> Scene:
         """Scene of a sequence. Raises FieldError that names the entry and its value where there is none."""
-        return _scene(self, sequence) if self.base.world.populations else self.described(sequence)
+        populated = self.base.world.populations
+        return _scene(self, sequence, self.stamps) if populated else self.described(sequence)
 
     def repeat(self, sequence: int) -> tuple[str, int]:
         """The grid point of a sequence, as written, and which repeat of that it is."""
@@ -186,14 +197,14 @@ class Sequences:
 
     def bodies(self, sequence: int) -> DrawnBodies:
         """The bodies of the populations of a sequence. Raises FieldError where a population has no room."""
-        return _bodies(self, sequence)
+        return _bodies(self, sequence, self.stamps)
 
     def _drawn_in(self, scene: Scene, sequence: int) -> DrawnBodies:
         return draw(scene, self.seed, self.key(sequence), self.repeat(sequence))
 
     def described(self, sequence: int) -> Scene:
         """The same before its populations are drawn."""
-        return _described(self, sequence) if self.varied else with_relief(self.base)
+        return _described(self, sequence, self.stamps) if self.varied else with_relief(self.base)
 
     @cached_property
     def split(self) -> Ints:
@@ -244,7 +255,7 @@ class Sequences:
             if not self.varied or error.path[:1] != ("scene",):
                 raise
             settings = self.settings(sequence)
-            blamed = [s for s in settings if any(_meet(where(path), error.path) for path in s.paths)]
+            blamed = [s for s in settings if any(leads_through(where(path), error.path) for path in s.paths)]
             shown = ", ".join(s.shown for s in blamed or settings)
             at = max(blamed, key=_closeness).source if blamed else error.path
             field = "" if at == error.path else f"{'.'.join(map(str, error.path))}: "
@@ -261,31 +272,20 @@ def _closeness(setting: Setting) -> tuple[int, bool]:
     return max(len(where(path)) for path in setting.paths), setting.source[0] == "variations"
 
 
-def _has(value: Plain, wanted: Plain) -> bool:
-    """Whether an entry has a value, or one of that kind."""
-    content = value.value
-    return value == wanted or (isinstance(content, dict) and content.get("kind") == wanted.value)
-
-
-def _meet(a: Where, b: Where) -> bool:
-    """Whether one path leads through the other."""
-    return all(x == y for x, y in zip(a, b, strict=False))
-
-
 @lru_cache(maxsize=128)
-def _scene(sequences: Sequences, sequence: int) -> Scene:
+def _scene(sequences: Sequences, sequence: int, stamps: Stamps) -> Scene:
     return sequences.bodies(sequence).put_in(sequences.described(sequence))
 
 
 @lru_cache(maxsize=4)
-def _described(sequences: Sequences, sequence: int) -> Scene:
+def _described(sequences: Sequences, sequence: int, stamps: Stamps) -> Scene:
     scene = with_relief(with_settings(sequences.base, sequences._plain, sequences.settings(sequence)))
     speed = sequences._mesh_speed
     return scene if speed is None else replace(scene, sonar=replace(scene.sonar, mesh_sound_speed=speed))
 
 
 @lru_cache(maxsize=1024)  # as many as a plan looks at
-def _bodies(sequences: Sequences, sequence: int) -> DrawnBodies:
+def _bodies(sequences: Sequences, sequence: int, stamps: Stamps) -> DrawnBodies:
     return sequences._drawn_in(sequences.described(sequence), sequence)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from sonarsynth import store
 from sonarsynth.labels.odds import NO_ODDS, Odds
-from sonarsynth.planning import Plan, Stage
+from sonarsynth.planning import Plan
 from sonarsynth.planning.costs import machine_factor
 from sonarsynth.schedule.benchmark_frames import Sizes, Trial, disk_use, try_frames
 from sonarsynth.schedule.making import usable_cores
@@ -146,9 +146,10 @@ class Prediction:
         grown = 1.0 + log(frames / tried) if frames > tried else frames / tried
         return self.loading + sum(self.fresh) * grown if self.workers else 0.0
 
-    def rows(self, plan: Plan) -> tuple[Stage, ...]:
-        """The stages of a plan with the seconds of this prediction."""
-        return tuple(replace(row, seconds=self.stages.get(row.stage, row.seconds)) for row in plan.stages)
+    def tried(self, plan: Plan) -> Plan:
+        """The plan with the seconds of this prediction, and the odds of finding targets, for printing."""
+        stages = tuple(replace(row, seconds=self.stages.get(row.stage, row.seconds)) for row in plan.stages)
+        return replace(plan, stages=stages, odds=self.odds.line)
 
     def as_json(self) -> dict[str, Any]:
         """For a program: wall-clock seconds on `workers`, bytes on the disk; seconds of cores, bytes otherwise."""

@@ -18,7 +18,7 @@ from sonarsynth.recipe.populations.regions import BoxRegion
 from sonarsynth.recipe.rising_bottom import relief_of
 from sonarsynth.recipe.scene import Physics
 from sonarsynth.scattering import MirrorLobe
-from sonarsynth.targets.relief import Relief, highest_within
+from sonarsynth.targets.relief import BOTTOM, Relief, highest_within
 from sonarsynth.targets.shapes import Box, MeshFile, Sphere
 from sonarsynth.targets.target import Target
 from tests.scenes import remus
@@ -127,6 +127,15 @@ def test_bodies_lie_on_it(tmp_path) -> None:
     over = np.array([z for *_, z in drawn]) + 10.0 - 0.1 - ground  # their lowest points
     assert np.ptp(ground) > 0.5
     assert (over > 0.0).all() and (over < 0.5).all()
+
+
+def test_a_file_that_changes_is_seen_by_sequences_that_are_drawn(tmp_path) -> None:
+    path = grid(tmp_path / "hill.npz", lambda x, y: 0.5 + 0 * x)
+    recipe = replace(sea(path), repeats=2)
+    before = recipe.scene_of(1)
+    assert recipe.scene_of(1) is before
+    grid(path, lambda x, y: 0 * x, X[:-1])  # another size: clocks of files are coarse
+    assert BOTTOM in before.world.target_names and BOTTOM not in recipe.scene_of(1).world.target_names
 
 
 @pytest.mark.parametrize(("kind", "reason"), [("linked", "lies in another file"), ("vast", "numbers 'z', more than")])

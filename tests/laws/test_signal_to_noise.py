@@ -24,7 +24,7 @@ from sonarsynth.receiver.sensor_errors import Electronics
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
 from sonarsynth.scattering import Isotropic
-from sonarsynth.schedule.benchmark_frames import try_frames
+from sonarsynth.schedule import predict
 from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.shapes import Sphere
@@ -138,7 +138,10 @@ def test_loud_targets_are_found_in_all_tried_frames_faint_ones_by_chance(level: 
         scene.sonar, array=PlanarLattice(columns=12, rows=8, pitch=0.04), electronics=Electronics(level=level)
     )
     eight = replace(scene, sonar=sonar, trajectory=replace(scene.trajectory, frames=8))
-    seen = try_frames(plan(replace(recipe(), scene=eight), ("image",))).odds
+    made = plan(replace(recipe(), scene=eight), ("image",))
+    told = predict(made)
+    seen = told.odds
+    assert seen.line in " ".join(str(told.tried(made)).split()) and "says them" in str(made)
     assert seen.frames == 8 and len(seen.snr) == 8 and seen.chance < 1.0
     if far > 0.0:
         assert min(seen.snr) > far and seen.found == seen.among_peaks == 8

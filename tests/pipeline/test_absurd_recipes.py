@@ -149,7 +149,7 @@ def test_a_title_is_printed_as_it_is(small: Recipe, capsys: pytest.CaptureFixtur
     numbers = dict.fromkeys(
         ("seconds", "frames", "workers", "core_seconds", "bytes", "file_bytes", "raw_bytes", "files"), 1
     )
-    printing.plan_report(made, SimpleNamespace(**numbers, basis="nothing", odds=SimpleNamespace(line="")))  # type: ignore[arg-type]
+    printing.plan_report(made, SimpleNamespace(**numbers, basis="nothing"))  # type: ignore[arg-type]
     assert "a [/b] [bold]c" in capsys.readouterr().out
 
 

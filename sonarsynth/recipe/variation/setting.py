@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import difflib
 import json
+import os
 import types
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from sonarsynth.conventions import Unit
-from sonarsynth.description import FieldError
+from sonarsynth.description import FieldError, named_files
 from sonarsynth.receiver import Sonar
 from sonarsynth.recipe.scene import Scene, Trajectory, World
 from sonarsynth.recipe.variation.values import Plain, Where, where
@@ -39,6 +41,23 @@ class Setting:
     def shown(self) -> str:
         """As errors say it."""
         return f"{self.name} = {self.value.shown}"
+
+
+Stamps = tuple[tuple[int, int] | None, ...]
+"""When files were changed, and their sizes."""
+
+
+def mesh_files(value: Any) -> tuple[str, ...]:
+    """Every file of a mesh or grid of heights in plain values, and every text that may be one."""
+    if isinstance(value, str):
+        return (value,) if Path(value).suffix else ()
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return tuple(dict.fromkeys(path for one in inner for path in mesh_files(one)))
+
+
+def file_stamps(paths: Iterable[str]) -> Stamps:
+    """As `named_files.stamp`, of each; None where there is no file."""
+    return tuple(named_files.stamp(path) if os.path.isfile(path) else None for path in paths)
 
 
 def plain_scene(scene: Scene) -> dict[str, Any]:

@@ -33,6 +33,11 @@ class Plain:
     text: str
     """Canonical JSON."""
 
+    def fits(self, wanted: Plain) -> bool:
+        """Whether it is that value, or one of that kind."""
+        content = self.value
+        return self == wanted or (isinstance(content, dict) and content.get("kind") == wanted.value)
+
     @property
     def value(self) -> Any:
         """The value."""
@@ -163,3 +168,8 @@ Name = Annotated[str, PlainValidator(_name), WithJsonSchema({"type": "string", "
 def default_name(paths: tuple[str, ...]) -> str:
     """What an entry without a name is called: targets_0_motion_heading."""
     return paths[0].removeprefix("scene.").removeprefix("world.").replace(".", "_")
+
+
+def leads_through(a: Where, b: Where) -> bool:
+    """Whether one path leads through the other."""
+    return all(x == y for x, y in zip(a, b, strict=False))
