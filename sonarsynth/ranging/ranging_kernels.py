@@ -7,8 +7,8 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-UNLIKE = 0.03
-"""Share of a pulse that is not explained, from which on sensors are asked for gains of their own: 1.5 dB of them make
+UNLIKE = 1e-3
+"""Share of a pulse that is not explained, from which on sensors are asked for gains of their own: 0.3 dB of them make
 as much."""
 
 
@@ -115,10 +115,9 @@ def template_sums(spectrum: Any, response: Any) -> Any:
 
 
 @nb.njit(cache=True, nogil=True)
-def share_beyond_gains(spectrum: Any, response: Any, template: Any) -> float:
-    """Share of the power of a pulse that the model of `lag_sums` does not explain, whatever the gain of each sensor.
-
-    Twice what the best gains leave: of another wave they take what is in phase, which is half.
+def beyond_gains(spectrum: Any, response: Any, template: Any) -> tuple[float, float]:
+    """What the model of `lag_sums` does not explain of a pulse, each sensor with the gain that suits it best; and the
+    power of the pulse, both (Pa s)^2 summed over sensors and bins.
     """
     power = explained = 0.0
     for q in range(len(spectrum)):
@@ -130,7 +129,7 @@ def share_beyond_gains(spectrum: Any, response: Any, template: Any) -> float:
             power += p.real**2 + p.imag**2
         if along > 0.0:
             explained += along**2 / loud
-    return 2.0 * (power - explained) / power if power > 0.0 else 1.0
+    return power - explained, power
 
 
 @nb.njit(cache=True, nogil=True)

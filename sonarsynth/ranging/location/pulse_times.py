@@ -246,8 +246,11 @@ def measure(
     noise = float(np.sum(residuals[live]))
     explained = float(wave.power @ np.abs(wave.template) ** 2)
     share = noise / (explained + noise) if explained + noise > 0 else 1.0
-    if share > ranging_kernels.UNLIKE:
-        share = min(share, ranging_kernels.share_beyond_gains(wave.spectrum[live], wave.response[live], wave.template))
+    if (
+        share > ranging_kernels.UNLIKE
+    ):  # gains of sensors are no noise; of another wave they take what is in phase, half
+        noise, power = ranging_kernels.beyond_gains(wave.spectrum[live], wave.response[live], wave.template)
+        share, dof = min(share, 2.0 * noise / power) if power > 0.0 else share, max(dof - np.sum(live), 1)
     return Pulse(aligned.frequency, wave.template, time, lag, weight, 2 * noise / dof, wave.power, share, None, deaf)
 
 
