@@ -39,21 +39,35 @@ def test_no_density_changes_no_number() -> None:
     assert int(empty["truth/soundscape"].snaps) == 0 and int(empty["truth/soundscape"].clear) == 1
 
 
-def test_a_chorus_is_added_and_changes_no_other_draw() -> None:
-    chorus = "scene.world.chorus={density: 0.02, reach: 100 m, images: 2}"
-    off = "scene.sonar.converter=null"
-    silent, both, louder = (
-        frame_of(off, *more) for more in ((), (chorus,), (chorus, "scene.world.chorus.level=205 dB"))
-    )
-    added = [tree["signals"].pressure.values - silent["signals"].pressure.values for tree in (both, louder)]
-    assert np.abs(added[0]).max() > 0.0
-    assert np.abs(added[1] - 10.0 * added[0]).max() <= 1e-4 * np.abs(added[1]).max()
-    assert (silent["truth/emissions/level"].values == both["truth/emissions/level"].values).all()
+PARTS = (
+    "scene.world.environment.noise=[{kind: flat, level: 30 dB}, {kind: wind, directions: {kind: surface}}]",
+    "scene.world.chorus={density: 0.02, reach: 100 m, images: 2}",
+    "scene.world.reverberation={bottom: {kind: lambert}, surface: null}",
+    "scene.world.noise_sources=[{motion: {kind: still, position: [60, 20, -2]}, sound: {kind: flat, level: 130 dB}}]",
+    "scene.sonar.electronics={level: 50 dB}",
+)
 
 
-def test_overlapping_windows_hear_the_same_chorus() -> None:
+def test_parts_of_the_sea_add_up_and_change_no_draw_of_each_other() -> None:
+    """All parts at once bring what each brings alone; a part that changed a draw of another would bring other noise."""
+
+    def heard(*more: str) -> np.ndarray:
+        recipe = reading.load(str(REMUS), [*SMALL, "scene.sonar.converter=null", *more])
+        return render(plan(recipe, ("signals",)), 1)["signals"].pressure.values.astype(float)
+
+    silent = heard()
+    alone = [heard(part) - silent for part in PARTS]
+    together = heard(*PARTS) - silent
+    quietest = min(np.sqrt(np.mean(part**2)) for part in alone)
+    assert np.abs(together - sum(alone)).max() < 1e-2 * quietest
+
+
+@pytest.mark.parametrize("sonar", ["still", "over the border of a cell"])
+def test_overlapping_windows_hear_the_same_chorus(sonar: str) -> None:
     """Two frames 2 ms apart hear the same sea: their records agree where they overlap."""
+    moving = "{kind: course, start: [24.994 m, 0 m, -5 m], heading: 90 deg, speed: 2 m/s}"
     more = (
+        *(() if sonar == "still" else (f"scene.trajectory.sonar={moving}",)),
         "scene.world.chorus={density: 0.05, reach: 60 m, images: 1, distant: false}",
         "scene.world.sources.0.source_level=0 dB",
         "scene.world.environment.noise=null",

@@ -43,10 +43,11 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     if scene.world.chorus is not None and plan.chorus is not None:
         reach, distant = plan.chorus, 0.0 if plan.distant_chorus is None else plan.distant_chorus.share
         level = reach.level - 10.0 * np.log10(1.0 - distant)
+        beyond, heard = (distant, "Gaussian noise") if distant else (10.0 ** (reach.beyond / 10.0), "left out")
         lines.append(
             f"chorus: {scene.world.chorus.row()}: predicted {level:.0f} dB re 1 uPa rms in the band, "
-            f"{100.0 * distant:.2g} % of it from beyond {reach.reach:.4g} m; excess kurtosis of snaps within "
-            f"{reach.kurtosis:.3g}"
+            f"snaps within {reach.reach:.4g} m one by one (excess kurtosis {reach.kurtosis:.3g}), those beyond, "
+            f"{100.0 * beyond:.2g} % of the power, {heard}"
         )
     cancelled = scene.processing.cancelling is not None
     if plan.propagation.bounces and not cancelled and plan.products & OF_BEAMS and plan.sizes["emission"]:
