@@ -43,7 +43,8 @@ PARTS = (
     "scene.world.environment.noise=[{kind: flat, level: 30 dB}, {kind: wind, directions: {kind: surface}}]",
     "scene.world.chorus={density: 0.02, reach: 100 m, images: 2}",
     "scene.world.reverberation={bottom: {kind: lambert}, surface: null}",
-    "scene.world.noise_sources=[{motion: {kind: still, position: [60, 20, -2]}, sound: {kind: flat, level: 130 dB}}]",
+    "scene.world.noise_sources="
+    "[{name: ship, motion: {kind: still, position: [60, 20, -2]}, sound: {kind: flat, level: 130 dB}}]",
     "scene.sonar.electronics={level: 50 dB}",
 )
 
