@@ -24,7 +24,7 @@ from sonarsynth.recipe.scene import Frame
 
 BRIGHT = 20.0
 """dB under the brightest beam: beams that count."""
-ZONES = (1, 2, 4, 8, 16)
+PARTS = (0, 1, 2, 3, 4)
 BESIDE = 0.02
 """rad of direction, and m of path: points of two clouds that are further apart are not one."""
 
@@ -39,8 +39,8 @@ def image_points(plan: Plan, beamformed: BeamformedFrame, peers: bool = True) ->
     settings: list[tuple[str, str, Any]] = []
     if plan.elements.on_lattice and isinstance(slow, DenseDelayAndSum):
         fast: Any = FocusedDelayAndSum(focus=slow.focus, shading=slow.shading)
-        if any(f.name == "zones" for f in fields(fast)):
-            settings += [("zones", f"{n} zones", replace(fast, zones=n)) for n in ZONES]
+        if any(f.name == "parts" for f in fields(fast)):
+            settings += [("parts", f"{n} x {n} parts", replace(fast, parts=n)) for n in PARTS]
         else:
             settings += [("focus", "focused", fast)]
         if slow.focus is not None:
@@ -72,8 +72,8 @@ def other_images(slow: Any, elements: Elements) -> list[Any]:
 
 def named(method: Any) -> str:
     """A beamformer in a few words."""
-    zones = getattr(method, "zones", None)
-    return f"{method.kind}, {zones} zones" if zones is not None else str(method.kind)
+    parts = getattr(method, "parts", None)
+    return f"{method.kind}, {parts} x {parts} parts" if parts is not None else str(method.kind)
 
 
 def imaged(beamformed: BeamformedFrame) -> bool:

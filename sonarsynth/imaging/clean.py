@@ -60,7 +60,7 @@ class Clean(Steering):
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`: an image for each direction that something is taken from."""
-        return DIRECTIONS * FocusedDelayAndSum(zones=4).cost(size)
+        return DIRECTIONS * FocusedDelayAndSum(parts=2).cost(size)
 
     def row(self) -> str:
         """Its kind, and how far down it goes."""

@@ -44,7 +44,7 @@ class SubBand(Steering):
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`: a little more than delay and sum."""
-        return 1.2 * FocusedDelayAndSum(zones=4).cost(size)
+        return FocusedDelayAndSum(parts=2).cost(size)
 
     def row(self) -> str:
         """Its kind, and the number of sub-bands."""

@@ -17,7 +17,7 @@ from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description.method import Demand
 from sonarsynth.planning.choices import OF_BEAMS, Choices
 from sonarsynth.planning.listening_windows import frame_start
-from sonarsynth.planning.measured.focus_zones import beamformer
+from sonarsynth.planning.measured.image_errors import beamformer
 from sonarsynth.planning.measured.ray_bending import ranging_error
 from sonarsynth.planning.measured.sampled_arrivals import sampled_arrivals
 from sonarsynth.planning.measured.sampled_frames import SampledScene

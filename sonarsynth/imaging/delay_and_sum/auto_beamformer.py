@@ -8,7 +8,7 @@ from sonarsynth.conventions import Floats, PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand
 from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
-from sonarsynth.imaging.delay_and_sum.focus_error import zones_needed
+from sonarsynth.imaging.delay_and_sum.focus_error import parts_needed
 from sonarsynth.imaging.delay_and_sum.focused import AUTO_ERROR, FocusedDelayAndSum
 from sonarsynth.imaging.image_window import Shading
 from sonarsynth.imaging.steering import Steering
@@ -18,8 +18,8 @@ from sonarsynth.receiver import Elements, Sonar
 
 @description
 class AutoBeamforming(Steering):
-    """Delay and sum: `focused` with the fewest zones that `focus_error` allows, `dense` where the array is no lattice
-    or 32 do not suffice."""
+    """Delay and sum: `focused` with the fewest parts that `focus_error` allows, `dense` where the array is no lattice
+    or 16 by 16 do not suffice."""
 
     kind: Literal["auto"] = "auto"
     focus: PositiveMetres | None = 20.0
@@ -42,9 +42,9 @@ class AutoBeamforming(Steering):
     def estimated(self, elements: Elements, sonar: Sonar, error_db: float) -> FocusedDelayAndSum | DenseDelayAndSum:
         """The method whose `focus_error`, an estimate and no bound, is not above `error_db` (dB)."""
         if elements.on_lattice:
-            zones = zones_needed(elements, self.shading, sonar, self.focus, error_db)
-            if zones is not None:
-                return FocusedDelayAndSum(focus=self.focus, shading=self.shading, zones=zones)
+            parts = parts_needed(elements, self.shading, sonar, self.focus, error_db)
+            if parts is not None:
+                return FocusedDelayAndSum(focus=self.focus, shading=self.shading, parts=parts)
         return DenseDelayAndSum(focus=self.focus, shading=self.shading)
 
     def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:

@@ -1,4 +1,4 @@
-"""What a lattice focused in zones gets wrong, and how many zones a tolerance needs: its error model.
+"""What a focused lattice gets wrong, and how many parts a tolerance needs: its error model.
 
 The error is that of one beam, for sources at the focus with a flat spectrum over the band: its energy with the delays
 that the zones leave out, against that with the delays of a sphere. The beams tried are those at the corners of the
@@ -23,9 +23,8 @@ from sonarsynth.imaging.delay_and_sum.zones import Lens, Zone, corners, for_sens
 from sonarsynth.imaging.image_window import Shading, weights
 from sonarsynth.receiver import Band, BeamGrid, Elements, Sonar
 
-MOST_ZONES = 32
-FALL = 0.6
-"""The error falls about as the zones to the power of minus one over this; a first guess."""
+PARTS = (0, 1, 2, 3, 4, 6, 8, 12, 16)
+"""Numbers of parts along each axis of an array that are tried; 0: the delay of the axis in all directions."""
 
 MARGIN = 1.1
 """The worst source lies between those that are tried."""
@@ -48,18 +47,18 @@ def focus_error(
     sound_speed: float,
     focus: float | None,
     band: Band,
-    zones: int,
+    parts: int,
     within: float = 20.0,
 ) -> float:
     """Estimate of the largest error (dB) of the image of a source at the focus, over beams `within` dB of its peak.
 
-    weight (sensor,), of sum one; focus in m, None for plane waves (no error); `zones` as for `FocusedDelayAndSum`.
+    weight (sensor,), of sum one; focus in m, None for plane waves (no error); `parts` as for `FocusedDelayAndSum`.
     within 0: the energy that is lost in the beam of the source itself.
     """
     if focus is None:
         return 0.0
-    glass, moments = lens(elements, focus, sound_speed), for_sensors(elements, weight, band)
-    cut = zones_of(glass, moments, beams, zones)
+    glass, moments = lens(elements, focus, sound_speed, parts), for_sensors(elements, weight, band)
+    cut = zones_of(glass, moments, beams, parts)
     u = quadrant(beams)
 
     def left_out(zone: Zone, at: tuple[int, int]) -> float:
@@ -136,37 +135,12 @@ def _unit(u: Floats) -> Floats:
     return np.concatenate([x, u], axis=-1)
 
 
-def zones_for(
-    elements: Elements,
-    weight: Floats,
-    beams: BeamGrid,
-    sound_speed: float,
-    focus: float | None,
-    band: Band,
-    error_db: float,
-    within: float = 20.0,
-) -> int | None:
-    """The fewest zones whose `focus_error` is not above error_db (dB), None if 32 are too few.
-
-    The error is taken to fall with every zone more: it does so on the whole, not at each.
-    """
-
-    few, many, guess = 0, MOST_ZONES + 1, 1
-    while many - few > 1:
-        error = focus_error(elements, weight, beams, sound_speed, focus, band, guess, within)
-        if error <= error_db:
-            many, guess = guess, (few + guess) // 2
-            continue
-        few = guess
-        ratio = (error / error_db) ** FALL if error_db > 0 else np.inf
-        guess = (few + many) // 2 if many <= MOST_ZONES else int(min(max(few + 1, few * ratio), MOST_ZONES))
-    return many if many <= MOST_ZONES else None
-
-
 @lru_cache(maxsize=64)
-def zones_needed(
+def parts_needed(
     elements: Elements, shading: Shading, sonar: Sonar, focus: float | None, error_db: float
 ) -> int | None:
-    """`zones_for` the array, the beams and the band of a sonar; kept from frame to frame."""
-    weight = weights(elements, shading)
-    return zones_for(elements, weight, sonar.beams, sonar.assumed_sound_speed, focus, sonar.band, error_db)
+    """The fewest parts whose `focus_error` is not above error_db (dB), None if all are too few; kept from frame to
+    frame."""
+    weight, band, speed = weights(elements, shading), sonar.band, sonar.assumed_sound_speed
+    tried = ((parts, focus_error(elements, weight, sonar.beams, speed, focus, band, parts)) for parts in PARTS)
+    return next((parts for parts, error in tried if error <= error_db), None)

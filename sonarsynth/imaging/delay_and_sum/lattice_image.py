@@ -84,38 +84,72 @@ class SteeredZone:
     rows: Ints  # of the image, ascending: those of the zone and of its mirror image
     columns: Ints
     shared: bool  # whether it and its mirror images take the same delays
-    delay: Floats  # s: (half column, half row) where shared, else (half column, half row, 4 mirrored sensors)
-    rise: Floats  # (row, side of y, half column) s: half of what a wave is sooner at the next row up
-    across: Floats  # (row, column) s: the same at the next column to port
+    delay: Floats  # s: (half column, half row) where shared, else (part, half column, half row, 4 mirrored sensors)
+    rise: Floats  # (row, part, side of y, half column) s: half of what a wave is sooner at the next row up
+    across: Floats  # (part, row, column) s: the same at the next column to port
     # where shared: (row,) and (column,), elevation and azimuth (rad) of a plane wave with the slopes that are kept
+    middle: Floats  # (part, row, column) s: what it is later in the middle of the part; empty where shared
 
 
 def steered(zone: Zone, elements: Elements, beams: BeamGrid, glass: Lens) -> SteeredZone:
     """The delays and the steps of a zone on a lattice."""
-    y = half_coordinates(elements.columns, elements.pitch)[:, None]
-    z = half_coordinates(elements.rows, elements.pitch)
     rows, columns = _mirrored(zone.low, zone.high, beams.elevations), _mirrored(zone.near, zone.far, beams.azimuths)
     if zone.shared:
+        y, z = (half_coordinates(count, elements.pitch) for count in (elements.columns, elements.rows))
         up, port = (np.arcsin(s) for s in zone.sines(glass, beams.elevation[rows], beams.azimuth[columns]))
-        return SteeredZone(rows, columns, True, glass.even(y, z, zone.centre), up, port)
-    delay = np.stack([glass.bulge(b * y, a * z, zone.centre) for a in (1, -1) for b in (1, -1)], axis=-1)
+        return SteeredZone(rows, columns, True, glass.even(y[:, None], z, zone.centre), up, port, np.empty(0))
+    y, z = (half_coordinates(count, elements.pitch) for count in (glass.part_columns, glass.part_rows))
+    middle_z, middle_y = (m.ravel()[:, None, None] for m in np.meshgrid(*_middles(glass), indexing="ij"))
+    delay = np.stack(
+        [glass.bulge(middle_y + b * y[:, None], middle_z + a * z, zone.centre) for a in (1, -1) for b in (1, -1)], -1
+    )
     u = quadrant(beams)[zone.low : zone.high, zone.near : zone.far]
-    level = np.stack(np.broadcast_arrays(zone.centre[0], u[:, 0, 1]), axis=-1)
-    sides = np.stack([y[:, 0], -y[:, 0]])
+    level = np.stack(np.broadcast_arrays(zone.centre[0], u[:, 0, 1]), axis=-1)[:, None, None, None, :]
+    rise = glass.slope_along_z(middle_y + np.stack([y, -y]), middle_z, level, zone.centre)
+    rise = level[..., 1] / glass.sound_speed - rise
+    across = u[..., 0] / glass.sound_speed - glass.slope_along_y(middle_y, middle_z, u, zone.centre)
+    middle = glass.bulge(middle_y, middle_z, u) - glass.bulge(middle_y, middle_z, zone.centre)
+    middle -= (u[..., 0] * middle_y + u[..., 1] * middle_z) / glass.sound_speed
     half = 0.5 * elements.pitch
-    rise = level[:, None, None, 1] / glass.sound_speed
-    rise = half * (rise - glass.slope_along_z(sides, level[:, None, None, :], zone.centre))
-    across = half * (u[..., 0] / glass.sound_speed - glass.slope_along_y(u, level[:, None, :]))
-    return SteeredZone(rows, columns, False, delay, rise, across)
+    return SteeredZone(rows, columns, False, delay, half * rise, half * across, middle)
+
+
+def _middles(glass: Lens) -> tuple[Floats, Floats]:
+    """z (part,) and y (part,) in m of the middles of the parts, in the order of rows and of columns."""
+    part = 2 * np.arange(glass.parts)
+    z = 0.5 * glass.pitch * (glass.rows - glass.part_rows * (1 + part))
+    y = 0.5 * glass.pitch * (glass.columns - glass.part_columns * (1 + part))
+    return np.asarray(z), np.asarray(y)
+
+
+def fold_parts(elements: Elements, parts: int) -> tuple[Ints, Ints]:
+    """Live elements of each part, of the array and of its mirror images: (mirror, part, half column, half row, 4) as
+    `lattices.mirrored_sensors` places them; and rows in use (part, half column). Mirrored in y: 1, in z: 2, in both: 3.
+    """
+    live, nobody = np.flatnonzero(elements.gain), elements.count
+    rows, columns = -(-elements.rows // parts), -(-elements.columns // parts)
+    places = []
+    for mirror in range(4):
+        row = elements.rows - 1 - elements.row if mirror & 2 else elements.row
+        column = elements.columns - 1 - elements.column if mirror & 1 else elements.column
+        part = (row // rows * parts + column // columns)[live]
+        places.append(
+            [mirrored_sensors(column % columns, row % rows, columns, rows, live[part == p], nobody)
+             for p in range(parts * parts)]
+        )  # fmt: skip
+    used = np.min(places, axis=(0, 4)) < nobody
+    heights = np.where(np.any(used, axis=2), used.shape[2] - np.argmax(used[:, :, ::-1], axis=2), 0)
+    return np.asarray(places), heights
 
 
 @lru_cache(maxsize=16)
 def steered_zones(
-    elements: Elements, shading: Shading, beams: BeamGrid, focus: float, sound_speed: float, band: Band, zones: int
+    elements: Elements, shading: Shading, beams: BeamGrid, focus: float, sound_speed: float, band: Band, parts: int
 ) -> tuple[SteeredZone, ...]:
-    """The zones of a beam grid cut into zones x zones parts, ready for `zoned_energies`; kept from frame to frame."""
-    glass = lens(elements, focus, sound_speed)
-    cut = zones_of(glass, for_sensors(elements, weights(elements, shading), band), beams, zones)
+    """The zones of a beam grid for an array cut into parts x parts, ready for `zoned_energies`; kept from frame to
+    frame."""
+    glass = lens(elements, focus, sound_speed, parts)
+    cut = zones_of(glass, for_sensors(elements, weights(elements, shading), band), beams, parts)
     return tuple(steered(zone, elements, beams, glass) for zone in cut)
 
 
@@ -138,22 +172,27 @@ def zoned_energies(
     from sonarsynth.equations.kernels.lanes import LANES
     from sonarsynth.equations.kernels.phasors import padded_bins
     from sonarsynth.imaging.delay_and_sum.lattice_kernel import lattice_energies
-    from sonarsynth.imaging.delay_and_sum.zone_kernel import zone_energies
+    from sonarsynth.imaging.delay_and_sum.part_kernel import part_energies
 
-    places, heights = fold(elements)
     padded = padded_bins(spectra, elements.count + 1, LANES)
-    array = padded.view(np.float32).ravel(), padded.shape[1], places, np.append(weight, 0.0).astype(np.float32)
-    odd = elements.rows % 2 == 1, elements.columns % 2 == 1
+    pairs, bins = padded.view(np.float32).ravel(), padded.shape[1]
+    live = np.append(weight, 0.0).astype(np.float32)
     band = first_and_spacing(frequencies)
     image = np.empty((beams.elevations, beams.azimuths))
     for zone in zones:
         if zone.shared:
-            half = 0.5 * elements.pitch / sound_speed
+            places, heights = fold(elements)
+            odd, half = (elements.rows % 2 == 1, elements.columns % 2 == 1), 0.5 * elements.pitch / sound_speed
             image[np.ix_(zone.rows, zone.columns)] = lattice_energies(
-                *array, zone.delay, heights, *odd, half, *band, zone.across, zone.rise
+                pairs, bins, places, live, zone.delay, heights, *odd, half, *band, zone.across, zone.rise
             )
             continue
-        energy = zone_energies(*array, zone.delay, heights, *odd, zone.rise, zone.across, *band)
+        parts = round(len(zone.delay) ** 0.5)
+        places, heights = fold_parts(elements, parts)
+        odd = -(-elements.rows // parts) % 2 == 1, -(-elements.columns // parts) % 2 == 1
+        energy = part_energies(
+            pairs, bins, places, live, zone.delay, heights, *odd, zone.rise, zone.across, zone.middle, *band
+        )
         rows, columns = zone.rows[-energy.shape[1] :], zone.columns[-energy.shape[2] :]
         # From the far corner on: beams on an axis are their own mirror images, and are taken from the zone itself.
         image[np.ix_(beams.elevations - 1 - rows, beams.azimuths - 1 - columns)] = energy[3]

@@ -1,18 +1,19 @@
-"""Zones of a picture that are focused each on its own centre: where they lie, and what delay is left out in each.
+"""What delay of focusing a lattice takes in which beams, and what of it is left out.
 
 A lattice is fast where the delay of focusing is a property of the sensor, not of the beam. W(u), the delay of a sphere
-less that of the plane wave from the same direction u, changes with u; a zone takes it from its own centre, and from
-there to each beam keeps what separates: the slope of W along z in each column, and its slope along y.
+less that of the plane wave from the same direction u, changes with u. A zone of the picture takes it from its own
+centre, and from there to each beam keeps what separates: the slope of W along z in each column, and its slope along y.
+What is left falls as the square of the array, so a large one is cut into parts, each with slopes of its own about its
+own middle.
 
 A zone and its three mirror images share all sums if the delay is the same for the four mirrored sensors; it is that
 part of W which is even in y and in z. What it leaves out, odd in both, grows with u_y u_z: near the axes of the picture
-nothing else is needed. A zone is `shared` where this is no worse than the worst zone of the others.
+nothing else is needed. There a zone is `shared`, as wide as it is no worse than the rest.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -20,16 +21,13 @@ from sonarsynth.conventions import Floats
 from sonarsynth.receiver import Band, BeamGrid, Elements
 
 REACH = 0.6
-"""Slopes are taken between this part of the half width of the array and its mirror image."""
+"""Slopes are taken between this part of the half width of a part of the array and its mirror image."""
 
 EVEN, ODD = 20.0, 10.0
 """dB by which a phase of 1 rad2, and of 1 rad, changes beams 20 dB under the peak, about."""
 
-BANDS = 2.0 / 3.0
-"""Bands of rows are cut at this power of 0 to 1: with u_z^2 more is left out, and less may be near the middle."""
-
 WORTH = 3
-"""A shared zone is taken if another would not be more than so many times as wide: it is that much faster."""
+"""A shared zone is taken if the picture is not more than so many times as wide: it is that much faster."""
 
 CELLS = 14
 """Cells in each direction into which a larger array is gathered for estimates."""
@@ -37,12 +35,42 @@ CELLS = 14
 
 @dataclass(frozen=True, eq=False)
 class Lens:
-    """What focuses an array: where, at what sound speed, and at which heights slopes are taken."""
+    """What focuses a lattice: where, at what sound speed, and in which parts."""
 
     focus: float  # m
     sound_speed: float  # m/s
-    half_width: float  # m
-    half_height: float  # m
+    pitch: float  # m
+    columns: int  # of the lattice
+    rows: int
+    parts: int  # along each axis
+
+    @property
+    def part_columns(self) -> int:
+        """Columns of a part; the last may lack some."""
+        return -(-self.columns // self.parts)
+
+    @property
+    def part_rows(self) -> int:
+        """Rows of a part."""
+        return -(-self.rows // self.parts)
+
+    @property
+    def half_width(self) -> float:
+        """Distance (m) along y from the middle of a part at which slopes are taken."""
+        return 0.5 * REACH * self.pitch * self.part_columns
+
+    @property
+    def half_height(self) -> float:
+        """The same along z."""
+        return 0.5 * REACH * self.pitch * self.part_rows
+
+    def middle(self, y: Floats, z: Floats) -> tuple[Floats, Floats]:
+        """y and z (...) in m of the middle of the part of sensors at y, z (...) m."""
+        middles = []
+        for place, count, step in ((y, self.columns, self.part_columns), (z, self.rows, self.part_rows)):
+            part = np.floor((0.5 * count - place / self.pitch) / step)  # counted as columns and rows are: from above
+            middles.append(0.5 * self.pitch * (count - step - 2 * step * np.clip(part, 0, self.parts - 1)))
+        return middles[0], middles[1]
 
     def bulge(self, y: Floats, z: Floats, u: Floats) -> Floats:
         """W (...) in s at y, z (...) m for directions u (..., yz): the delay of a sphere less that of a plane wave.
@@ -58,19 +86,24 @@ class Lens:
         """The part of W that is even in y and in z."""
         return 0.25 * (self.bulge(y, z, u) + self.bulge(-y, z, u) + self.bulge(y, -z, u) + self.bulge(-y, -z, u))
 
-    def slope_along_z(self, y: Floats, u: Floats, centre: Floats) -> Floats:
-        """Slope along z (s/m) at y of W(u) - W(centre)."""
-        z = np.asarray(self.half_height)
-        rise = self.bulge(y, z, u) - self.bulge(y, z, centre) - self.bulge(y, -z, u) + self.bulge(y, -z, centre)
-        return 0.5 * rise / self.half_height
+    def slope_along_z(self, y: Floats, z: Floats, u: Floats, centre: Floats) -> Floats:
+        """Slope along z (s/m) of W(u) - W(centre) at y, about z (...) m."""
+        upper, lower = (self.bulge(y, z + h, u) - self.bulge(y, z + h, centre) for h in _both(self.half_height))
+        return np.asarray(0.5 * (upper - lower) / self.half_height)
 
-    def slope_along_y(self, u: Floats, centre: Floats) -> Floats:
-        """Slope along y (s/m) of W(u) - W(centre), the mean of those above and below the middle."""
-        y, slope = np.asarray(self.half_width), np.zeros(())
-        for z in (np.asarray(self.half_height), np.asarray(-self.half_height)):
-            rise = self.bulge(y, z, u) - self.bulge(y, z, centre) - self.bulge(-y, z, u) + self.bulge(-y, z, centre)
-            slope = slope + 0.25 * rise / self.half_width
+    def slope_along_y(self, y: Floats, z: Floats, u: Floats, centre: Floats) -> Floats:
+        """Slope along y (s/m) of W(u) - W(centre) about y, the mean of those above and below z (...) m."""
+        slope = np.zeros(())
+        for h in _both(self.half_height):
+            port, starboard = (
+                self.bulge(y + w, z + h, u) - self.bulge(y + w, z + h, centre) for w in _both(self.half_width)
+            )
+            slope = slope + 0.25 * (port - starboard) / self.half_width
         return slope
+
+
+def _both(distance: float) -> tuple[float, float]:
+    return distance, -distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +135,12 @@ class Zone:
 
         def raised(sine: Floats) -> Floats:
             u = np.stack(np.broadcast_arrays(self.centre[0], sine), axis=-1)
-            y = np.asarray(glass.half_width)
-            slope = glass.slope_along_z(y, u, on_axis) + glass.slope_along_z(-y, u, on_axis)
+            y, z = np.asarray(glass.half_width), np.zeros(())
+            slope = glass.slope_along_z(y, z, u, on_axis) + glass.slope_along_z(-y, z, u, on_axis)
             return np.asarray(sine - 0.5 * glass.sound_speed * slope)
 
         u = np.stack(np.broadcast_arrays(middle * np.sin(azimuth), self.centre[1]), axis=-1)
-        across = u[..., 0] - glass.sound_speed * glass.slope_along_y(u, on_axis)
+        across = u[..., 0] - glass.sound_speed * glass.slope_along_y(np.zeros(()), np.zeros(()), u, on_axis)
         return raised(np.sin(elevation)), across / np.sqrt(1.0 - raised(self.centre[1]) ** 2)
 
     def left_out(self, glass: Lens, y: Floats, z: Floats, u: Floats) -> Floats:
@@ -122,8 +155,11 @@ class Zone:
             return exact - glass.even(y, z, self.centre) - modelled / glass.sound_speed
         u = u[:, None, :]
         level = np.stack(np.broadcast_arrays(self.centre[0], u[..., 1]), axis=-1)
-        modelled = glass.bulge(y, z, self.centre) + z * glass.slope_along_z(y, level, self.centre)
-        return exact - modelled - y * glass.slope_along_y(u, level)
+        middle_y, middle_z = glass.middle(y, z)
+        middle = glass.bulge(middle_y, middle_z, u) - glass.bulge(middle_y, middle_z, self.centre)
+        rise = (z - middle_z) * glass.slope_along_z(y, middle_z, level, self.centre)
+        across = (y - middle_y) * glass.slope_along_y(middle_y, middle_z, u, self.centre)
+        return np.asarray(exact - glass.bulge(y, z, self.centre) - middle - rise - across)
 
     def variances(self, glass: Lens, moments: ArrayMoments, u: Floats) -> tuple[Floats, Floats]:
         """Variance over the array (beam,) in rad2 of what is left out in beams u (beam, yz): even and odd part."""
@@ -146,10 +182,9 @@ def corners(zone: Zone) -> list[tuple[int, int]]:
     return [(row, column) for row in {zone.low, zone.high - 1} for column in {zone.near, zone.far - 1}]
 
 
-def lens(elements: Elements, focus: float, sound_speed: float) -> Lens:
-    """The lens of a lattice."""
-    reach = 0.5 * REACH * elements.pitch
-    return Lens(focus, sound_speed, reach * elements.columns, reach * elements.rows)
+def lens(elements: Elements, focus: float, sound_speed: float, parts: int) -> Lens:
+    """The lens of a lattice that is cut into parts (0: its axis does for all beams, so it is one)."""
+    return Lens(focus, sound_speed, elements.pitch, elements.columns, elements.rows, max(parts, 1))
 
 
 def for_sensors(elements: Elements, weight: Floats, band: Band) -> ArrayMoments:
@@ -170,57 +205,36 @@ def quadrant(beams: BeamGrid) -> Floats:
     return np.stack(np.broadcast_arrays(across, np.sin(elevation)[:, None]), axis=-1)
 
 
-def zones_of(glass: Lens, moments: ArrayMoments, beams: BeamGrid, zones: int) -> list[Zone]:
-    """The zones of a beam grid: `zones` across where most is left out, at its upper and lower edge.
+def zones_of(glass: Lens, moments: ArrayMoments, beams: BeamGrid, parts: int) -> list[Zone]:
+    """The zones of a beam grid for an array cut into parts x parts.
 
-    There are half as many bands of rows, narrower away from the middle. From the middle outwards each zone of a band is
-    as wide as may be for what it leaves out (as `Zone.estimate` has it) not to be more than in the worst of that many
-    zones in the band at the edge. One zone: that of the acoustic axis.
+    None: one, with the delays of the acoustic axis. One part: a shared zone in the middle, all rows high and as wide as
+    may be for what it leaves out (as `Zone.estimate` has it) not to be more than at the edges of the picture; and the
+    rest. More: all of the picture.
     """
     u = quadrant(beams)
-    if zones == 1:
-        return [Zone(0, u.shape[0], 0, u.shape[1], np.zeros(2), True, True)]
-    count = zones // 2
-    bands = _parts(beams.elevation[beams.elevations // 2 :], (np.arange(1, count) / count) ** BANDS)
-    azimuths = _parts(beams.azimuth[beams.azimuths // 2 :], np.arange(2 - zones % 2, zones, 2) / zones)
+    wide = u.shape[1]
+    if parts == 0:
+        return [Zone(0, u.shape[0], 0, wide, np.zeros(2), True, True)]
+    whole = _zone(u, 0, wide, False)
+    if parts > 1:
+        return [whole]
 
     def estimate(zone: Zone) -> float:
         rows, columns = zip(*corners(zone), strict=True)
         return zone.estimate(glass, moments, u[list(rows), list(columns)])
 
-    def widest(low: int, high: int, near: int, shared: bool) -> Zone | None:
-        chosen, stop = None, u.shape[1] + 1
-        far = u.shape[1]
-        while far > (chosen.far if chosen else near):
-            zone = _zone(u, low, high, near, far, shared)
-            if estimate(zone) <= worst:
-                chosen = zone
-            else:
-                stop = far
-            far = ((chosen.far if chosen else near) + stop) // 2
-        return chosen
-
-    edge = [_zone(u, *bands[-1], *span, False) for span in azimuths]
-    columns = [_zone(u, *band, u.shape[1] - 1, u.shape[1], False) for band in bands]
-    worst = max(estimate(zone) for zone in edge + columns)
-    tiling: list[Zone] = []
-    for low, high in bands:
-        near = 0
-        while near < u.shape[1]:
-            shared, zone = widest(low, high, near, True), widest(low, high, near, False)
-            if shared is not None and (zone is None or WORTH * (shared.far - near) >= zone.far - near):
-                zone = shared
-            tiling.append(zone or _zone(u, low, high, near, near + 1, False))
-            near = tiling[-1].far
-    return tiling
+    worst = max(estimate(whole), estimate(_zone(u, wide - 1, wide, False)))
+    good, bad = 0, wide + 1
+    while bad - good > 1:
+        far = (good + bad) // 2
+        good, bad = (far, bad) if estimate(_zone(u, 0, far, True)) <= worst else (good, far)
+    if WORTH * good < wide:
+        return [whole]
+    return [_zone(u, 0, good, True), *([_zone(u, good, wide, False)] if good < wide else [])]
 
 
-def _zone(u: Floats, low: int, high: int, near: int, far: int, shared: bool) -> Zone:
-    directions = u[low:high, near:far].reshape(-1, 2)
-    return Zone(low, high, near, far, 0.5 * (directions.min(axis=0) + directions.max(axis=0)), shared)
-
-
-def _parts(angles: Floats, edges: Floats) -> list[tuple[int, int]]:
-    """Parts of `angles` (count,) >= 0, cut at `edges` (...) 0 to 1 of the largest: first, and one after the last."""
-    cut = sorted({0, *(int(i) for i in np.searchsorted(angles, edges * angles[-1])), len(angles)})
-    return list(pairwise(cut))
+def _zone(u: Floats, near: int, far: int, shared: bool) -> Zone:
+    directions = u[:, near:far].reshape(-1, 2)
+    centre = 0.5 * (directions.min(axis=0) + directions.max(axis=0))
+    return Zone(0, u.shape[0], near, far, centre, shared)

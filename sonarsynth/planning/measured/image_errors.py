@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import direction
+from sonarsynth.conventions import Floats, Ints, direction
 from sonarsynth.description.method import Demand
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging.delay_and_sum.dense import dense_energies
@@ -27,40 +28,56 @@ SAFETY = 1.25
 """What was measured in some frames may be so much more in others."""
 
 
+@dataclass(frozen=True, eq=False)
+class ExactBeams:
+    """Bright beams of a frame with the exact delays of a focus: what images are compared with."""
+
+    signals: Signals
+    start: float  # s: of the echo window
+    stop: float
+    row: Ints  # (beam,) elevation index
+    column: Ints  # (beam,) azimuth index
+    energy: Floats  # (beam,) Pa2 s
+
+    def error(self, plan: Plan, method: Any) -> float:
+        """Root mean square error (dB) of an image by `method`."""
+        image = method.image(self.signals, plan.elements, plan.scene.sonar, self.start, self.stop).energy.astype(float)
+        with np.errstate(divide="ignore"):
+            wrong = 10.0 * np.log10(image[self.row, self.column] / self.energy)
+        return float(np.sqrt(np.mean(wrong**2)))
+
+
 def beamformer(plan: Plan, indices: Sequence[int]) -> tuple[Any, float]:
     """The beamformer of a plan, and its error: root mean square in dB, over beams within 20 dB of the brightest."""
-    accuracy, sampled = plan.recipe.accuracy, list[tuple[Signals, float, float]]()
+    accuracy, exact = plan.recipe.accuracy, dict[Any, list[ExactBeams]]()
 
     def error(method: Any) -> float:
-        if not sampled:
-            sampled.extend(
-                signals for signals in (_signals_of_frame(plan, index) for index in indices) if signals is not None
-            )
-        return max((image_error(plan, method, *sample) for sample in sampled), default=0.0)
+        if method.exact() not in exact:
+            signals = (_signals_of_frame(plan, index) for index in indices)
+            beams = (exact_beams(plan, method, *sample) for sample in signals if sample is not None)
+            exact[method.exact()] = [frame for frame in beams if frame is not None]
+        return max((frame.error(plan, method) for frame in exact[method.exact()]), default=0.0)
 
     demand = Demand(accuracy.image_db / SAFETY, accuracy.exact, error, plan.elements)
     return plan.scene.processing.beamforming.resolve(demand)
 
 
-def image_error(plan: Plan, method: Any, signals: Signals, start: float, stop: float) -> float:
-    """Root mean square error (dB) of an image of signals from start to stop (s), over its bright beams, against the
-    exact delay and sum of its focus and weights."""
+def exact_beams(plan: Plan, method: Any, signals: Signals, start: float, stop: float) -> ExactBeams | None:
+    """Beams of signals from start to stop (s) that are bright as `method` has them, by the exact delay and sum of its
+    focus and weights; None in silence."""
     slow = method.exact()
     elements, sonar = plan.elements, plan.scene.sonar
     energy = method.image(signals, elements, sonar, start, stop).energy.astype(float)
     if not energy.any():
-        return 0.0
+        return None
     row, column = np.nonzero(energy >= energy.max() * 10.0 ** (-WITHIN / 10.0))
     every = -(-len(row) // COMPARED)
     row, column = row[::every], column[::every]
     snapshots = snapshots_of(signals, sonar, start, stop)
     beams = direction(sonar.beams.azimuth[column], sonar.beams.elevation[row])
     delay = focus_delay(elements.position, beams, slow.focus, sonar.assumed_sound_speed)
-    exact = snapshots.unit * dense_energies(
-        snapshots.spectra, delay, weights(elements, slow.shading), snapshots.frequency
-    )
-    wrong = 10.0 * np.log10(energy[row, column] / exact)
-    return float(np.sqrt(np.mean(wrong**2)))
+    exact = dense_energies(snapshots.spectra, delay, weights(elements, slow.shading), snapshots.frequency)
+    return ExactBeams(signals, start, stop, row, column, snapshots.unit * exact)
 
 
 def _signals_of_frame(plan: Plan, index: int) -> tuple[Signals, float, float] | None:
