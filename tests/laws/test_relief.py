@@ -12,6 +12,7 @@ from sonarsynth.geometry.motion import Still
 from sonarsynth.pipeline import trace_frame
 from sonarsynth.planning import plan
 from sonarsynth.products import Arrivals
+from sonarsynth.products.paths import FAMILIES
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.populations.population import BodyModel, Population
 from sonarsynth.recipe.populations.regions import BoxRegion
@@ -127,6 +128,18 @@ def test_bodies_lie_on_it(tmp_path) -> None:
     over = np.array([z for *_, z in drawn]) + 10.0 - 0.1 - ground  # their lowest points
     assert np.ptp(ground) > 0.5
     assert (over > 0.0).all() and (over < 0.5).all()
+
+
+@pytest.mark.parametrize(("middle", "hidden"), [(14.0, 1), (6.0, 0)])
+def test_the_plan_says_which_mirror_reflections_a_relief_takes(tmp_path, middle: float, hidden: int) -> None:
+    """The ball is 20 m ahead, 2 m over the bottom, the array 5 m over it: by the bottom at 14.3 m, or not at all."""
+    hill = grid(tmp_path / "hill.npz", lambda x, y: 0.5 * (np.hypot(x - middle, y) < 1.5))
+    made, silent = plan(sea(hill, edge=0.5, mirrors=True), {"signals"}), paths(sea(None, mirrors=True))[0]
+    bound = next(row.bound for row in made.left_out if row.what == "relief in mirror reflections")
+    assert bound.startswith(f"of the first frame's 3 by the bottom {hidden} are under it: lost")
+    found = trace_frame(made, 0).arrivals
+    by_bottom = [a.select((a.arrives_by == FAMILIES.index("bottom")) & (a.target == 0)) for a in (found, silent)]
+    assert energy(by_bottom[0], 0) == (0.0 if hidden else pytest.approx(energy(by_bottom[1], 0), rel=1e-12))
 
 
 def test_a_file_that_changes_is_seen_by_sequences_that_are_drawn(tmp_path) -> None:

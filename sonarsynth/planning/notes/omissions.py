@@ -6,6 +6,7 @@ import numpy as np
 
 from sonarsynth.environment.boundary_numbers import rms_height
 from sonarsynth.environment.casts import profile_of
+from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.planning.choices import ALL_PRODUCTS
 from sonarsynth.planning.measured.ray_bending import bending_error
 from sonarsynth.planning.measured.sampled_arrivals import one_facet_in
@@ -20,6 +21,7 @@ from sonarsynth.scattering import MirrorLobe
 from sonarsynth.signals.chorus.chorus_arrivals import FAINT
 from sonarsynth.state import FrameContext, Receiver, Tolerances
 from sonarsynth.targets.mesh_resolution import expected_error
+from sonarsynth.targets.relief import BOTTOM, highest_within
 from sonarsynth.tracing.arrivals import trace
 
 ENOUGH = 2500
@@ -79,14 +81,31 @@ def _relief_left_out(plan: Plan) -> list[Omission]:
         return []
     highest, up = float(relief.box[1, 2]), relief.normal[:, 2] > 0.0
     area = float((relief.area * relief.normal[:, 2])[up].sum())
-    late = f"up to {2e3 * highest / slowest:.2g} ms ({highest:.3g} m of height) late over its {area:.3g} m2"
-    rows = [
-        Omission("relief in mirror reflections", "they are at the mean plane", f"those under it are hidden, not {late}")
-    ]
+    early = f"up to {2e3 * highest / slowest:.2g} ms early over its {area:.3g} m2"
+    hidden, points = _mirror_points_under(plan, relief)
+    lost = f"of the first frame's {points} by the bottom {hidden} are under it: lost, not {early}"
+    rows = [Omission("relief in mirror reflections", "they are at the mean plane", lost)]
+    if least := plan.scene.world.relief.least if plan.scene.world.relief else 0.0:
+        bound = f"mirror reflections up to {2e3 * least / slowest:.2g} ms early; no slopes that scatter"
+        rows.append(Omission(f"relief of less than {least:.3g} m", "it would hide the mean plane under it", bound))
     if plan.scene.world.reverberation is not None or plan.scene.world.chorus is not None:
         why = "their places are on the mean plane, and nothing hides them"
         rows.append(Omission("relief in reverberation and chorus", why, f"{area:.3g} m2 are heard through it"))
     return rows
+
+
+def _mirror_points_under(plan: Plan, relief: Mesh) -> tuple[int, int]:
+    """How many mirror reflections by the bottom alone are under a relief, in the first frame, and how many there are:
+    from snaps to the array and to targets, and from these to the array, straight."""
+    frame, depth = plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1], plan.medium.depth
+    bodies = [b.pose.position for b in frame.moment.bodies if b.name != BOTTOM]
+    own, snaps = frame.sonar_pose.position, [s.position for s in frame.moment.snaps]
+    pairs = [(a, b) for a in snaps for b in (own, *bodies)] + [(a, own) for a in bodies]
+    heights = [(max(a[2] + depth, 0.0), max(b[2] + depth, 0.0)) for a, b in pairs]
+    points = [
+        a + (b - a) * (x / (x + y) if x + y > 0.0 else 0.5) for (a, b), (x, y) in zip(pairs, heights, strict=True)
+    ]
+    return sum(highest_within(relief, point[:2], 0.0) > 0.0 for point in points), len(points)
 
 
 def _chorus_left_out(plan: Plan) -> list[Omission]:
