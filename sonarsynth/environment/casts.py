@@ -15,7 +15,7 @@ from sonarsynth.description import named_files
 from sonarsynth.environment.down_cast import PLAUSIBLE, Selection, averaged, left_out, select
 from sonarsynth.environment.hydrography import SpeedFormula, sea_water_speed
 from sonarsynth.environment.profiles import nearest
-from sonarsynth.environment.readers import READ, CastError, CastTable, read_cast
+from sonarsynth.environment.readers import READ, CastError, CastTable, files_of, read_cast
 from sonarsynth.environment.sound_speed import (
     Cast,
     Catenary,
@@ -55,14 +55,14 @@ def profile_of(sound_speed: SoundSpeed) -> Profile:
     """
     if isinstance(sound_speed, Cast):
         try:
-            return _profile_of(sound_speed, named_files.stamp(sound_speed.path))
+            return _profile_of(sound_speed, tuple(map(named_files.stamp, files_of(Path(sound_speed.path)))))
         except named_files.FileError as error:
             raise CastError(f"{sound_speed.path}: {error}") from None
     return _profile_of(sound_speed, None)
 
 
 @lru_cache(maxsize=64)
-def _profile_of(sound_speed: SoundSpeed, stamp: tuple[int, int] | None) -> Profile:
+def _profile_of(sound_speed: SoundSpeed, stamps: tuple[tuple[int, int], ...] | None) -> Profile:
     match sound_speed:
         case Isovelocity():
             return _profile([0.0], [sound_speed.speed])

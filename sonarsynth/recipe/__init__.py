@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from pydantic import Discriminator, Tag, TypeAdapter
 
 from sonarsynth.description import description, named_files
 from sonarsynth.environment.noise import RecordedNoise
+from sonarsynth.environment.readers import files_of
 from sonarsynth.environment.sound_speed import Cast
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.recorded_track import RecordedTrack
@@ -201,7 +203,7 @@ def _by_content(value: Any) -> Any:
     """The same JSON value with the path of each file replaced by the digest of what it holds."""
     if isinstance(value, dict):
         path = value.get("path") if value.get("kind") in FILE_KINDS else None
-        content = {"path": named_files.digest(path)} if isinstance(path, str) else {}
+        content = {"path": "+".join(map(named_files.digest, files_of(Path(path))))} if isinstance(path, str) else {}
         return {name: _by_content(v) for name, v in value.items()} | content
     return [_by_content(v) for v in value] if isinstance(value, list) else value
 

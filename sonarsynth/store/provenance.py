@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from sonarsynth.description.named_files import digest
+from sonarsynth.environment.readers import files_of
 from sonarsynth.recipe import FILE_KINDS
 
 if TYPE_CHECKING:
@@ -189,7 +190,7 @@ def paths(value: Any) -> Iterator[str]:
     """Paths of files in a recipe."""
     if isinstance(value, Mapping):
         if any(value.get("kind") == kind for kind in FILE_KINDS) and isinstance(value.get("path"), str):
-            yield value["path"]
+            yield from map(str, files_of(Path(value["path"])))
         for inner in value.values():
             yield from paths(inner)
     elif isinstance(value, list):

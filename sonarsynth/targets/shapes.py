@@ -34,7 +34,7 @@ class BodyShape(Method):
 @description
 class MeshFile(BodyShape):
     """A mesh in a file: STL, OBJ, PLY, OFF, glTF, COLLADA, 3MF, or a text of three lines a facet; or a grid of heights
-    (CSV, npz, netCDF): x, y and z (or depth) in metres, whose front is above."""
+    (CSV, npz, netCDF): x, y and z (or depth) in metres, whose front is above; or a bottom of Bellhop (BTY)."""
 
     kind: Literal["mesh_file"] = "mesh_file"
     path: str

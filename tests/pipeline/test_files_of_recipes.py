@@ -180,6 +180,28 @@ def test_a_path_means_one_thing(
         reading.load(file, [f"{place}={{kind: {kind}, path: there.x}}"])
 
 
+def test_a_file_that_need_not_say_its_kind_is_one_too(
+    home: Path, small_text: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The relief has meshes alone."""
+    file, place = home / "recipe.yaml", "scene.world.relief.shape"
+    (home / "reef.stl").write_bytes((home / "here.stl").read_bytes())
+    for path, message in (("link.stl", "is a link out of the folder"), ("/etc/passwd", "is an absolute path")):
+        file.write_text(small_text.replace("  world:", f"  world:\n    relief: {{shape: {{path: {path}}}}}", 1))
+        with pytest.raises(RecipeError, match=rf"{place}\.path: {message}"):
+            reading.load(file)
+        grid = f"grid: [{{path: {place}, values: [{{path: reef.stl}}, {{path: {path}}}]}}]\n"
+        file.write_text(small_text.replace("  world:", "  world:\n    relief: {shape: {path: reef.stl}}", 1) + grid)
+        with pytest.raises(RecipeError, match=rf"grid\.0\.values\.1\.path: {message}"):
+            reading.load(file)
+    file.write_text(small_text)
+    monkeypatch.chdir(tmp_path)  # in `--set` it starts at the shell's folder
+    with pytest.raises(RecipeError, match=rf"{place}\.path: no such file: reef\.stl, in {tmp_path}$"):
+        reading.load(file, ["scene.world.relief={shape: {path: reef.stl}}"])
+    relief = reading.load(file, ["scene.world.relief={shape: {path: home/reef.stl}}"]).scene.world.relief
+    assert relief.shape.path == str(home / "reef.stl")
+
+
 def yaml_text(data: object) -> str:
     out = io.StringIO()
     YAML(typ="safe").dump(data, out)

@@ -15,7 +15,9 @@ from sonarsynth.environment.casts import CastError, profile_of
 from sonarsynth.environment.sound_speed import Cast
 from sonarsynth.equations.water.boundary_reflection import rayleigh
 from sonarsynth.export import write_bellhop
+from sonarsynth.geometry.surfaces import MeshError
 from sonarsynth.recipe.reading import load
+from sonarsynth.targets.mesh_readers.mesh_files import read_surface
 from sonarsynth.validation.bellhop import ArrivalsError, BellhopArrivals, compare_arrivals, read_arrivals
 from sonarsynth.validation.bellhop.arrivals_compared import paired
 
@@ -120,7 +122,7 @@ def test_an_environment_is_read_by_the_rules_of_fortran(tmp_path):
     assert found.notes[1] == (
         f"the environment's depth is 60 m in the file, the reflection of its bottom {{kind: fluid, density_ratio: 1.8, "
         f"speed_ratio: {1600 / 1505:.6g}, loss_tangent: {loss:.4g}}}, without its shear waves of 200 m/s; its "
-        "bathymetry file is not read: the bottom is flat"
+        "bathymetry, a.bty, can be given as the `relief`"
     )
 
 
@@ -134,7 +136,6 @@ def test_a_loss_in_a_unit_that_is_not_known_is_not_said(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "line", "said"),
     [
-        ("'SVF'", "'QVF'", 4, "a sound speed that varies with range (option 'Q' and its .ssp) is not supported"),
         ("'SVF'", "'HVF'", 4, "a sound speed that varies in three dimensions"),
         ("'SVF'", "'AVF'", 4, "an analytic sound speed (option 'A') is not supported"),
         ("'SVF'", "'SVF ~'", 4, "an altimetry file (option '~') is not supported"),
@@ -174,7 +175,7 @@ def test_a_cut_environment_and_profiles_over_range_are_refused(tmp_path):
         (lambda text: text[: len(text) // 2], "is cut off"),
         (lambda text: text.replace("'2D'", "'3D'"), "is of BELLHOP3D"),
         (lambda text: text.replace("          21\n", "  1e9\n"), "is cut off"),
-        (lambda text: text.replace("0.122970447", "nan"), "not finite"),
+        (lambda text: text.replace("0.122970447", "nan"), "are of no arrival"),
         (lambda text: text.replace("0.122970447", "x"), "is no file of arrivals"),
         (lambda text: "", "is cut off"),
         (lambda text: text.replace("16.0000000", "12.0"), "has no source and receiver where a snap and the array are"),
@@ -218,3 +219,65 @@ def test_the_command_writes_environments_and_tables_of_reflection(tmp_path, caps
 def test_options_of_the_other_export_are_refused(tmp_path, capsys, given):
     assert run(app, ["export", str(HERE / given[0]), *given[1:], "--out", str(tmp_path / "x")]) == 2
     assert "is for" in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
+GULF = "'Gulf'\n1000.0\n1\n'QVW'\n0 0.0 50.0\n0.0 1500.0 /\n20.0 1500.0 /\n50.0 1500.0 /\n'A' 0.0\n50.0 1800.0 /\n"
+
+
+def test_of_profiles_over_range_one_is_taken_by_its_number(tmp_path):
+    """Speeds are those of the .ssp beside the environment, not the environment's own; a change of it is seen."""
+    file, beside = tmp_path / "gulf.env", tmp_path / "gulf.ssp"
+    file.write_text(GULF)
+    with pytest.raises(CastError, match=r"gulf\.ssp: no such file"):
+        profile_of(Cast(path=str(file)))
+    beside.write_text("2\n0.0 12.5\n1536 1530\n1506,1507\n1503 1501.5 ! m/s\n")
+    for number, speeds, off in ((0, [1536.0, 1506.0, 1503.0], 6), (1, [1530.0, 1507.0, 1501.5], 6)):
+        profile = profile_of(Cast(path=str(file), profile=number))
+        assert profile.depth.tolist() == [0.0, 20.0, 50.0] and profile.speed.tolist() == speeds
+        assert (
+            f"profile {number} of 2, at {12.5 * number:g} km" in profile.notes[0] and f"{off} m/s" in profile.notes[0]
+        )
+    digests = set()
+    for cell in ("1536", "1537"):
+        beside.write_text(f"2\n0.0 12.5\n{cell} 1530\n1506 1507\n1503 1501.5\n")
+        recipe = load(HERE / "layers.yaml", [f"scene.world.environment.sound_speed={{kind: cast, path: {file}}}"])
+        digests.add(recipe.digest)
+        assert profile_of(recipe.scene.world.environment.sound_speed).speed[0] == float(cell)
+    assert len(digests) == 2
+    for cells, message in (
+        ("2\n0.0\n1 2\n", r"gulf\.ssp: has 1 rows of sound speeds, its environment has 3 depths"),
+        ("2\n0.0 12.5\n1536\n1506 1507\n1503 1501.5\n", r"gulf\.ssp, line 3: has 1 numbers, not 2"),
+        ("2\n0.0 12.5\n1536 x\n1506 1507\n1503 1501.5\n", r"gulf\.ssp, line 3: 'x' is not a number"),
+    ):
+        beside.write_text(cells)
+        with pytest.raises(CastError, match=message):
+            profile_of(Cast(path=str(file)))
+    beside.write_text("2\n0.0 12.5\n1536 1530\n1506 1507\n")
+    with pytest.raises(CastError, match=r"give the \.env beside it"):
+        profile_of(Cast(path=str(beside)))
+
+
+def test_a_bathymetry_is_a_surface_over_its_ranges(tmp_path):
+    """A line of depths is alike across; a grid with axes by their ends is the same as with axes in full."""
+    line, grid = tmp_path / "line.bty", tmp_path / "grid.bty"
+    line.write_text("'L'\n3\n0.0 20\n0.010 15\n0.03 20\n")
+    vertices, faces = read_surface(line)
+    along = np.unique(vertices[:, [0, 2]], axis=0)
+    assert along.tolist() == [[0.0, -20.0], [10.0, -15.0], [30.0, -20.0]] and len(faces) == 4
+    assert set(vertices[:, 1]) == {-15.0, 15.0}
+    surfaces = []
+    for axis in ("0 0.010 0.020", "0 0.020 /"):
+        grid.write_text(f"'R'\n3\n{axis}\n2\n-0.005 0.005\n20 15 20\n20 14 20\n")
+        surfaces.append(read_surface(grid))
+    assert all(np.array_equal(*pair) for pair in zip(*surfaces, strict=True))
+    assert surfaces[0][0][4].tolist() == [10.0, 5.0, -14.0]  # x, y, z of the second row's middle
+    for text, message in (
+        ("'L'\n3\n0 20\n0.01 15\n", "line 3|cut off"),
+        ("'R'\n2\n0 1\n2\n0 1\n20 20\n", "1 rows of depths, not 2"),
+        ("X\n2\n0 20\n1 20\n", "line 1: is no option"),
+        ("'L'\n2\n0 20\n0 20\n", "neither only rise nor only fall"),
+        ("'L'\n2\n0 20\n1 inf\n", "line 4: 'inf' is not a finite number"),
+    ):
+        line.write_text(text)
+        with pytest.raises(MeshError, match=message):
+            read_surface(line)

@@ -13,6 +13,7 @@ KINDS = {
     "fuzz": "change recipes and their files, plan them",
     "meshes": "change mesh files, plan with them",
     "casts": "change casts, tracks and recordings, plan with them",
+    "arrivals": "change arrivals of Bellhop, compare them with rays",
     "links": "put links into a store, beside it and in front of it",
     "hostile": "forge stores, digests and all, and run every command on them",
     "renames": "move stores while they are built",

@@ -31,6 +31,7 @@ seed: 3
 scene:
   world:
     environment: {{depth: 12 m, sound_speed: {speed}, noise: {noise}}}
+    relief: {relief}
     noise_sources: {ships}
     targets:
       - name: body
@@ -52,6 +53,7 @@ USUAL = {
     "snap": "source_level: 190 dB",
     "noise": "{kind: flat, level: 40 dB}",
     "ships": "[]",
+    "relief": "null",
 }
 ENVIRONMENT = """\
 'A shelf'
@@ -66,11 +68,16 @@ ENVIRONMENT = """\
 'A' 0.0
 12.0 1800.0 0.0 1.8 0.5 0.0 /
 """
+RANGES = "3\n0.0 0.5 1.0\n1540 1541 1542\n1541 1541 1541\n1530 1529 1528\n"
+BOTTOMS = {
+    "slope.bty": "'L'\n3\n0.015 12\n0.016 10.5\n0.018 12\n",
+    "hill.bty": "'R'\n3\n0.015 0.018 /\n2\n-0.001 0.001\n12 10 12\n12 11 12\n",
+}
 ODD_LINES = (
     b"'", b'"', b"/", b"1e9 /", b"1 1e300 /", b"0 0 0", b"'QVW'", b"'CVWB'", b"1000000000", b"nan,nan,nan,nan", b",,,,",
     b"2024-05-01T10:00:00Z,1,2,3", b"time,lat,lon", b"t,x,y,z", b"Depth (m),Sound speed (m/s)", b"*END*", b"# name 0 =",
     b'<!DOCTYPE x [<!ENTITY a "b">]>', b"<trkpt>", b"</trkseg>", b'<trkpt lat="99" lon="1e9"/>', b"<a>" * 3000, b"\0",
-    b"\xff", b"5*1.0", b"1.5D400", b"0.0 10.0", b"2",
+    b"\xff", b"5*1.0", b"1.5D400", b"0.0 10.0", b"2", b"'R'", b"'C'",
 )  # fmt: skip
 
 
@@ -84,6 +91,7 @@ CAST, NOISE, SNAP = (
     "{{kind: recording, path: {}}}",
     "{{kind: recorded_snap, path: {}, fade: 0.1}}",
 )
+RELIEF = "{{shape: {{path: {}, offset: [0, 0, 12], edge: 1 m}}}}"
 SOURCE = "[{{name: ship, motion: {{kind: still, position: [9, 3, -4]}}, sound: {{kind: noise_recording, path: {}}}}}]"
 
 
@@ -130,10 +138,13 @@ def bases() -> list[Case]:
         ("snap.h5", "snap", f"snap: {SNAP}", _hdf5()),
         *((name, "snap", f"snap: {SNAP}", data) for name, data in snap_files().items()),
     ]
-    return [
+    found += [(name, "relief", RELIEF, text.encode()) for name, text in BOTTOMS.items()]
+    cases = [
         Case(name, RECIPE.format(**USUAL | {field: text.format(name)}).encode(), {name: data})
         for name, field, text, data in found
     ]
+    ranges = {"gulf.env": ENVIRONMENT.replace("'CVWF'", "'QVWF'").encode(), "gulf.ssp": RANGES.encode()}
+    return [*cases, Case("gulf", RECIPE.format(**USUAL | {"speed": CAST.format("gulf.env")}).encode(), ranges)]
 
 
 def _hdf5() -> bytes:
@@ -150,13 +161,13 @@ odd_lines = lines_changed(ODD_LINES)
 
 def mutated(case: Case, random: np.random.Generator) -> Case:
     """The case with its file changed once to three times; now and then its recipe too, or the path to it."""
-    (name,) = case.files
+    name = pick(sorted(case.files), random)
     ways = (
         [damaged] if name.endswith((".h5", ".wav", ".nc", ".gz")) else [numbers, numbers, odd_lines, odd_lines, damaged]
     )
     for _ in range(pick((1, 1, 2, 3), random)):
         changed = pick(ways, random)(case.files[name], random)
-        case = replace(case, files={name: changed}, done=(*case.done, "file"))
+        case = replace(case, files=case.files | {name: changed}, done=(*case.done, "file"))
     if random.random() < 0.1:
         case = by_structure(case, random)
     return by_file(case, random) if random.random() < 0.1 else case

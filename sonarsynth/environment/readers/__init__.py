@@ -13,19 +13,19 @@ from pathlib import Path
 from typing import Any, Final
 
 from sonarsynth.description import named_files
-from sonarsynth.environment.readers.bellhop_env import is_bellhop, is_range_dependent, read_bellhop
+from sonarsynth.environment.readers.bellhop_env import is_bellhop, is_range_dependent, ranges_beside, read_bellhop
 from sonarsynth.environment.readers.cast_netcdf import read_netcdf
 from sonarsynth.environment.readers.cast_table import MAX_ROWS, CastError, CastTable, Column
 from sonarsynth.environment.readers.fixed_columns import read_fixed_columns
 from sonarsynth.environment.readers.named_columns import read_named_columns
 from sonarsynth.environment.readers.sea_bird import is_sea_bird, read_sea_bird
 
-__all__ = ["READ", "CastError", "CastTable", "Column", "read_cast"]
+__all__ = ["READ", "CastError", "CastTable", "Column", "files_of", "read_cast"]
 
 READ: Final = (
     "Sea-Bird CNV, ROS and BTL; CastAway, Valeport, AML, RBR, Sippican EDF, MVP, SAIV, Idronaut, Sea and Sun, "
     "Oceanscience and other tables with column names and units; Kongsberg ASVP and S, Hypack, Caris, ISS, Sonardyne, "
-    "TSK, UNB; .env of Bellhop; netCDF of Argo, WOA and Turo; any of them in .gz, .bz2 or .zip"
+    "TSK, UNB; .env of Bellhop with its .ssp; netCDF of Argo, WOA and Turo; any of them in .gz, .bz2 or .zip"
 )
 """What is read, for refusals."""
 
@@ -62,16 +62,22 @@ def read_cast(
     return table
 
 
+def files_of(path: Path) -> tuple[Path, ...]:
+    """The files that are read for a cast: it, and what an environment of Bellhop has beside it."""
+    beside = ranges_beside(path)
+    return (path, beside) if path.suffix.lower() == ".env" and beside.is_file() else (path,)
+
+
 def _read_text(path: Path, data: bytes, profile: int | None) -> CastTable:
     text = _decoded(data)
     if "\0" in text[:4096]:
         raise CastError(f"{path}: is not a text file, nor netCDF; read are {READ}")
-    table = read_bellhop(path, text) if is_bellhop(text) else read_fixed_columns(path, text, profile or 0)
+    table = read_bellhop(path, text, profile) if is_bellhop(text) else read_fixed_columns(path, text, profile or 0)
     try:
         table = table or read_named_columns(path, text)
     except CastError:
         if is_range_dependent(text):
-            line = "is a .ssp of Bellhop, profiles over range without depths, which is not supported"
+            line = "is a .ssp of Bellhop, sound speeds without depths: give the .env beside it, which has them"
             raise CastError(f"{path}: {line}") from None
         raise
     if profile and not table.several:

@@ -13,19 +13,22 @@ from typing import Final
 
 import numpy as np
 
+from sonarsynth.description import named_files
+from sonarsynth.description.fortran_rows import fortran_rows
 from sonarsynth.environment.readers.cast_table import MAX_ROWS, CastError, CastTable, Column, is_number
 
 WORD: Final = re.compile(r"('(?:[^']|'')*'|\"[^\"]*\"|/|[^\s,/'\"]+)")
 INTERPOLATION: Final = {"N": "of 1/c2", "S": "by a spline", "P": "by a monotone cubic"}
 """How Bellhop goes from node to node, where that is not in straight lines."""
 REFUSED: Final = {
-    "Q": "a sound speed that varies with range (option 'Q' and its .ssp)",
     "H": "a sound speed that varies in three dimensions (option 'H' and its .ssp)",
     "A": "an analytic sound speed (option 'A')",
 }
 NEPER: Final = 20.0 / np.log(10.0)  # dB
 WATER: Final = (1500.0, 0.0, 1.0, 0.0, 0.0)
 """What a record leaves out before any other has said it: speeds (m/s), density (g/cm3), attenuations."""
+MAX_SPEEDS: Final = 1 << 26
+"""Bytes of a .ssp."""
 SAME: Final = 1.2e-5
 """m: a node this near to the bottom is the last (Bellhop's own tolerance)."""
 
@@ -97,8 +100,10 @@ class _Records:
         return CastError(f"{self.path}, line {self.line}: {message}")
 
 
-def read_bellhop(path: Path, text: str) -> CastTable:
-    """The profile of an environmental file. Raises CastError, which names what is not supported."""
+def read_bellhop(path: Path, text: str, profile: int | None) -> CastTable:
+    """The profile of an environmental file; where the sound speed varies with range, that of the `profile`-th range of
+    the .ssp beside it (left out: the first). Raises CastError, which names what is not supported.
+    """
     records = _Records(path, text.split("\n"))
     records.text()
     frequency = records.numbers((0.0,))[0]
@@ -108,7 +113,7 @@ def read_bellhop(path: Path, text: str) -> CastTable:
     options = records.text().ljust(6)
     if options[0] in REFUSED:
         raise records.error(f"{REFUSED[options[0]]} is not supported: one profile for all ranges is")
-    if options[0] not in ("C", *INTERPOLATION):
+    if options[0] not in ("C", "Q", *INTERPOLATION):
         raise records.error(f"option {options[0]!r} is no way of Bellhop's to interpolate the sound speed")
     _skip_attenuation(records, options)
     if options[4] in "~*":
@@ -116,12 +121,39 @@ def read_bellhop(path: Path, text: str) -> CastTable:
     depth = records.numbers((0.0, 0.0, 0.0), 3)[2]
     nodes, lines = _nodes(records, depth)
     notes = []
+    if options[0] == "Q":
+        nodes[:, 1], note = _at_range(ranges_beside(path), len(nodes), profile or 0)
+        notes.append(note)
     if options[0] in INTERPOLATION:
         law = INTERPOLATION[options[0]]
         notes.append(f"Bellhop interpolates this profile {law} (option '{options[0]}'), here it is straight lines")
     notes.append(_bottom(records, options[2], frequency, depth, nodes[-1, 1]))
     columns = {"depth": Column("z", nodes[:, 0]), "sound speed": Column("c", nodes[:, 1])}
-    return CastTable(path, "Bellhop", columns, lines, ("z", "c"), notes=tuple(notes))
+    return CastTable(path, "Bellhop", columns, lines, ("z", "c"), notes=tuple(notes), several=options[0] == "Q")
+
+
+def ranges_beside(path: Path) -> Path:
+    """The .ssp that belongs to an environment."""
+    return path.with_suffix(".ssp")
+
+
+def _at_range(path: Path, nodes: int, profile: int) -> tuple[np.ndarray, str]:
+    """Speeds (node,) at one of the ranges of a .ssp, and a note of how unlike the others are. Raises CastError."""
+    try:
+        rows = fortran_rows(named_files.read(path, MAX_SPEEDS).decode("ascii", "replace").split("\n"))
+        if len(rows) < 2 + nodes:
+            raise ValueError(f"has {max(len(rows) - 2, 0)} rows of sound speeds, its environment has {nodes} depths")
+        (count,) = rows[0].axis(1)
+        ranges = rows[1].axis(count)
+        if not profile < count:
+            raise ValueError(f"has no profile {profile}, only {count:g} (from 0)")
+        speeds = np.array([row.axis(count) for row in rows[2 : 2 + nodes]])
+    except ValueError as error:
+        line = str(error)
+        raise CastError(f"{path}{', ' if line.startswith('line ') else ': '}{line}") from None
+    unlike = float(np.abs(speeds - speeds[:, profile, None]).max())
+    where = f"profile {profile} of {count:g}, at {ranges[profile]:g} km, stands for all ranges"
+    return speeds[:, profile], f"{where}: at others the sound speed is up to {unlike:.3g} m/s off it"
 
 
 def _skip_attenuation(records: _Records, options: str) -> None:
@@ -158,7 +190,11 @@ def _nodes(records: _Records, bottom: float) -> tuple[np.ndarray, np.ndarray]:
 def _bottom(records: _Records, unit: str, frequency: float, depth: float, speed: float) -> str:
     """A note of what the file says of the bottom, in words that a recipe takes."""
     options, _ = (str(value) for value in records.read(("", 0.0)))
-    shape = "" if options[1:2] not in ("~", "*") else "; its bathymetry file is not read: the bottom is flat"
+    shape = (
+        ""
+        if options[1:2] not in ("~", "*")
+        else f"; its bathymetry, {records.path.stem}.bty, can be given as the `relief`"
+    )
     kind, depth_note = options[:1], f"the environment's depth is {depth:g} m in the file"
     reflection = {"V": "{kind: pressure_release}", "R": "{kind: rigid}"}.get(kind)
     if kind == "A":

@@ -153,7 +153,7 @@ def _resolved(source: Source, data: Any, keys: Where, check: bool) -> Any:
     if not isinstance(data, dict):
         return data
     path = data.get("path")
-    if isinstance(path, str) and any(data.get("kind") == kind for kind in FILE_KINDS):
+    if isinstance(path, str) and _is_file(data, keys):
         field = (*keys, "path")
         folder = Path.cwd() if source.place(field) == SET else source.folder
         file = Path(path) if Path(path).is_absolute() else folder / path
@@ -162,6 +162,14 @@ def _resolved(source: Source, data: Any, keys: Where, check: bool) -> Any:
             _check_file(source, field, path, folder)
         return data | {"path": path if Path(path).is_absolute() else str(file)}
     return {key: _resolved(source, value, (*keys, key), check) for key, value in data.items()}
+
+
+def _is_file(data: dict[str, Any], keys: Where) -> bool:
+    """Whether a description with a path is of a file, or may be where it need not say its kind: a path that is none
+    is a field of the scene, and stands in the recipe's grid and variations."""
+    return any(data.get("kind") == kind for kind in FILE_KINDS) or (
+        "kind" not in data and ("scene" in keys or "values" in keys)
+    )
 
 
 def _check_file(source: Source, keys: Where, path: str, folder: Path) -> None:

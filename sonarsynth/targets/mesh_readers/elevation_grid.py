@@ -1,4 +1,5 @@
-"""Elevation grids as surfaces: heights over a grid of x (east) and y (north), in text, NumPy's npz or netCDF.
+"""Elevation grids as surfaces: heights over a grid of x (east) and y (north), in text, NumPy's npz, netCDF, or as
+Bellhop has its bottom.
 
 Two triangles a cell. The grid may be uneven; a name `depth`, or `positive: down`, says that heights count downwards.
 """
@@ -14,6 +15,7 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.description import netcdf_files
+from sonarsynth.description.fortran_rows import FortranRow, fortran_rows
 from sonarsynth.description.memory import max_facets
 from sonarsynth.geometry.surfaces import MeshError, Surface, weld
 from sonarsynth.targets.mesh_readers.mesh_repair import without_area
@@ -87,6 +89,38 @@ def read_grid_text(data: bytes) -> Surface:
     z = np.empty((len(y), len(x)))
     z[row, column] = sign * table[:, 2]
     return grid_surface(x, y, z)
+
+
+def read_bathymetry(data: bytes) -> Surface:
+    """A `.bty` of Bellhop, ranges in km and depths in m: along x, and alike across it for half as far to either side; or
+    over a grid of x and y, of Bellhop3D. Between its points it is flat, whatever the file says. Raises MeshError.
+    """
+    lines = [line.decode("utf-8", "replace") for line in lines_of(data)]
+    option = re.match(r"\s*['\"]\s*([LCR])", lines[0].upper())
+    if option is None:
+        raise MeshError("line 1: is no option of a bathymetry of Bellhop: 'L', 'C' or 'R'")
+    try:
+        rows = fortran_rows(lines[1:], 2)
+        count, *points = rows
+        if option[1] != "R" and count.axis(1)[0] == len(points) and all(len(row.numbers) > 1 for row in points):
+            x, depth = np.array([row.numbers[:2] for row in points]).T * [[1e3], [1.0]]
+            across = 0.5 * np.ptp(x) * np.array([-1.0, 1.0])
+            return grid_surface(x, across, -np.tile(depth, (2, 1)))
+        return grid_surface(*_bathymetry_grid(rows))
+    except ValueError as error:
+        raise MeshError(str(error)) from None
+
+
+def _bathymetry_grid(rows: list[FortranRow]) -> tuple[Floats, Floats, Floats]:
+    """x, y and heights (y, x) in m. Raises ValueError."""
+    if len(rows) < 4:
+        raise ValueError("is cut off: it has no axes, nor depths")
+    (columns,), (lines,) = rows[0].axis(1), rows[2].axis(1)
+    x, y = rows[1].axis(columns, 1e3), rows[3].axis(lines, 1e3)
+    if len(rows) - 4 < lines:
+        raise ValueError(f"is cut off: {len(rows) - 4} rows of depths, not {lines:g}")
+    depth = [row.axis(columns) for row in rows[4 : 4 + int(lines)]]
+    return np.array(x), np.array(y), -np.array(depth)
 
 
 def read_npz(data: bytes) -> Surface:

@@ -15,7 +15,12 @@ from typing import Final
 from sonarsynth.description import named_files
 from sonarsynth.description.memory import max_facets
 from sonarsynth.geometry.surfaces import MeshError, Surface
-from sonarsynth.targets.mesh_readers.elevation_grid import read_grid_text, read_netcdf_grid, read_npz
+from sonarsynth.targets.mesh_readers.elevation_grid import (
+    read_bathymetry,
+    read_grid_text,
+    read_netcdf_grid,
+    read_npz,
+)
 from sonarsynth.targets.mesh_readers.mesh_3mf import read_3mf
 from sonarsynth.targets.mesh_readers.mesh_collada import read_collada
 from sonarsynth.targets.mesh_readers.mesh_gltf import read_glb, read_gltf
@@ -23,7 +28,7 @@ from sonarsynth.targets.mesh_readers.mesh_ply import read_ply
 from sonarsynth.targets.mesh_readers.mesh_text import read_corners, read_obj, read_off, read_text_stl
 from sonarsynth.targets.mesh_readers.mesh_trimesh import by_trimesh
 
-GRIDS: Final = ("csv", "npz", "nc")
+GRIDS: Final = ("csv", "npz", "nc", "bty")
 """Elevation grids, in metres."""
 MAX_BYTES = {
     "stl": 4 << 30,
@@ -100,6 +105,7 @@ READERS: dict[str, Callable[[bytes, Path], Surface]] = {
     "csv": lambda data, folder: read_grid_text(data),
     "npz": lambda data, folder: read_npz(data),
     "nc": lambda data, folder: read_netcdf_grid(data),
+    "bty": lambda data, folder: read_bathymetry(data),
 }
 """Per format: vertices and triangles of a file's bytes (and its folder), or MeshError with the reason."""
 

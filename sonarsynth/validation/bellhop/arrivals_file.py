@@ -20,6 +20,12 @@ MAX_BYTES: Final = 1 << 26
 COLUMNS: Final = 8
 """Amplitude, phase, delay (real, imaginary), angles at source and receiver, bounces at top and bottom."""
 
+LARGEST: Final = np.array([1e6, 1e6, 1e6, 1e6, 360.0, 360.0, 1e6, 1e6])
+"""Of each column: more is a damaged file."""
+
+LEAST_LOSS: Final = -200.0
+"""dB."""
+
 
 class ArrivalsError(ValueError):
     """A file of arrivals that cannot be read: one line that names it."""
@@ -92,6 +98,8 @@ class ArrivalsFile:
         amplitude, phase, delay, lost, launch, arrival, surface, bottom = self._rows(self._indices(wanted)).T
         with np.errstate(divide="ignore", invalid="ignore"):
             loss = -20.0 * np.log10(np.abs(amplitude)) - 20.0 / np.log(10.0) * 2.0 * np.pi * self.frequency * lost
+        if (loss < LEAST_LOSS).any():
+            raise ArrivalsError(f"{self.path}: holds arrivals that are louder than any")
         ends = (-np.deg2rad(launch), -np.deg2rad(arrival))  # Bellhop's are down positive
         counts = (surface.astype(np.int64), bottom.astype(np.int64))
         return BellhopArrivals(self.frequency, *self.nearest(*wanted), delay, loss, np.deg2rad(phase), *ends, *counts)
@@ -108,8 +116,8 @@ class ArrivalsFile:
                 for distance in range(sizes[2]):
                     rows = numbers.take(COLUMNS * numbers.take(1)[0]).reshape(-1, COLUMNS)
                     if [source, depth, distance] == wanted:
-                        if not np.isfinite(rows).all():
-                            raise ArrivalsError(f"{self.path}: holds numbers that are not finite")
+                        if not (np.isfinite(rows).all() and (np.abs(rows) <= LARGEST).all()):
+                            raise ArrivalsError(f"{self.path}: holds numbers that are of no arrival")
                         return rows
         raise AssertionError("the nearest are among them")
 
