@@ -120,7 +120,7 @@ def _table(rows: list[Row]) -> None:
             table.add_section()
         case, against = ("" if a == b else a for a, b in zip(named, before, strict=True))
         before = named
-        numbers = (f"{row.expected:.2g}", f"{row.got:.2g}", f"{row.cost:.3g} {row.cost_unit}")
+        numbers = (f"{row.bound:.2g}", f"{row.error:.2g}", f"{row.cost:.3g} {row.cost_unit}")
         counts = (str(row.counts.get(name, "")) for name in counted)
         verdict = ("ok" if row.ok else "FAILED") + (f" ({notes.index(row.note) + 1})" if row.note else "")
         table.add_row(case, against, row.quantity, row.unit, *numbers, *counts, verdict)

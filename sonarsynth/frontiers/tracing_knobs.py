@@ -30,7 +30,7 @@ from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.planning import Plan, arrivals_of, frame_start
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Straight
-from sonarsynth.receiver.subarrays import Subarray, subarrays, with_rim
+from sonarsynth.receiver.subarrays import Subarray, subarrays, with_outermost_sensor
 from sonarsynth.recipe.scene import Frame
 
 DYNAMIC_RANGES = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
@@ -76,7 +76,7 @@ class TracedBySensor:
         for piece, traced in self.pieces:
             rows = np.flatnonzero(np.isin(sensor, piece.sensor))
             own = np.searchsorted(piece.sensor, sensor[rows])
-            rimmed, index = with_rim(piece, own)
+            rimmed, index = with_outermost_sensor(piece, own)
             arrivals = traced.for_sensors(index, piece.elements.count)
             received = pressures(self.plan, self.frame, arrivals, rimmed, golden(self.plan))
             for total, values in zip(out, received, strict=True):

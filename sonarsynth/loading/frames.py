@@ -57,7 +57,7 @@ class Frames:
         chosen = np.isfinite(self._reader.array("truth/sonar_position").every()[:, 0])
         if split is not None:
             chosen &= self._reader.array("split").every() == _number(split)
-        self.frames = _some(np.flatnonzero(chosen), split)
+        self.frames = _not_empty(np.flatnonzero(chosen), split)
         """(row,) the number in the store of each."""
         flags = str(self._reader.attributes_of("truth/targets/category").get("flag_meanings", "target"))
         self.categories = tuple(flags.split())
@@ -103,7 +103,7 @@ class RenderedFrames:
         if split is not None:
             number = _number(split)
             candidates = np.array([frame for frame in candidates.tolist() if recipe.split(frame) == number], int)
-        self.frames = stream(seed, "training order").permutation(_some(candidates, split))[part[0] :: part[1]]
+        self.frames = stream(seed, "training order").permutation(_not_empty(candidates, split))[part[0] :: part[1]]
         """(row,) the number in the recipe of each, in the order that they come."""
         self.categories = recipe.categories
 
@@ -116,7 +116,7 @@ class RenderedFrames:
             yield self._form.sample(frame, lambda name, of=tree: np.asarray(of[name].values))  # type: ignore[misc]
 
 
-def _some(frames: np.ndarray, split: str | None) -> np.ndarray:
+def _not_empty(frames: np.ndarray, split: str | None) -> np.ndarray:
     """The same frames. Raises FieldError for a split that has none."""
     if split is not None and not len(frames):
         raise FieldError(("split",), f"{split} has no frames")

@@ -82,11 +82,11 @@ Hearing = Callable[[str, Signals], object]
 """Is told what there is of the sound of a frame after each part of it, by name."""
 
 
-def told_nothing(part: str, signals: Signals) -> None:
+def keep_nothing(part: str, signals: Signals) -> None:
     """A `Hearing` that keeps nothing."""
 
 
-def digitise(plan: Plan, frame: Frame, signals: Signals, hearing: Hearing = told_nothing) -> Signals:
+def digitise(plan: Plan, frame: Frame, signals: Signals, hearing: Hearing = keep_nothing) -> Signals:
     """Signals as the sonar has them: ambient noise, errors of the channels, electronics, converter; `plan` is that of
     the sequence. Each part has a stream of its own."""
     mark_stage("synthesise")

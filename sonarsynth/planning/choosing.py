@@ -24,7 +24,7 @@ from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Errors, Plan
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements
-from sonarsynth.receiver.subarrays import subarray, subarrays, with_rim
+from sonarsynth.receiver.subarrays import subarray, subarrays, with_outermost_sensor
 from sonarsynth.recipe import Accuracy
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.auto_synthesis import deposit_for
@@ -248,7 +248,7 @@ class PerSensorReference:
         for part in subarrays(self.plan.elements, count):
             rows = np.flatnonzero(np.isin(self.sensor, part.sensor))
             if len(rows):
-                own, column = with_rim(part, np.searchsorted(part.sensor, self.sensor[rows]))
+                own, column = with_outermost_sensor(part, np.searchsorted(part.sensor, self.sensor[rows]))
                 arrivals = sampled_arrivals(plan, self.frame, part).for_sensors(column, part.elements.count)
                 for out, pressure in zip(pressures, _pressures(plan, self.frame, arrivals, own), strict=True):
                     out[rows] = pressure[: len(rows)]

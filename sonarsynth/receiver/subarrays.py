@@ -49,7 +49,7 @@ def subarray(elements: Elements, sensor: Ints) -> Subarray:
     return Subarray(sensor, centre, own)
 
 
-def with_rim(part: Subarray, own: Ints) -> tuple[Elements, Ints]:
+def with_outermost_sensor(part: Subarray, own: Ints) -> tuple[Elements, Ints]:
     """Elements `own` (rows of a part), and after them the one farthest out, so that polynomials over the aperture keep
     their scale; and the rows (element,) of all of these."""
     elements = part.elements

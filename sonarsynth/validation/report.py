@@ -21,7 +21,7 @@ RELATIVE: Final = "relative error at 110 kHz, rms over ways"
 
 
 def as_json(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """The rows, for programs: case, quantity, expected (the bound), got (the error), ok, cost and more."""
+    """The rows, for programs: case, quantity, bound, error, ok, cost and more."""
     return [row.as_json() for row in rows]
 
 
@@ -39,8 +39,8 @@ def write(rows: Sequence[Row], out: Path, name: str) -> list[Path]:
 
 def _rays(rows: Sequence[Row]) -> Figure | None:
     times = [row for row in rows if row.quantity == "time"]
-    marks = [Mark(r.case, r.reference, r.cost, r.got) for r in times if r.knob is None]
-    lines = [Line(knob, tuple(r.cost for r in of), tuple(r.got for r in of)) for knob, of in _knobs(times).items()]
+    marks = [Mark(r.case, r.reference, r.cost, r.error) for r in times if r.knob is None]
+    lines = [Line(knob, tuple(r.cost for r in of), tuple(r.error for r in of)) for knob, of in _knobs(times).items()]
     return error_and_time_figure(marks, lines) if times else None
 
 
@@ -54,7 +54,7 @@ def _trades(rows: Sequence[Row], quantity: str) -> list[RefinementCurve]:
     """Those of one quantity."""
     curves = []
     for name, of in _knobs([row for row in rows if row.quantity == quantity]).items():
-        columns = [r.counts["facets"] for r in of], [r.cost for r in of], [r.got for r in of], [r.expected for r in of]
+        columns = [r.counts["facets"] for r in of], [r.cost for r in of], [r.error for r in of], [r.bound for r in of]
         curves.append(RefinementCurve(name, *columns))
     return curves
 

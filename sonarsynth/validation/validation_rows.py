@@ -17,9 +17,9 @@ class Row:
     """What it was compared with."""
     quantity: str
     unit: str
-    expected: float
-    """Bound of the error, in `unit`: at the place where the error is largest against its bound."""
-    got: float
+    bound: float
+    """Of the error, in `unit`: at the place where the error is largest against its bound."""
+    error: float
     """The error there."""
     cost: float
     """CPU time of one core, in `cost_unit`."""
@@ -35,8 +35,8 @@ class Row:
     @property
     def ok(self) -> bool:
         """Whether the error is within its bound; an error that is not a number is not."""
-        return self.got <= self.expected
+        return self.error <= self.bound
 
     def as_json(self) -> dict[str, Any]:
         """The row with its verdict, for programs: counts by their names; an error that is not a number is None."""
-        return asdict(self) | dict(self.counts) | {"got": None if isnan(self.got) else self.got, "ok": self.ok}
+        return asdict(self) | dict(self.counts) | {"error": None if isnan(self.error) else self.error, "ok": self.ok}

@@ -137,6 +137,6 @@ def test_rows_and_picture_are_written(rows: dict[str, list[Row]], tmp_path: Path
     files = write(rows["plate"], tmp_path, "plate")
     assert [file.name for file in files] == ["plate.json", "plate.png"]
     answer = json.loads(files[0].read_text())
-    assert {"case", "quantity", "expected", "got", "ok", "cost", "cost_unit", "facets", "knob"} <= set(answer[0])
+    assert {"case", "quantity", "bound", "error", "ok", "cost", "cost_unit", "facets", "knob"} <= set(answer[0])
     assert files[1].stat().st_size > 30_000
     assert set(REFERENCES) - set(PICTURES) == {"bubble"}

@@ -121,11 +121,11 @@ def test_rows_and_picture_are_written(rows: list[Row], tmp_path: Path) -> None:
     assert [file.name for file in files] == ["rays.json", "rays.png"]
     answer = json.loads(files[0].read_text())
     assert len(answer) == len(rows)
-    assert {"case", "quantity", "expected", "got", "ok", "cost", "cost_unit", "pairs", "rays"} <= set(answer[0])
+    assert {"case", "quantity", "bound", "error", "ok", "cost", "cost_unit", "pairs", "rays"} <= set(answer[0])
     assert files[1].stat().st_size > 10_000
     lost = Row("a", "b", "time", "s", 1e-13, float("nan"), 1.0, "us a ray", {"pairs": 1, "rays": 1})
     assert not lost.ok
-    assert lost.as_json()["got"] is None
+    assert lost.as_json()["error"] is None
 
 
 def test_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -141,7 +141,7 @@ def test_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pyt
     assert "ok (1)" in out and "(1) a note" in out
     assert "1 rows, all within their bounds" in out
     assert str(tmp_path / "rays.png") in out
-    monkeypatch.setitem(REFERENCES, "rays", lambda quick: [good, replace(good, got=1e-12)])
+    monkeypatch.setitem(REFERENCES, "rays", lambda quick: [good, replace(good, error=1e-12)])
     assert run(app, ["--json", "--out", str(tmp_path)]) == 1
     assert [row["ok"] for row in json.loads(capfd.readouterr().out)] == [True, False]
     assert run(app, ["--reference", "nothing", "--out", str(tmp_path)]) == 2

@@ -25,7 +25,7 @@ from sonarsynth.pipeline import digitise, locate_and_image
 from sonarsynth.pipeline.synthesis import array_signals, true_elements
 from sonarsynth.planning import Plan, arrivals_of, plan
 from sonarsynth.products import Arrivals
-from sonarsynth.receiver.subarrays import Subarray, with_rim
+from sonarsynth.receiver.subarrays import Subarray, with_outermost_sensor
 from sonarsynth.recipe import reading
 from sonarsynth.recipe.scene import Frame
 
@@ -59,7 +59,7 @@ def fastest(work: Callable[[], Any]) -> tuple[Any, float]:
 def echoes_at(made: Plan, frame: Frame, arrivals: Arrivals, sensor: Any) -> tuple[Floats, Floats]:
     """Echoes and direct arrivals at some hydrophones, of arrivals at the whole array."""
     whole = Subarray(np.arange(made.elements.count), np.zeros(3), made.elements)
-    some, rows = with_rim(whole, sensor)
+    some, rows = with_outermost_sensor(whole, sensor)
     found = pressures(made, frame, arrivals.for_sensors(rows, made.elements.count), some, golden(made))
     return found[0][: len(sensor)], found[1][: len(sensor)]
 

@@ -59,12 +59,12 @@ def category_names(tree: xr.DataTree) -> list[str]:
 
 def true_objects(tree: xr.DataTree, frames: np.ndarray) -> TrueObjects:
     """The objects of some frames."""
-    blocks = [_some(tree, frames[start : start + BLOCK]) for start in range(0, max(len(frames), 1), BLOCK)]
+    blocks = [_objects_of_frames(tree, frames[start : start + BLOCK]) for start in range(0, max(len(frames), 1), BLOCK)]
     names = [field.name for field in fields(TrueObjects)]
     return TrueObjects(**{name: np.concatenate([block[name] for block in blocks]) for name in names})
 
 
-def _some(tree: xr.DataTree, frames: np.ndarray) -> dict[str, np.ndarray]:
+def _objects_of_frames(tree: xr.DataTree, frames: np.ndarray) -> dict[str, np.ndarray]:
     targets = tree["truth/targets"].dataset.isel(frame=frames)
     table = {name: np.asarray(targets[name].values) for name in _OF_TARGETS}
     wanted = (table["present"] == 1) & (table["clutter"] == 0)

@@ -21,19 +21,21 @@ def target_meshes(sequences: Sequences) -> dict[str, tuple[Mesh, ...]]:
 
     Raises FieldError for more than MOST_VARIANTS, or a scene that cannot be.
     """
-    return _found(sequences, sequences.stamps)[0]
+    return _meshes_and_numbers(sequences, sequences.stamps)[0]
 
 
 def mesh_number(sequences: Sequences, scene: Scene, target: int) -> int:
     """Which of its meshes a target of the scene of a sequence has."""
-    numbers, name = _found(sequences, sequences.stamps)[1], scene.world.targets[target].name
+    numbers, name = _meshes_and_numbers(sequences, sequences.stamps)[1], scene.world.targets[target].name
     digest = _base_mesh(scene, target).digest
     group = next((p.name for p in sequences.base.world.populations if name in p.slots), name)
     return numbers[group][digest]
 
 
 @lru_cache(maxsize=8)
-def _found(sequences: Sequences, stamps: Stamps) -> tuple[dict[str, tuple[Mesh, ...]], dict[str, dict[str, int]]]:
+def _meshes_and_numbers(
+    sequences: Sequences, stamps: Stamps
+) -> tuple[dict[str, tuple[Mesh, ...]], dict[str, dict[str, int]]]:
     """Meshes of each group, and their numbers by their digests."""
     scene = sequences.described(0)
     meshes = {target.name: _of_target(sequences, n) for n, target in enumerate(scene.world.targets)}

@@ -35,7 +35,7 @@ def files_of(path: Folder, attrs: Mapping[str, Any], folder: Path | str | None) 
             f"say in which folder they may be looked for, such as --files {common}"
         )
     root, digests = Path(os.path.realpath(folder)), _digests(attrs)
-    return {name: _found(path, name, root, digests.get(PurePath(name).name, set())) for name in named}
+    return {name: _file_of_digest(path, name, root, digests.get(PurePath(name).name, set())) for name in named}
 
 
 def _digests(attrs: Mapping[str, Any]) -> dict[str, set[str]]:
@@ -49,7 +49,7 @@ def _digests(attrs: Mapping[str, Any]) -> dict[str, set[str]]:
     return digests
 
 
-def _found(path: Folder, name: str, root: Path, digests: set[str]) -> str:
+def _file_of_digest(path: Folder, name: str, root: Path, digests: set[str]) -> str:
     """The file within a folder that has the longest end of a path in common, and one of the digests."""
     names, changed = [folder for folder in PurePath(name).parts if folder not in ("/", "..", ".")], False
     for first in range(len(names)):

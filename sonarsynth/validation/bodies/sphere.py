@@ -180,7 +180,7 @@ def _bistatic(radius: float, surface: Surface, quick: bool) -> Iterator[Row]:
     for row in _sectors(f"{surface} sphere, {radius:g} m", radius, surface, Kirchhoff(surface=surface), step, last):
         behind = row.quantity.endswith(f"{last:g} deg")
         note = f"{AIM:g} dB is aimed at up to {SECTORS[-2]:g} deg" if behind else ""
-        yield replace(row, expected=BEHIND if behind else AIM, note=note)
+        yield replace(row, bound=BEHIND if behind else AIM, note=note)
 
 
 def _tapered(radius: float, quick: bool) -> Iterator[Row]:
@@ -190,7 +190,7 @@ def _tapered(radius: float, quick: bool) -> Iterator[Row]:
     for row in _sectors(case, radius, "rigid", law, step, last):
         claimed = radius < 0.3 and row.quantity.endswith(f"{last:g} deg")
         note = f"what Kirchhoff claims; {AIM:g} dB is aimed at" if claimed else ""
-        yield replace(row, expected=CLAIMED if claimed else AIM, note=note)
+        yield replace(row, bound=CLAIMED if claimed else AIM, note=note)
 
 
 def _sectors(case: str, radius: float, surface: Surface, law: Kirchhoff, step: float, last: float) -> Iterator[Row]:
