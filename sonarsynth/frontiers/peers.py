@@ -127,8 +127,7 @@ def plain(arrivals: Arrivals, plan: Plan, frame: Frame) -> Arrivals:
         corner_delays=np.zeros((len(nought), 3)),
         coherent_fraction=nought,
         height_delay_std=nought,
-        phase_terms=np.zeros((len(nought), 0)),
-        delay_variance_terms=np.zeros((len(nought), 0)),
+        expansion=selected.expansion.without("phase", "delay_variance"),
     )
 
 

@@ -30,7 +30,7 @@ from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.planning import Plan, arrivals_of, frame_start
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Straight
-from sonarsynth.receiver.subarrays import Subarray, subarrays, with_outermost_sensor
+from sonarsynth.receiver.subarrays import Subarray, subarrays
 from sonarsynth.recipe.scene import Frame
 
 DYNAMIC_RANGES = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
@@ -76,11 +76,10 @@ class TracedBySensor:
         for piece, traced in self.pieces:
             rows = np.flatnonzero(np.isin(sensor, piece.sensor))
             own = np.searchsorted(piece.sensor, sensor[rows])
-            rimmed, index = with_outermost_sensor(piece, own)
-            arrivals = traced.for_sensors(index, piece.elements.count)
-            received = pressures(self.plan, self.frame, arrivals, rimmed, golden(self.plan))
+            arrivals = traced.for_sensors(own, piece.elements.count)
+            received = pressures(self.plan, self.frame, arrivals, piece.elements.select(own), golden(self.plan))
             for total, values in zip(out, received, strict=True):
-                total[rows] = values[: len(rows)]
+                total[rows] = values
         return out[0], out[1]
 
     @property

@@ -24,7 +24,7 @@ from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Errors, Plan
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements
-from sonarsynth.receiver.subarrays import subarray, subarrays, with_outermost_sensor
+from sonarsynth.receiver.subarrays import subarray, subarrays
 from sonarsynth.recipe import Accuracy
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.auto_synthesis import deposit_for
@@ -183,7 +183,8 @@ def _finer(
         if n:
             before, error = error, _worst(measures, 2**n, seeing, allowed)
             stuck = stuck + 1 if stuck == 2 or error > WORTHWHILE_GAIN * before else 0
-            if stuck == 2 and error > allowed and plan.scene.physics.occlusion == "auto":
+            own_view = seeing == "centre" and plan.scene.physics.occlusion == "auto"
+            if stuck == 2 and error > allowed and own_view:
                 own = _worst(measures, 2**n, "sensors", allowed)
                 if own < WORTHWHILE_GAIN * error:
                     seeing, error, stuck = "sensors", own, 0
@@ -248,10 +249,11 @@ class PerSensorReference:
         for part in subarrays(self.plan.elements, count):
             rows = np.flatnonzero(np.isin(self.sensor, part.sensor))
             if len(rows):
-                own, column = with_outermost_sensor(part, np.searchsorted(part.sensor, self.sensor[rows]))
-                arrivals = sampled_arrivals(plan, self.frame, part).for_sensors(column, part.elements.count)
-                for out, pressure in zip(pressures, _pressures(plan, self.frame, arrivals, own), strict=True):
-                    out[rows] = pressure[: len(rows)]
+                own = np.searchsorted(part.sensor, self.sensor[rows])
+                arrivals = sampled_arrivals(plan, self.frame, part).for_sensors(own, part.elements.count)
+                heard = _pressures(plan, self.frame, arrivals, part.elements.select(own))
+                for out, pressure in zip(pressures, heard, strict=True):
+                    out[rows] = pressure
         sizes = [float(np.linalg.norm(x)) for x in self.exact]
         errors = [float(np.linalg.norm(a - b)) for a, b in zip(pressures, self.exact, strict=True)]
         return max((e / size for e, size in zip(errors, sizes, strict=True) if size > 0.0), default=0.0)

@@ -6,6 +6,7 @@ Unless said otherwise arrays are float64, positions in m in the sonar frame, tim
 the instant of the frame; a snap at `Emission.time` is heard a travel time later).
 """
 
+from sonarsynth.products.array_expansion import ArrayExpansion
 from sonarsynth.products.labels import LINK_BUDGET, ORIGINS, SPLITS, VIEWS, Echoes, LinkBudget, PointLabels, Truth, View
 from sonarsynth.products.paths import DIRECT, FAMILIES, Arrivals, Kind, Paths
 from sonarsynth.products.results import REASONS, EnergyImage, PointCloud, Signals, SourceEstimates, no_points
@@ -19,6 +20,7 @@ __all__ = [
     "REASONS",
     "SPLITS",
     "VIEWS",
+    "ArrayExpansion",
     "Arrivals",
     "BeamSpectra",
     "Echoes",

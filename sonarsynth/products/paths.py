@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Bools, Bytes, Floats, Ints
+from sonarsynth.products.array_expansion import ArrayExpansion
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +80,7 @@ class Arrivals:
     t_1..3      corner_delays (path, 3)           s    of the facet about tau, a mean over it; 0: a point
     w           coherent_fraction (path,)         1    of the power that is coherent where the facet is smooth
     sigma_h     height_delay_std (path,)          s    of its heights: sqrt(1 - w exp(-(2 pi f sigma_h)^2)); w = 0: all
-    array expansion: b(q) are `apertures.aperture_terms` of a sensor at q; no columns where all have what the centre has
-                delay_terms (path, term)          s    tau(q) = tau + (|R d - q| - R)/c + delay_terms b(q)
-                amplitude_terms (path, term)      1    A(q) = A R/|R d - q| (1 + amplitude_terms b(q))
-                phase_terms (path, term)          rad  phi(q) = phi + phase_terms b(q)
-                delay_variance_terms (path, term) s2   sigma(q)^2 = sigma^2 + delay_variance_terms b(q)
+    array       expansion (path,)                     `ArrayExpansion`: beside the array centre, at each sensor
     provenance
                 kind (path,)                           `Kind`
                 snap (path,)                           index of the emission
@@ -119,10 +116,7 @@ class Arrivals:
     corner_delays: Floats
     coherent_fraction: Floats
     height_delay_std: Floats
-    delay_terms: Floats
-    amplitude_terms: Floats
-    phase_terms: Floats
-    delay_variance_terms: Floats
+    expansion: ArrayExpansion
     kind: npt.NDArray[np.int8]
     snap: Ints
     target: Ints
@@ -135,15 +129,26 @@ class Arrivals:
     arrives_by: Ints
     centre: float  # f_c, Hz: centre of the band, where amplitudes hold
     sound_speed: float  # c, m/s of the water at the array centre
-    wavefront_error: float  # s: largest error of the wavefronts that was measured, at probes spread over the aperture
-    amplitude_error: float = 0.0  # largest error of the amplitudes measured there, relative to the strongest echo
+    amplitude_error: float = 0.0  # largest error of the expansion's amplitudes at its probes, over the strongest echo
 
     def select(self, keep: Bools | Ints) -> Arrivals:
         """The arrivals picked by a mask or by indices (path,)."""
         rows: dict[str, Any] = {
-            name: value[keep] if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
+            name: value[keep] if isinstance(value, np.ndarray | ArrayExpansion) else value
+            for name, value in vars(self).items()
         }
         return Arrivals(**rows)
+
+    @property
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """All that paths have, by name; what they have over the aperture too."""
+        named = {**vars(self), **{f"expansion.{name}": value for name, value in vars(self.expansion).items()}}
+        return {name: value for name, value in named.items() if isinstance(value, np.ndarray)}
+
+    @property
+    def wavefront_error(self) -> float:
+        """Largest error (s) of the expansion, but for amplitudes, at its probes."""
+        return float(self.expansion.error.max(initial=0.0))
 
     def hidden(self, sensors: int) -> Bools:
         """(path, sensor) hydrophones that a body hides each path from; (path, 0) where none is hidden anywhere."""

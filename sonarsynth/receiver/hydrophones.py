@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Annotated, Literal
 
@@ -101,6 +101,11 @@ class Elements:
     row: Ints  # (sensor,) lattice row, 0 at the top (+z)
     columns: int
     rows: int
+
+    def select(self, sensor: Ints) -> Elements:
+        """Some of them (element,), where they are."""
+        columns = {name: getattr(self, name)[sensor] for name in ("position", "gain", "column", "row")}
+        return replace(self, **columns)
 
     @property
     def count(self) -> int:

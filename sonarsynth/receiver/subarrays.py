@@ -37,27 +37,10 @@ def subarrays(elements: Elements, count: int) -> tuple[Subarray, ...]:
 
 def subarray(elements: Elements, sensor: Ints) -> Subarray:
     """The part of an array with these elements, about the middle of the ball round them."""
-    position = elements.position[sensor]
-    centre = _middle(position)
-    own = replace(
-        elements,
-        position=position - centre,
-        gain=elements.gain[sensor],
-        column=elements.column[sensor],
-        row=elements.row[sensor],
-    )
+    chosen = elements.select(sensor)
+    centre = _middle(chosen.position)
+    own = replace(chosen, position=chosen.position - centre)
     return Subarray(sensor, centre, own)
-
-
-def with_outermost_sensor(part: Subarray, own: Ints) -> tuple[Elements, Ints]:
-    """Elements `own` (rows of a part), and after them the one farthest out, so that polynomials over the aperture keep
-    their scale; and the rows (element,) of all of these."""
-    elements = part.elements
-    rim = int(np.argmax(np.linalg.norm(elements.position, axis=1)))
-    rows = np.append(own, rim)
-    column, row = elements.column[rows], elements.row[rows]
-    rimmed = replace(elements, position=elements.position[rows], gain=elements.gain[rows], column=column, row=row)
-    return rimmed, rows
 
 
 def _middle(position: Floats) -> Floats:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.equations.arrays.apertures import kept_aperture_terms
-from sonarsynth.products import Arrivals
+from sonarsynth.products import ArrayExpansion, Arrivals
+from sonarsynth.products.array_expansion import QUANTITIES
 from sonarsynth.receiver import Elements
 from sonarsynth.signals.filtered_pulse import snap_gains
 from sonarsynth.state import Emission
@@ -28,20 +28,10 @@ LONGEST_CORNER = 0.01
 """The corners of a facet are closer to its arrival than this (s): 7 m, there and back."""
 
 FINITE = (
-    *(
-        "delay",
-        "direction",
-        "amplitude",
-        "absorption",
-        "delay_terms",
-        "amplitude_terms",
-        "phase",
-        "delay_std",
-        "doppler",
-    ),
-    *("phase_terms", "delay_variance_terms", "corner_delays", "coherent_fraction", "height_delay_std"),
+    *("delay", "direction", "amplitude", "absorption", "phase", "delay_std", "doppler"),
+    *("corner_delays", "coherent_fraction", "height_delay_std"),
 )
-"""What of the arrivals must be finite."""
+"""What of the arrivals must be finite, beside their expansion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +43,9 @@ class ArrayPaths:
     curvature: Floats  # (path,) 1/m: 1/radius, 0 for a plane wave
     amplitude: Floats  # (path,)
     loss: Floats  # (path,) dB of absorption at the band centre, inside amplitude
-    delay_terms: Floats  # (path, term) s
-    amplitude_terms: Floats  # (path, term)
-    phase_terms: Floats  # (path, term) rad: phase over that at the centre
-    delay_variance_terms: Floats  # (path, term) s2: variance over that at the centre
+    expansion: ArrayExpansion  # (path,)
     sound_speed: float  # m/s
-    aperture: float  # m: scale of the terms
+    aperture: float  # m: no hydrophone is farther out
     phase: Floats  # (path,) rad, -pi/2 to pi/2: whole half turns are signs of the amplitude
     variance: Floats  # (path,) s2: of the Gaussian that the pulse is blurred with
     doppler: Floats  # (path,) the pulse lasts 1 + doppler times as long
@@ -81,7 +68,8 @@ class ArrayPaths:
         if len(keep) == self.count and (keep == np.arange(self.count)).all():
             return self
         rows: dict[str, Any] = {
-            name: value[keep] if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
+            name: value[keep] if isinstance(value, np.ndarray | ArrayExpansion) else value
+            for name, value in vars(self).items()
         }
         return ArrayPaths(**rows)
 
@@ -92,8 +80,8 @@ def array_paths(
     """The wavefronts of arrivals, in water that absorbs `attenuation` (dB/m) at the band centre; raises ValueError
     where one cannot be synthesised."""
     count = arrivals.delay.size
-    for name in FINITE:
-        value = getattr(arrivals, name)
+    expanded = {f"expansion.{name}": getattr(arrivals.expansion, name) for name in QUANTITIES}
+    for name, value in ({name: getattr(arrivals, name) for name in FINITE} | expanded).items():
         if not np.isfinite(value).all():
             wrong = ~np.isfinite(value).all(axis=tuple(range(1, value.ndim)))
             raise ValueError(f"arrival {np.flatnonzero(wrong)[0]} has {name} that is not a finite number")
@@ -120,10 +108,7 @@ def array_paths(
         curvature=1.0 / arrivals.radius,
         amplitude=arrivals.amplitude * gain[arrivals.snap] * sign if count else arrivals.amplitude,
         loss=arrivals.absorption,
-        delay_terms=arrivals.delay_terms,
-        amplitude_terms=arrivals.amplitude_terms,
-        phase_terms=arrivals.phase_terms,
-        delay_variance_terms=arrivals.delay_variance_terms,
+        expansion=arrivals.expansion,
         sound_speed=arrivals.sound_speed,
         aperture=elements.aperture or 1.0,
         phase=phase,
@@ -193,7 +178,7 @@ BENT = 4
 def tilt(front: ArrayPaths, gradient: Floats) -> Floats:
     """What delay terms turn the wavefront by, (point, xyz, path), beside the sphere: -c times their gradient (xyz,
     point, term)."""
-    slope = gradient[:, :, BENT:] @ front.delay_terms[:, BENT:].T
+    slope = gradient[:, :, BENT:] @ front.expansion.delay[:, BENT:].T
     return np.asarray(-front.sound_speed * slope.swapaxes(0, 1))
 
 
@@ -201,24 +186,9 @@ def arrival_directions(front: ArrayPaths, points: Floats) -> Floats:
     """Slownesses of the wavefronts at points (point, xyz), times the speed of sound at the centre, (path, point, xyz):
     what element faces hear, and unit vectors of `towards` where rays are straight."""
     u, _ = towards(front, points)
-    if not front.delay_terms.shape[1]:
+    if not front.expansion.delay.shape[1]:
         return u
-    gradient = terms_gradient(points, front.aperture, front.delay_terms.shape[1])
-    return np.asarray(u + np.moveaxis(tilt(front, gradient), 2, 0))
-
-
-def terms_gradient(points: Floats, aperture: float, terms: int) -> Floats:
-    """Gradient (xyz, point, term) in 1/m of so many aperture terms at points (point, xyz)."""
-    steps = 1e-4 * aperture * np.eye(3)
-    sides = [[kept_aperture_terms(points + sign * step, aperture, terms) for sign in (1, -1)] for step in steps]
-    return np.array([(ahead - behind) / (2e-4 * aperture) for ahead, behind in sides])
-
-
-def over(terms: Floats, points: Floats, aperture: float) -> Floats:
-    """Polynomials with coefficients terms (path, term) at points (point, xyz): (path, point); 0 without terms."""
-    if not terms.shape[1]:
-        return np.zeros((len(terms), len(points)))
-    return np.asarray(terms @ kept_aperture_terms(points, aperture, terms.shape[1]).T)
+    return np.asarray(u + np.moveaxis(tilt(front, front.expansion.gradient(points, "delay")), 2, 0))
 
 
 def delay_and_gain(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
@@ -228,10 +198,10 @@ def delay_and_gain(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
     # (|R d - q| - R)/c without the difference of nearly equal numbers
     path = (front.curvature[:, None] * square - 2.0 * front.direction @ points.T) / (n + 1.0)
     delay, gain = path / front.sound_speed, 1.0 / n
-    if front.delay_terms.shape[1]:
-        delay = delay + over(front.delay_terms, points, front.aperture)
-    if front.amplitude_terms.shape[1]:
-        gain = gain * (1.0 + over(front.amplitude_terms, points, front.aperture))
+    if front.expansion.delay.shape[1]:
+        delay = delay + front.expansion.over("delay", points)
+    if front.expansion.amplitude.shape[1]:
+        gain = gain * (1.0 + front.expansion.over("amplitude", points))
     if front.attenuation:
         gain = gain * lost(front.attenuation * front.sound_speed * delay)
     return delay, gain
@@ -244,25 +214,22 @@ def lost(level: Floats) -> Floats:
 
 def reach(front: ArrayPaths) -> Floats:
     """Bound (path,) on how long (s) before or after the array centre a wavefront meets any hydrophone."""
-    return np.asarray(front.aperture / front.sound_speed + np.abs(front.delay_terms).sum(axis=1))
+    return np.asarray(front.aperture / front.sound_speed + front.expansion.largest("delay"))
 
 
-def reference_of(front: ArrayPaths, middle: Floats, phase_terms: Floats, delay_variance_terms: Floats) -> ArrayPaths:
+def reference_of(front: ArrayPaths, middle: Floats, phase: Floats, variance: Floats) -> ArrayPaths:
     """The front that a tile of paths is steered to, from the middle (column,) of their directions, curvatures,
     absorption and delay terms, and the change over the aperture that it takes."""
     norm = np.linalg.norm(middle[:3])
     direction = middle[:3] if norm < 0.1 else middle[:3] / norm
-    terms = front.delay_terms.shape[1]
+    delay, none = middle[None, 5 : 5 + front.expansion.delay.shape[1]], np.zeros((1, 0))
     return ArrayPaths(
         delay=np.zeros(1),
         direction=direction[None] if norm >= 0.1 else np.array([[1.0, 0.0, 0.0]]),
         curvature=middle[3:4],
         amplitude=np.ones(1),
         loss=middle[4:5],
-        delay_terms=middle[None, 5 : 5 + terms],
-        amplitude_terms=np.zeros((1, 0)),
-        phase_terms=phase_terms[None],
-        delay_variance_terms=delay_variance_terms[None],
+        expansion=ArrayExpansion(delay, none, phase[None], variance[None], np.zeros(1), front.expansion.aperture),
         sound_speed=front.sound_speed,
         aperture=front.aperture,
         phase=np.zeros(1),

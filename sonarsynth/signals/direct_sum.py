@@ -56,7 +56,7 @@ def exact_spectra(
             shape = shape * facet_response(
                 frequency, path.coherent, path.corner_delays, path.coherent_fraction, path.height_delay_std, path.centre
             )
-        if path.phase_terms.any() or path.delay_variance_terms.any():
+        if path.expansion.phase.any() or path.expansion.delay_variance.any():
             shape = shape * changed(path, elements.position, frequency)
         gain_of_sensors = elements.gain * ~path.occluded[0] if path.occluded.shape[1] else elements.gain
         total += (path.amplitude[0] * gain[0] * gain_of_sensors)[:, None] * (

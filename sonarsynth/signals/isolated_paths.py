@@ -73,8 +73,8 @@ def measured_levels(
     count, fs = len(paths.delay), sonar.sampling_frequency
     if not count:
         return np.zeros(0)
-    hydrophone, none = ideal_hydrophone(), np.empty((count, 0))
-    paths = replace(paths, phase_terms=none, delay_variance_terms=none)  # that of the centre is heard
+    hydrophone, alike = ideal_hydrophone(), paths.expansion.without("phase", "delay_variance")
+    paths = replace(paths, expansion=alike)  # that of the centre is heard
     front = array_paths(paths, snaps, hydrophone)
     before, after = layout(paths, front, snaps, hydrophone, sonar, 0.0, 1).support + reach(front)
     lead = int(np.ceil(before.max() * fs)) + GUARD

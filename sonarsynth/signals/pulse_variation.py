@@ -2,7 +2,7 @@
 
 At a point of the aperture a path has the phase and the variance of its blur
     phase + turn,  variance + spread,
-both polynomials (`apertures.aperture_terms`). The modes of its pulse (`shapes`) change with them: by the cosine
+both polynomials (`ArrayExpansion`). The modes of its pulse (`shapes`) change with them: by the cosine
 and the sine of turn, times its modes and those of the pulse a quarter of a period ahead; and by powers of spread, times
 those of the pulse times powers of -(2 pi f)^2/2. What all paths of a tile share of it the field of the tile takes.
 """
@@ -17,7 +17,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.bubble.snap_pressure import ComplexArray
-from sonarsynth.signals.array_paths import ArrayPaths, over, terms_gradient
+from sonarsynth.signals.array_paths import ArrayPaths
 
 MOST_POWERS = 8
 """Powers of spread that pulses may be expanded in."""
@@ -40,19 +40,9 @@ class PulseVariation(NamedTuple):
 UNCHANGING = PulseVariation((), np.zeros((0, 0, 0)), 0.0)
 
 
-def widest_turn(front: ArrayPaths) -> Floats:
-    """Bound (path,) on |turn| (rad) over the aperture."""
-    return np.asarray(np.abs(front.phase_terms).sum(axis=1))
-
-
-def widest_spread(front: ArrayPaths) -> Floats:
-    """Bound (path,) on |spread| (s2) over the aperture."""
-    return np.asarray(np.abs(front.delay_variance_terms).sum(axis=1))
-
-
 def turn_and_spread(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
     """Turn (rad) and spread (s2), (path, point) each, at points (point, xyz)."""
-    return over(front.phase_terms, points, front.aperture), over(front.delay_variance_terms, points, front.aperture)
+    return front.expansion.over("phase", points), front.expansion.over("delay_variance", points)
 
 
 def changed(front: ArrayPaths, points: Floats, frequency: Floats) -> ComplexArray:
@@ -64,11 +54,7 @@ def changed(front: ArrayPaths, points: Floats, frequency: Floats) -> ComplexArra
 
 def aperture_gradient(front: ArrayPaths, points: Floats) -> Floats:
     """Gradient (xyz, point, term) of the aperture terms at points (point, xyz); empty where no front has such terms."""
-    every = front.delay_terms, front.phase_terms, front.delay_variance_terms
-    widest = max(terms.shape[1] for terms in every)
-    if not widest:
-        return np.zeros((3, 0, 0))
-    return terms_gradient(points, front.aperture, widest)
+    return front.expansion.gradient(points, "delay", "phase", "delay_variance")
 
 
 def slopes(front: ArrayPaths, gradient: Floats, lowest: float, highest: float) -> Floats:
@@ -79,8 +65,8 @@ def slopes(front: ArrayPaths, gradient: Floats, lowest: float, highest: float) -
     """
     total = np.zeros((3, front.count))
     for terms, scale in (
-        (front.phase_terms, highest / lowest),
-        (front.delay_variance_terms, 0.5 * (2.0 * np.pi * highest) ** 2),
+        (front.expansion.phase, highest / lowest),
+        (front.expansion.delay_variance, 0.5 * (2.0 * np.pi * highest) ** 2),
     ):
         if terms.shape[1]:
             total += scale * np.abs(np.einsum("et,ipt->ipe", terms, gradient[:, :, : terms.shape[1]])).max(axis=1)
@@ -90,7 +76,7 @@ def slopes(front: ArrayPaths, gradient: Floats, lowest: float, highest: float) -
 def with_changes(front: ArrayPaths) -> ArrayPaths:
     """Paths, and after them the loudest of those that change, as they are elsewhere on the aperture: more and less
     blurred, and as loud as what turns, a quarter of a period ahead."""
-    turn, spread = widest_turn(front), widest_spread(front)
+    turn, spread = front.expansion.largest("phase"), front.expansion.largest("delay_variance")
     loud = np.abs(front.amplitude)
     copies = [np.arange(front.count)]
     copies += [_loudest(loud * (spread > 0.0))] * 2 + [_loudest(loud * turn)]
@@ -98,11 +84,11 @@ def with_changes(front: ArrayPaths) -> ArrayPaths:
     every = front.select(np.concatenate(copies))
     blur = np.repeat([0.0, 1.0, -1.0, 0.0], count)
     ahead = np.repeat([0.0, 0.0, 0.0, 1.0], count)
-    size = np.where(ahead > 0.0, np.minimum(widest_turn(every), 1.0), 1.0)
+    size = np.where(ahead > 0.0, np.minimum(every.expansion.largest("phase"), 1.0), 1.0)
     return replace(
         every,
         amplitude=every.amplitude * size,
-        variance=every.variance + blur * widest_spread(every),
+        variance=every.variance + blur * every.expansion.largest("delay_variance"),
         phase=every.phase + 0.5 * np.pi * ahead,
     )
 
@@ -115,7 +101,7 @@ def _loudest(loud: Floats) -> Ints:
 
 def changes(front: ArrayPaths, frequency: Floats, spectrum: ComplexArray) -> PulseVariation:
     """What the pulses of paths change by, from the spectra (mode, bin) of modes that hold it (`with_changes`)."""
-    turns, spreads = bool(front.phase_terms.any()), bool(front.delay_variance_terms.any())
+    turns, spreads = bool(front.expansion.phase.any()), bool(front.expansion.delay_variance.any())
     if not (turns or spreads):
         return UNCHANGING
     exponent = 0.5 * (2.0 * np.pi * frequency) ** 2
@@ -133,8 +119,8 @@ def changes(front: ArrayPaths, frequency: Floats, spectrum: ComplexArray) -> Pul
 class ResidualVariation(NamedTuple):
     """What pulses of a tile change by beside the reference, which the whole field of the tile changes with."""
 
-    phase_terms: Floats  # (term,) rad of the reference; none where it does not change
-    delay_variance_terms: Floats  # (term,) s2
+    phase: Floats  # (term,) rad of the reference; none where it does not change
+    delay_variance: Floats  # (term,) s2
     which: Ints  # (some,) changes that count
     size: Floats  # (some, path) bounds on how much there is of each in some paths of the tile
     paths: Ints  # (path,) those
@@ -148,8 +134,8 @@ def rest(front: ArrayPaths, paths: Ints, variation: PulseVariation, tolerance: f
     loud, weight = np.abs(front.amplitude[sampled]), front.modes[sampled]
     if not variation.kinds:
         return ResidualVariation(none, none, np.zeros(0, int), np.zeros((0, sampled.size)), sampled)
-    turn, turned = _middle(front.phase_terms, sampled)
-    spread, softer = _middle(front.delay_variance_terms, sampled)
+    turn, turned = _middle(front.expansion.phase, sampled)
+    spread, softer = _middle(front.expansion.delay_variance, sampled)
     share = np.array([np.minimum(turned, 1.0) ** a * (softer * variation.rate) ** p for p, a in variation.kinds])
     size = np.sqrt((np.tensordot(weight, variation.onto, (1, 1)) ** 2).sum(axis=2)).T * share * loud
     mean = np.sqrt((size**2).sum(axis=1) / (loud**2).sum())

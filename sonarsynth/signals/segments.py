@@ -14,7 +14,6 @@ from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths, delay_and_gain, reach
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, PulseChanges, at_longest, silencing_blur, support_of
-from sonarsynth.signals.pulse_variation import widest_spread
 from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
 
@@ -92,9 +91,9 @@ def _supports(
     if not front.count:
         return np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0, bool)
     chosen, rough = sonar.antialias, front.coherent_fraction > 0.0
-    spread = widest_spread(front)
+    spread = front.expansion.largest("delay_variance")
     delay_std, least = np.sqrt(front.variance + spread), np.sqrt(np.maximum(front.variance - spread, 0.0))
-    turned = (front.phase != 0.0) | front.phase_terms.any(axis=1)
+    turned = (front.phase != 0.0) | front.expansion.phase.any(axis=1)
     longest = [at_longest(s.waveform) for s in snaps]
     roughest = float(front.height_delay_std[rough].max(initial=0.0))
 

@@ -16,7 +16,7 @@ from sonarsynth.state import Emission, FrameContext
 from sonarsynth.tracing.doppler import Meeting, MotionTerms, apply_doppler, received
 from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.expansion.amplitude_polynomials import fitted
-from sonarsynth.tracing.expansion.array_expansion import array_expansion
+from sonarsynth.tracing.expansion.aperture_paths import aperture_paths
 from sonarsynth.tracing.facet_paths import FacetPaths, facet_paths
 from sonarsynth.tracing.meetings import hearing_times, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
@@ -94,19 +94,19 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     legs = view.visible(legs, legs.point, None)
     legs = view.settled(legs, legs.point, None)
     count = len(legs.row)
-    over = array_expansion(legs, np.zeros(count, int), array.bending, receiver, array.propagation)
+    over = aperture_paths(legs, np.zeros(count, int), array.bending, receiver, array.propagation)
     one, none, none_out = np.ones(count), np.full(count, NO_TARGET), TransmitPaths.none(count)
     rows, (loud, turned) = np.arange(count), directed(snap, legs.departure)
     gain, met = over.gain(rows), MotionTerms.direct(count, snap)
     if snap.directivity is not None:  # seen from the source, hydrophones are in other directions than the centre
         gain = gain * (snap.directivity(over.departure(rows)) / snap.directivity(legs.departure)[:, None])
-    variation = fitted(array, gain, legs.spreading)
+    amplitude, error = fitted(array, gain, legs.spreading)
     legs = replace(legs, spreading=legs.spreading * loud, phase=legs.phase + turned)
     legs = legs if meeting is None else received(legs, met, meeting, medium.profile)
     direct = assemble(
-        legs, over.terms, none_out, index, snap.time, path_loss(array, snap, legs),
-        kind=Kind.DIRECT, target=none, facet=none, scattering=one, variation=variation,
-        pulses=PulseResponse.plain(count),
+        legs, replace(over.expansion, amplitude=amplitude), none_out, index, snap.time, path_loss(array, snap, legs),
+        kind=Kind.DIRECT, target=none, facet=none, scattering=one, pulses=PulseResponse.plain(count),
+        amplitude_error=error,
     )  # fmt: skip
     if meeting is None:
         return direct

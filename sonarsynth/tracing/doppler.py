@@ -32,7 +32,7 @@ from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Arrivals
 from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Emission
-from sonarsynth.tracing.expansion.probe_paths import TERMS
+from sonarsynth.tracing.expansion.probe_sensors import TERMS
 from sonarsynth.tracing.receive_paths import ReceivePaths
 from sonarsynth.tracing.transmit_paths import TransmitPaths
 
@@ -187,6 +187,7 @@ def apply_doppler(
     doppler = (1.0 - out.approach) * (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
     if not array.velocity.any() or not aperture:
         return replace(arrivals, doppler=doppler)
-    terms = arrivals.delay_terms.copy() if arrivals.delay_terms.shape[1] else np.zeros((len(doppler), TERMS))
+    expansion = replace(arrivals.expansion, aperture=aperture)
+    terms = expansion.delay.copy() if expansion.delay.shape[1] else np.zeros((len(doppler), TERMS))
     terms[:, 1:4] -= (of_array / (1.0 - of_array) * aperture / c_array)[:, None] * legs.direction
-    return replace(arrivals, doppler=doppler, delay_terms=terms)
+    return replace(arrivals, doppler=doppler, expansion=replace(expansion, delay=terms))

@@ -11,7 +11,7 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, Ints, depth, picked
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.products import Arrivals, Kind
+from sonarsynth.products import ArrayExpansion, Arrivals, Kind
 from sonarsynth.propagation.reflections import reflections
 from sonarsynth.scattering import Component
 from sonarsynth.scattering.facet_geometry import PulseResponse
@@ -19,8 +19,8 @@ from sonarsynth.state import Emission
 from sonarsynth.tracing.doppler import MotionTerms, apply_doppler, meets, met_paths, received, velocities
 from sonarsynth.tracing.echo_batches import EchoBatch, echo_batches, in_band
 from sonarsynth.tracing.expansion.amplitude_polynomials import variations
+from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
 from sonarsynth.tracing.expansion.scattering_points import delay_to_scattering_points, shift_to_scattering_points
-from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES, ExpansionTerms, probes
 from sonarsynth.tracing.occlusion.ray_cones import hidden, overlapping
 from sonarsynth.tracing.path_absorption import path_loss
 from sonarsynth.tracing.pruning import EchoLevels, loud_of_all, loud_ones
@@ -48,7 +48,7 @@ class _EchoBlock:
     factor: Floats  # (pair,) what the ways do to amplitudes
     few: Floats  # (echo, FEW) amplitudes of the law at the first probes
     gain: Floats  # (echo, FEW) of the legs there
-    terms: ExpansionTerms  # (echo,) of the wavefronts
+    terms: ArrayExpansion  # (echo,) but for amplitudes
     pulses: PulseResponse  # (echo,)
     carried: MotionTerms | None  # (pair,); None: nothing moves
 
@@ -60,7 +60,7 @@ class _EchoBlock:
         number = np.split(np.arange(len(row)), np.cumsum([len(g.row) for g in groups])[:-1])
         groups = [replace(g, row=rows) for g, rows in zip(groups, number, strict=True)]
         out, leg, factor = self.out.select(row), self.leg[row], self.factor[row]
-        terms, pulses = self.terms.select(loud), self.pulses.select(loud)
+        terms, pulses = self.terms[loud], self.pulses.select(loud)
         carried = None if self.carried is None else self.carried.select(row)
         return _EchoBlock(self.array, groups, out, leg, factor, self.few[loud], self.gain[loud], terms, pulses, carried)
 
@@ -127,10 +127,10 @@ def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...
             legs = received(legs, block.carried, meeting, profile)
         kinds, target, facet = array.met(out.facet, kind)
         amplitude, sign = _columns(block.groups, "amplitude", "sign")
-        scattered, vary, loss = sign * amplitude, (variation, error), path_loss(array, snap, legs, out)
+        scattered, loss = sign * amplitude, path_loss(array, snap, legs, out)
         echo = assemble(
-            legs, over, out, index, snap.time, loss,
-            kind=kinds, target=target, facet=facet, scattering=scattered, variation=vary, pulses=block.pulses,
+            legs, replace(over, amplitude=variation), out, index, snap.time, loss, kind=kinds, target=target,
+            facet=facet, scattering=scattered, pulses=block.pulses, amplitude_error=error,
         )  # fmt: skip
         if meeting is not None and block.carried is not None:
             echo = apply_doppler(echo, legs, out, block.carried, meeting, profile, receiver.elements.aperture)
@@ -180,7 +180,7 @@ def _found(array: FacetPaths, snap: Emission, components: tuple[tuple[Component,
     few = np.concatenate([g.over(of) for g, of in zip(groups, away, strict=True)])
     pulses = PulseResponse.join([g.pulses(array.context.receiver.centre) for g in groups])
     rows = leg[_columns(groups, "row")[0]]
-    gain, over = fronts.gain(rows, QUADRATIC_PROBES), fronts.terms.select(rows)
+    gain, over = fronts.gain(rows, QUADRATIC_PROBES), fronts.expansion[rows]
     return _EchoBlock(array, groups, out, leg, factor, few, gain, over, pulses, carried)
 
 
@@ -239,7 +239,7 @@ def _hides(
     return stand_in(bodies, array.bending, start, end, -out.arrival, out.length)
 
 
-def _turned(block: _EchoBlock, strongest: float) -> ExpansionTerms:
+def _turned(block: _EchoBlock, strongest: float) -> ArrayExpansion:
     """Wavefronts (path,) of echoes, with the phases of reflections from facets to each probe; strongest: of all.
 
     They vary over the aperture where part of the sound enters the body; what polynomials miss counts as far as the echo
@@ -254,9 +254,7 @@ def _turned(block: _EchoBlock, strongest: float) -> ExpansionTerms:
     if not shift.any():
         return over
     probe = probes(array.context.receiver.elements)
-    terms = probe.fit(np.where(leaps[:, None], 0.0, shift))
+    terms, missed = probe.expand(np.where(leaps[:, None], 0.0, shift))
     share = np.abs(block.strength) / max(strongest, 1e-300)
-    error = over.error + share * np.where(leaps, 0.0, probe.misfit(shift, terms)) / (
-        2.0 * np.pi * array.context.receiver.band[1]
-    )
-    return over._replace(phase=over.phase + terms if over.phase.shape[1] else terms, error=error)
+    error = over.error + share * missed / (2.0 * np.pi * array.context.receiver.band[1])
+    return replace(over, phase=over.phase + terms if over.phase.shape[1] else terms, error=error)

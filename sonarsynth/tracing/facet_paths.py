@@ -15,7 +15,7 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Kind
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.doppler import Meeting
-from sonarsynth.tracing.expansion.array_expansion import ArrayExpansion, ExpansionSource, expansion_source
+from sonarsynth.tracing.expansion.aperture_paths import AperturePaths, ExpansionSource, expansion_source
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion
 from sonarsynth.tracing.receive_paths import (
     Facets,
@@ -46,15 +46,15 @@ class FacetPaths:
     meeting: Meeting | None = None  # when bodies and array are where they are here; None: nothing moves
 
     @property
-    def fronts(self) -> ArrayExpansion:
+    def fronts(self) -> AperturePaths:
         """(leg,) over the aperture: kept for all legs, made anew for some."""
         return self._whole if self.legs is self.wavefronts.legs else self._made()
 
     @cached_property
-    def _whole(self) -> ArrayExpansion:
+    def _whole(self) -> AperturePaths:
         return self._made()
 
-    def _made(self) -> ArrayExpansion:
+    def _made(self) -> AperturePaths:
         return self.wavefronts.of(slice(self.first, self.first + len(self.legs.row)))
 
     def part(self, rows: slice) -> FacetPaths:

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.products import Arrivals, Kind, Paths
+from sonarsynth.products import ArrayExpansion, Arrivals, Kind, Paths
+from sonarsynth.products.array_expansion import stacked
 from sonarsynth.propagation.reflections import Reflections, as_sign
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Emission
-from sonarsynth.tracing.expansion.wavefront_polynomials import ExpansionTerms
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
 COINCIDENCE_TIME = 1e-12
@@ -90,12 +90,12 @@ def directed(snap: Emission, departure: Floats) -> tuple[Floats | float, Floats 
 
 
 def assemble(
-    legs: ReceivePaths, over: ExpansionTerms, out: TransmitPaths, index: int, time: float, loss: Floats,
-    *, kind: Ints | Kind, target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float],
-    pulses: PulseResponse,
+    legs: ReceivePaths, over: ArrayExpansion, out: TransmitPaths, index: int, time: float, loss: Floats,
+    *, kind: Ints | Kind, target: Ints, facet: Ints, scattering: Floats, pulses: PulseResponse,
+    amplitude_error: float = 0.0,
 ) -> Arrivals:  # fmt: skip
-    """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: the wavefronts; loss: absorption of
-    each (dB); variation: terms of the amplitude and their error; pulses: what facets make of the snap."""
+    """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: over the aperture; loss: absorption
+    of each (dB); pulses: what facets make of the snap; amplitude_error: as of `Arrivals`."""
     length = out.length + legs.length
     sign, phase = as_sign(out.phase + legs.phase + pulses.phase)
     boundary = sign * out.boundary * legs.boundary
@@ -106,10 +106,7 @@ def assemble(
         delay=time + (out.travel_time + legs.travel_time),
         direction=legs.direction,
         radius=legs.radius,
-        delay_terms=over.delay,
-        phase_terms=over.phase,
-        delay_variance_terms=over.delay_std,
-        amplitude_terms=variation[0],
+        expansion=over,
         amplitude=first * scattering * second * boundary * 10.0 ** (-loss / 20.0),
         spreading_out=first,
         spreading_in=second,
@@ -139,8 +136,7 @@ def assemble(
         occluded=legs.occluded,
         centre=np.nan,
         sound_speed=np.nan,
-        wavefront_error=float(over.error.max(initial=0.0)),
-        amplitude_error=variation[1],
+        amplitude_error=amplitude_error,
     )
 
 
@@ -149,7 +145,7 @@ def no_arrivals(legs: ReceivePaths) -> Arrivals:
     none, zero = np.empty(0), np.empty(0, int)
     return assemble(
         legs.select(zero),
-        ExpansionTerms.none(0),
+        ArrayExpansion.none(0),
         TransmitPaths.none(0),
         0,
         0.0,
@@ -158,7 +154,6 @@ def no_arrivals(legs: ReceivePaths) -> Arrivals:
         target=zero,
         facet=zero,
         scattering=none,
-        variation=(np.empty((0, 0)), 0.0),
         pulses=PulseResponse.plain(0),
     )
 
@@ -188,15 +183,11 @@ def ordered(blocks: list[Arrivals], group: list[Ints]) -> Arrivals:
 def _stacked(blocks: list[Arrivals], rows: Bools | Ints | None) -> Arrivals:
     """These rows of all blocks, one after the other; the list is emptied, so that only one column is there twice."""
     tables = [dict(vars(block)) for block in blocks]
-    errors = {name: max(block[name] for block in tables) for name in ("wavefront_error", "amplitude_error")}
     plain = {name: tables[0][name] for name in ("centre", "sound_speed")}
     blocks.clear()
-    columns: dict[str, Any] = {}
-    for name in [name for name, value in tables[0].items() if isinstance(value, np.ndarray)]:
-        arrays = [block.pop(name) for block in tables]
-        if arrays[0].ndim == 2:  # columns that some lack are 0
-            width = max(a.shape[1] for a in arrays)
-            arrays = [a if a.shape[1] == width else np.zeros((len(a), width), a.dtype) for a in arrays]
-        column = np.concatenate(arrays)
+    columns: dict[str, Any] = {"amplitude_error": max(block["amplitude_error"] for block in tables)}
+    for name in [name for name, value in tables[0].items() if isinstance(value, np.ndarray | ArrayExpansion)]:
+        join = ArrayExpansion.join if name == "expansion" else stacked
+        column = join([block.pop(name) for block in tables])
         columns[name] = column if rows is None else column[rows]
-    return Arrivals(**columns, **plain, **errors)
+    return Arrivals(**columns, **plain)

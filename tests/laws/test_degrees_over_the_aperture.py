@@ -11,11 +11,11 @@ import pytest
 
 from sonarsynth import planning
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.planning import choosing
 from sonarsynth.planning.choosing import PerSensorReference
 from sonarsynth.products import Arrivals
+from sonarsynth.products.array_expansion import aperture_terms
 from sonarsynth.propagation import Refracted
 from sonarsynth.receiver import Elements, Romanis, Sonar, elements
 from sonarsynth.receiver.subarrays import subarray

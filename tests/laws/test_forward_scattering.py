@@ -10,7 +10,6 @@ from scipy.special import fresnel
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
@@ -66,14 +65,9 @@ def transfer(found: Arrivals, sensor: Floats | None = None) -> Floats:
     delay, amplitude = found.delay, found.amplitude
     if sensor is not None:
         away = np.linalg.norm(found.radius[:, None] * found.direction - sensor, axis=1)
-        delay = delay + (away - found.radius) / found.sound_speed
-        gain = np.ones(len(delay))
-        terms = aperture_terms(sensor[None], ROMANIS.aperture)[0]
-        if found.amplitude_terms.shape[1]:
-            gain = 1.0 + found.amplitude_terms @ terms[: found.amplitude_terms.shape[1]]
-        if found.delay_terms.shape[1]:
-            delay = delay + found.delay_terms @ terms[: found.delay_terms.shape[1]]
-        amplitude = amplitude * found.radius / away * gain
+        late, louder = (found.expansion.over(name, sensor[None])[:, 0] for name in ("delay", "amplitude"))
+        delay = delay + (away - found.radius) / found.sound_speed + late
+        amplitude = amplitude * found.radius / away * (1.0 + louder)
     phase = found.phase[:, None] - 2.0 * np.pi * delay[:, None] * F
     left = np.exp(-0.5 * np.multiply.outer(found.delay_std, 2.0 * np.pi * F) ** 2)
     return (amplitude[:, None] * shape * left * np.exp(1j * phase)).sum(axis=0)
@@ -159,8 +153,9 @@ def test_sound_is_blocked_or_scattered_forward_never_both() -> None:
     beside = ARRAY + [3.0, 6.0, 1.0]
     echoes, more = (heard((body(mesh, place),), beside, (law,)) for law in (Kirchhoff(), SCATTERED))
     assert len(more.delay) > len(echoes.delay)
-    for name in ("amplitude", "delay", "corner_delays", "facet", "amplitude_terms"):
+    for name in ("amplitude", "delay", "corner_delays", "facet"):
         np.testing.assert_array_equal(getattr(more, name)[: len(echoes.delay)], getattr(echoes, name))
+    np.testing.assert_array_equal(more.expansion.amplitude[: len(echoes.delay)], echoes.expansion.amplitude)
 
 
 @pytest.mark.parametrize(

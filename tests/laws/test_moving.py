@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from sonarsynth.conventions import Floats
-from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Circle, Motion, Track, Waypoint, Waypoints, pose, velocity
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -189,7 +188,7 @@ def test_a_moving_array_meets_the_wavefront_at_every_sensor_when_it_is_there() -
     u, q = np.array([1.5, -0.5, 0.2]), ROMANIS.position
     found = run(STILL, u, bodies=(), bounces=1, array=ROMANIS)
     far = np.linalg.norm(found.radius[:, None, None] * found.direction[:, None, :] - q, axis=-1)
-    terms = found.delay_terms @ aperture_terms(q, ROMANIS.aperture).T
+    terms = found.expansion.over("delay", q)
     late = found.delay[:, None] + (far - found.radius[:, None]) / found.sound_speed + terms
     places = {(s, b): source for source, s, b in images(SOURCE, 1)}
     for i in range(len(late)):

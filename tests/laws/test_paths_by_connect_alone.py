@@ -12,7 +12,6 @@ from sonarsynth.conventions import Floats
 from sonarsynth.description import description
 from sonarsynth.environment.boundaries import Rigid, SeaBottom
 from sonarsynth.environment.sea import Environment, Isovelocity, Profile
-from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -64,8 +63,7 @@ def wavefronts(found: Arrivals) -> Floats:
     q = ARRAY.position
     far = np.linalg.norm(found.radius[:, None, None] * found.direction[:, None, :] - q, axis=-1)
     late = (far - found.radius[:, None]) / found.sound_speed
-    if found.delay_terms.shape[1]:
-        late = late + found.delay_terms @ aperture_terms(q, ARRAY.aperture).T
+    late = late + found.expansion.over("delay", q)
     return np.asarray(late)
 
 

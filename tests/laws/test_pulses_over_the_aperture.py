@@ -10,11 +10,11 @@ import pytest
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.boundaries import Rigid, SeaBottom, SeaSurface, Sediment
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
+from sonarsynth.products.array_expansion import QUANTITIES
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import FacetLaw, Kirchhoff, MirrorLobe, PartlyReflecting
@@ -71,18 +71,12 @@ def single() -> Elements:
 
 def heard(found: Arrivals, q: Floats) -> Floats:
     """Each path (path, frequency) at a place in the sonar frame, at the edges and the centre of the band."""
-    basis = aperture_terms(q, ROMANIS.aperture)
-
-    def over(terms: Floats) -> Floats:
-        return terms @ basis[: terms.shape[1]] if terms.shape[1] else np.zeros(len(terms))
-
+    over = {name: found.expansion.over(name, q[None])[:, 0] for name in QUANTITIES}
     away = np.linalg.norm(found.radius[:, None] * found.direction - q, axis=1)
-    late = found.delay + (away - found.radius) / C + over(found.delay_terms)
-    amplitude = found.amplitude * found.radius / away * (1.0 + over(found.amplitude_terms))
-    phase = found.phase + over(found.phase_terms)
-    soft = np.exp(
-        -0.5 * np.multiply.outer(found.delay_std**2 + over(found.delay_variance_terms), (2.0 * np.pi * EDGES) ** 2)
-    )
+    late = found.delay + (away - found.radius) / C + over["delay"]
+    amplitude = found.amplitude * found.radius / away * (1.0 + over["amplitude"])
+    phase = found.phase + over["phase"]
+    soft = np.exp(-0.5 * np.multiply.outer(found.delay_std**2 + over["delay_variance"], (2.0 * np.pi * EDGES) ** 2))
     shape = facet_response(
         EDGES, found.coherent, found.corner_delays, found.coherent_fraction, found.height_delay_std, found.centre
     )
@@ -124,13 +118,12 @@ def test_each_family_at_the_edges_of_the_band_is_that_of_a_hydrophone_alone(scen
     What is left is the directivity of facets, which all hydrophones share, so that those of the body are small.
     """
     found = traced(*scene, PLACE)
-    none = np.empty((len(found.delay), 0))
     worst, plain = 0.0, 0.0
     for sensor in FAR:
         exact = alone(*scene, sensor=sensor)
         mine, theirs = both(found, exact)
         q = ROMANIS.position[sensor]
-        flat = replace(mine, phase_terms=none[: len(mine.delay)], delay_variance_terms=none[: len(mine.delay)])
+        flat = replace(mine, expansion=mine.expansion.without("phase", "delay_variance"))
         truth = heard(theirs, np.zeros(3))
         all_echoes = np.linalg.norm(truth[~theirs.direct], axis=0)
         family = 64 * (mine.target + 1) + 16 * mine.surface + 4 * mine.bottom + mine.arrives_by
@@ -162,7 +155,7 @@ def test_signals_of_one_expansion_are_those_of_each_hydrophone_alone(scene: tupl
 def test_boundaries_that_are_alike_at_all_angles_need_no_terms() -> None:
     found = traced(SeaSurface(), HARD, MirrorLobe(width=0.5), PLACE)
     assert (found.surface > 0).any() and (found.bottom > 0).any()
-    assert found.phase_terms.shape == found.delay_variance_terms.shape == (len(found.delay), 0)
+    assert found.expansion.phase.shape == found.expansion.delay_variance.shape == (len(found.delay), 0)
 
 
 def test_every_edge_of_a_blur_is_within_the_window_or_counted() -> None:
@@ -171,7 +164,7 @@ def test_every_edge_of_a_blur_is_within_the_window_or_counted() -> None:
     one = found.select(np.flatnonzero(found.direct & (found.surface == 1) & (found.bottom == 0)))
     terms = np.zeros((1, 20))
     terms[0, [1, 4, 7, 9]] = 0.0, 0.0, 4e-10, 4e-10
-    one = replace(one, delay_variance_terms=terms, phase_terms=np.zeros((1, 0)))
+    one = replace(one, expansion=replace(one.expansion, delay_variance=terms).without("phase"))
     array = few()
     exact = DirectSum().signals(one, (SNAP,), array, SONAR, None, START, 4000).pressure
     got = GriddedSynthesis(precision="float64", tolerance=1e-6).signals(one, (SNAP,), array, SONAR, None, START, 4000)
@@ -190,9 +183,9 @@ def few(count: int = 20) -> Elements:
 def test_the_fast_synthesis_changes_pulses_as_the_exact_one_does(amplify: float) -> None:
     """Both kinds of change at once, families mixed, and as they are or four times as large."""
     found = traced(*SCENES[3].values[0], PLACE)
-    found = replace(
-        found, phase_terms=amplify * found.phase_terms, delay_variance_terms=amplify * found.delay_variance_terms
-    )
+    over = found.expansion
+    over = replace(over, phase=amplify * over.phase, delay_variance=amplify * over.delay_variance)
+    found = replace(found, expansion=over)
     found = found.select(np.concatenate([np.flatnonzero(found.direct), np.flatnonzero(~found.direct)[::80]]))
     array = few()
     for direct in (True, False):

@@ -10,7 +10,6 @@ import pytest
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
@@ -23,7 +22,7 @@ from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerance
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.expansion.wavefront_polynomials import sphere
+from sonarsynth.tracing.expansion.probe_sensors import sphere
 
 C, DEPTH = 1500.0, 40.0
 EVEN = Profile(np.array([0.0, DEPTH]), np.array([C, C]))
@@ -103,7 +102,7 @@ def errors(
     start, part = found.delay.min() - 2e-4, some_of(array, FAR)
     place = Pose(PLACE, EAST).to_world(array.position[FAR])
     alone = [bounced(traced(law, view, at, SINGLE, profile, bounces), bounces) for at in place]
-    shared = replace(found, amplitude_terms=plain.amplitude_terms)
+    shared = replace(found, expansion=replace(found.expansion, amplitude=plain.expansion.amplitude))
     powers = np.zeros(3)
     for facet in np.unique(found.facet)[::16]:
         one, other, *exact = (x.select(x.facet == facet) for x in (found, shared, *alone))
@@ -168,7 +167,6 @@ def test_echoes_come_from_their_points(profile: Profile, bounces: int) -> None:
         a, b = (np.lexsort((np.round(x.delay, 5), x.facet)) for x in (found, alone))
         assert (found.facet[a] == alone.facet[b]).all()
         late = found.delay + sphere(found.direction, found.radius, q[None])[:, 0] / found.sound_speed
-        if found.delay_terms.shape[1]:
-            late = late + found.delay_terms @ aperture_terms(q, array.aperture)
+        late = late + found.expansion.over("delay", q[None])[:, 0]
         error = late[a] - alone.delay[b]
         assert np.abs(error).max() < 1e-10

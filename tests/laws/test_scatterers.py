@@ -135,8 +135,8 @@ def test_bodies_hide_scatterers_and_are_not_hidden_by_them() -> None:
     alone, both = traced(bodies=(body,)), traced(stones, bodies=(body,))
     loose = both.kind == Kind.REVERBERATION
     assert both.facet[loose].tolist() == [1], "the ball stands between the first stone and the array"
-    for name, value in vars(both.select(~loose)).items():
-        np.testing.assert_array_equal(value, getattr(alone, name), err_msg=name)
+    for name, value in both.select(~loose).columns.items():
+        np.testing.assert_array_equal(value, alone.columns[name], err_msg=name)
 
 
 def test_a_stone_is_in_image_and_cloud_and_is_no_target() -> None:

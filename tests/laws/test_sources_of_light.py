@@ -134,9 +134,8 @@ def test_a_source_that_does_not_illuminate_is_heard_directly_alone() -> None:
     plain = Emission(SOURCE, 0.0, TONE, None)
     every, alone = traced(plain), traced(replace(plain, illuminates=False))
     assert not every.direct.all() and alone.direct.all()
-    for name, value in vars(every.select(every.direct)).items():
-        if isinstance(value, np.ndarray):
-            np.testing.assert_array_equal(getattr(alone, name), value, err_msg=name)
+    for name, value in every.select(every.direct).columns.items():
+        np.testing.assert_array_equal(alone.columns[name], value, err_msg=name)
 
 
 def test_a_source_that_moves_with_the_array_is_at_rest_for_it() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import element_directivity
-from sonarsynth.products import Arrivals, Kind
+from sonarsynth.products import ArrayExpansion, Arrivals, Kind
 from sonarsynth.receiver import BandPass, Elements, LowPass, PositionTable, Romanis, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.direct_sum import exact_signals
@@ -27,6 +27,9 @@ SONAR = Sonar()
 SHARP = Sonar(filter=BandPass(low=35e3, high=75e3, transition=15e3, attenuation=160))  # nothing beyond 98 kHz
 FACES = elements(Romanis())
 C = 1540.0
+APERTURE = FACES.aperture
+SIZES = {"delay": 3e-7, "amplitude": 1e-3}
+"""Of terms over the aperture, s and 1."""
 
 
 def absorption(frequency: Floats) -> Floats:
@@ -48,8 +51,7 @@ def arrivals(
     loss: Floats | None = None,
     snap: Floats | None = None,
     target: Floats | None = None,
-    delay_terms: Floats | None = None,
-    amplitude_terms: Floats | None = None,
+    expanded: dict[str, Floats] | None = None,
 ) -> Arrivals:
     n = len(delay)
     one, zero = np.ones(n), np.zeros(n, np.int64)
@@ -57,10 +59,7 @@ def arrivals(
         delay=np.asarray(delay, float),
         direction=np.asarray(direction, float) / np.linalg.norm(direction, axis=1, keepdims=True),
         radius=np.asarray(radius, float),
-        delay_terms=np.zeros((n, 0)) if delay_terms is None else delay_terms,
-        amplitude_terms=np.zeros((n, 0)) if amplitude_terms is None else amplitude_terms,
-        phase_terms=np.zeros((n, 0)),
-        delay_variance_terms=np.zeros((n, 0)),
+        expansion=replace(ArrayExpansion.none(n, APERTURE), **(expanded or {})),
         amplitude=np.asarray(amplitude, float),
         spreading_out=one,
         spreading_in=one,
@@ -90,7 +89,6 @@ def arrivals(
         occluded=np.zeros((n, 0), np.uint8),
         centre=55e3,
         sound_speed=C,
-        wavefront_error=0.0,
     )
 
 
@@ -116,8 +114,7 @@ def target_at(distance: float, count: int, seed: int, *, refracted: bool = False
         amplitude,
         loss=0.018 * delay * C,
         target=target,
-        delay_terms=rng.uniform(-1, 1, (n, 20)) * 3e-7 if refracted else None,
-        amplitude_terms=rng.uniform(-1, 1, (n, 20)) * 1e-3 if refracted else None,
+        expanded={name: rng.uniform(-1, 1, (n, 20)) * s for name, s in SIZES.items()} if refracted else None,
     )
 
 
@@ -225,7 +222,7 @@ def test_lobes_that_vary_over_the_aperture(size: float) -> None:
     """Amplitudes that are cubics of any size, each path its own: from broad lobes to those that miss half the array."""
     of = target_at(20.0, 400, 17, direct=False)
     terms = np.random.default_rng(18).uniform(-1, 1, (400, 20)) * size
-    of = replace(of, amplitude_terms=terms)
+    of = replace(of, expansion=replace(of.expansion, amplitude=terms))
     start, samples = window(of, SONAR, FACES)
     got = GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:4], 250)  # rim and middle

@@ -8,7 +8,6 @@ import trimesh
 
 from sonarsynth.environment.boundaries import FluidHalfSpace, Rigid, SeaBottom, SeaSurface
 from sonarsynth.environment.sea import Environment, Isovelocity, Profile
-from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.water.boundary_reflection import rayleigh
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
@@ -110,8 +109,7 @@ def test_wavefronts_of_all_families_reach_every_sensor_when_rays_do(profile: Pro
     where = SONAR.to_world(q)
     far = np.linalg.norm(found.radius[:, None, None] * found.direction[:, None, :] - q, axis=-1)
     late = (far - found.radius[:, None]) / found.sound_speed
-    if found.delay_terms.shape[1]:
-        late = late + found.delay_terms @ aperture_terms(q, ROMANIS.aperture).T
+    late = late + found.expansion.over("delay", q)
     centre = model.connect(profile, BOTTOM_DEPTH, found.point, np.broadcast_to(ARRAY, found.point.shape))
     leg = {}
     for i in range(len(centre.pair)):

@@ -25,7 +25,7 @@ from sonarsynth.pipeline import digitise, locate_and_image
 from sonarsynth.pipeline.synthesis import array_signals, true_elements
 from sonarsynth.planning import Plan, arrivals_of, plan
 from sonarsynth.products import Arrivals
-from sonarsynth.receiver.subarrays import Subarray, with_outermost_sensor
+from sonarsynth.products.array_expansion import QUANTITIES
 from sonarsynth.recipe import reading
 from sonarsynth.recipe.scene import Frame
 
@@ -37,17 +37,15 @@ FAST = {
         "scene.trajectory.frames=8",
     ),
 }
-PARTS = ("amplitude", "phase", "delay", "delay_variance")
-"""Columns of the arrivals."""
 HYDROPHONES, TIMES = 8, 3
 
 
 def without(arrivals: Arrivals, part: str) -> Arrivals:
     """Arrivals of which all sensors have what the centre has of a part; of the motion of an array, no delay is left."""
-    terms = getattr(arrivals, f"{part}_terms").copy()
+    terms = getattr(arrivals.expansion, part).copy()
     kept = 4 if part == "delay" else 0
     terms[:, kept:] = 0.0
-    return replace(arrivals, **{f"{part}_terms": terms})
+    return replace(arrivals, expansion=replace(arrivals.expansion, **{part: terms}))
 
 
 def fastest(work: Callable[[], Any]) -> tuple[Any, float]:
@@ -58,10 +56,8 @@ def fastest(work: Callable[[], Any]) -> tuple[Any, float]:
 
 def echoes_at(made: Plan, frame: Frame, arrivals: Arrivals, sensor: Any) -> tuple[Floats, Floats]:
     """Echoes and direct arrivals at some hydrophones, of arrivals at the whole array."""
-    whole = Subarray(np.arange(made.elements.count), np.zeros(3), made.elements)
-    some, rows = with_outermost_sensor(whole, sensor)
-    found = pressures(made, frame, arrivals.for_sensors(rows, made.elements.count), some, golden(made))
-    return found[0][: len(sensor)], found[1][: len(sensor)]
+    there = arrivals.for_sensors(sensor, made.elements.count)
+    return pressures(made, frame, there, made.elements.select(sensor), golden(made))
 
 
 def energy(made: Plan, frame: Frame, arrivals: Arrivals) -> Floats | None:
@@ -96,8 +92,8 @@ def frame_rows(made: Plan, index: int) -> list[dict[str, Any]]:
 
     arrivals, seconds = fastest(lambda: arrivals_of(whole, frame))
     row("nothing", whole, arrivals, seconds)
-    for part in PARTS:
-        if getattr(arrivals, f"{part}_terms").any():
+    for part in QUANTITIES:
+        if getattr(arrivals.expansion, part).any():
             row(part, whole, without(arrivals, part), seconds)
     if choices.occlusion == "sensors":
         centre = replace(whole, choices=replace(whole.choices, occlusion="centre"))

@@ -32,7 +32,6 @@ HEARD = (253,)
 def plain(arrivals: Arrivals) -> Arrivals:
     """The same paths, each a scaled snap: what the pulses would be without their shapes."""
     none = np.zeros(len(arrivals.delay))
-    terms = np.empty((len(none), 0))
     return replace(
         arrivals,
         coherent=none.astype(bool),
@@ -41,8 +40,7 @@ def plain(arrivals: Arrivals) -> Arrivals:
         height_delay_std=none,
         delay_std=none,
         phase=none,
-        phase_terms=terms,
-        delay_variance_terms=terms,
+        expansion=arrivals.expansion.without("phase", "delay_variance"),
     )
 
 
@@ -61,12 +59,9 @@ def synthesis_ms(plan: Plan, index: int) -> tuple[float, float, float]:
     echoes = replace(traced, arrivals=traced.arrivals.select(~traced.arrivals.direct))
     shaped: Signals = synthesise(plan, echoes)
     elements = plan.elements
-    outmost = int(np.argmax(np.linalg.norm(elements.position, axis=1)))  # what the aperture is measured by
+    outmost = int(np.argmax(np.linalg.norm(elements.position, axis=1)))
     some = np.unique([outmost, *HEARD])
-    few = replace(
-        elements, position=elements.position[some], gain=elements.gain[some], column=elements.column[some],
-        row=elements.row[some],
-    )  # fmt: skip
+    few = elements.select(some)
     sonar, start = plan.scene.sonar, float(plan.windows.start[index])
     heard = echoes.arrivals.for_sensors(some, elements.count)
     exact, _ = exact_signals(heard, traced.frame.moment.snaps, few, sonar, plan.absorption, start, plan.windows.samples)

@@ -1,41 +1,11 @@
-"""Arrays of hydrophones: polynomials over the aperture, element directivity, focusing delays, weights."""
+"""Arrays of hydrophones: element directivity, focusing delays, weights."""
 
 from __future__ import annotations
-
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
-
-
-def aperture_terms(position: npt.ArrayLike, aperture: float, terms: int = 20) -> Floats:
-    """Polynomials over the aperture (..., term) at positions (..., xyz) in the sonar frame.
-
-    Coordinates are divided by `aperture` (m). The basis is the monomials of x, y, z, degree by degree: 1; x, y, z; xx,
-    xy, xz, yy, yz, zz; xxx, xxy, xxz, xyy, xyz, xzz, yyy, yyz, yzz, zzz; and so on. So many of them: 20 are those up to
-    the third degree, 56 up to the fifth. On a planar array those with x vanish.
-    """
-    axes = np.moveaxis(np.asarray(position, float) / aperture, -1, 0)
-    monomials = [np.ones_like(axes[0])]
-    degree = list(enumerate(axes))  # the last axis of each monomial, and its value
-    while len(monomials) < terms:
-        monomials += [value for _, value in degree]
-        degree = [(axis, value * axes[axis]) for last, value in degree for axis in range(last, 3)]
-    return np.stack(monomials[:terms], axis=-1)
-
-
-def kept_aperture_terms(position: Floats, aperture: float, terms: int) -> Floats:
-    """`aperture_terms` at positions (point, xyz) that are asked for in every frame: hydrophones, nodes between them."""
-    return _kept_terms(position.tobytes(), aperture, terms)
-
-
-@lru_cache(maxsize=256)
-def _kept_terms(position: bytes, aperture: float, terms: int) -> Floats:
-    polynomials = aperture_terms(np.frombuffer(position).reshape(-1, 3), aperture, terms)
-    polynomials.setflags(write=False)
-    return polynomials
 
 
 def element_directivity(frequency: npt.ArrayLike, direction: npt.ArrayLike, face: float, sound_speed: float) -> Floats:

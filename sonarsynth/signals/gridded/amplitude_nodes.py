@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.equations.arrays.apertures import aperture_terms
+from sonarsynth.products.array_expansion import aperture_terms
 from sonarsynth.receiver import Elements
 from sonarsynth.signals.array_paths import ArrayPaths
 from sonarsynth.signals.gridded.interpolation import box_nodes
@@ -35,10 +35,10 @@ def variation(front: ArrayPaths, elements: Elements) -> Floats:
     First the root mean square over the hydrophones; then, of each axis, bounds on the Chebyshev coefficients of degree
     0 to 3. No rows where the amplitude is that of the sphere alone.
     """
-    if not front.amplitude_terms.shape[1]:
+    if not front.expansion.amplitude.shape[1]:
         return np.zeros((0, front.count))
-    shape, basis, triangle = _basis(elements, front.aperture, front.amplitude_terms.shape[1])
-    terms = front.amplitude_terms.T.copy()
+    shape, basis, triangle = _basis(elements, front.expansion.aperture, front.expansion.amplitude.shape[1])
+    terms = front.expansion.amplitude.T.copy()
     terms[0] += 1.0
     rows = np.zeros((1 + 3 * DEGREES, front.count))
     rows[0] = np.sqrt(((triangle @ terms) ** 2).sum(axis=0))

@@ -21,8 +21,6 @@ from sonarsynth.signals.pulse_variation import (
     UNCHANGING,
     PulseVariation,
     changes,
-    widest_spread,
-    widest_turn,
     with_changes,
 )
 from sonarsynth.signals.segments import Segment
@@ -102,21 +100,18 @@ def _shaped(front: ArrayPaths) -> bool:
     shaped = bool(
         front.variance.any() or front.phase.any() or front.corner_delays.any() or front.coherent_fraction.any()
     )
-    return shaped or (front.count > 1 and bool(front.phase_terms.any() or front.delay_variance_terms.any()))
+    return shaped or (front.count > 1 and bool(front.expansion.phase.any() or front.expansion.delay_variance.any()))
 
 
 def _changing(front: ArrayPaths, highest: Floats, tolerance: float) -> ArrayPaths:
     """Paths without what their pulses change by over the aperture, up to the highest frequency (1,), where that is
     nothing beside the loudest."""
     loud = np.abs(front.amplitude)
-    turn = np.linalg.norm(widest_turn(front) * loud)
-    spread = np.linalg.norm(widest_spread(front) * loud) * float(blur_exponent(highest)[0])
+    turn = np.linalg.norm(front.expansion.largest("phase") * loud)
+    spread = np.linalg.norm(front.expansion.largest("delay_variance") * loud) * float(blur_exponent(highest)[0])
     least = SHAPES * tolerance * loud.max()
-    terms = (
-        v if size > least else v[:, :0] for size, v in ((turn, front.phase_terms), (spread, front.delay_variance_terms))
-    )
-    phase_terms, delay_variance_terms = terms
-    return replace(front, phase_terms=phase_terms, delay_variance_terms=delay_variance_terms)
+    quiet = [name for name, size in (("phase", turn), ("delay_variance", spread)) if size <= least]
+    return replace(front, expansion=front.expansion.without(*quiet))
 
 
 def _check_corners(front: ArrayPaths, highest: float) -> None:

@@ -18,8 +18,6 @@ from sonarsynth.signals.array_paths import (
     arrival_directions,
     delay_and_gain,
     lost,
-    over,
-    terms_gradient,
     tilt,
     towards,
 )
@@ -126,7 +124,7 @@ def _add_tile(sensor_spectra: npt.NDArray[Any], tile: Tile, paths: ArrayPaths, s
     points = tile.nodes(elements)
     alone = paths.count == 1
     field = _alone(tile, paths, points, stage) if alone else _deposited(tile, paths, points, stage)
-    if tile.reference.phase_terms.any() or tile.reference.delay_variance_terms.any():
+    if tile.reference.expansion.phase.any() or tile.reference.expansion.delay_variance.any():
         field = _changed(field, tile, points, stage)
     delay, gain = delay_and_gain(tile.reference, elements.position)
     late = delay[0] + (paths.delay[0] - stage.origin if alone else 0.0)
@@ -188,14 +186,12 @@ def _deposits(
     middle, level = arrival_directions(reference, points), towards(reference, points)[1]
     late, louder, lean = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0))
     share = shares(paths, reference, tile.changes, stage.bins.changes, points, stage.dtype)
-    if paths.delay_terms.shape[1]:
-        late = over(paths.delay_terms, points, paths.aperture).T * rate
+    if paths.expansion.delay.shape[1]:
+        late = paths.expansion.over("delay", points).T * rate
         if stage.aim.elements.face > 0.0:
-            lean = np.ascontiguousarray(
-                tilt(paths, terms_gradient(points, paths.aperture, paths.delay_terms.shape[1])[1:])
-            )
-    if paths.amplitude_terms.shape[1]:
-        louder = np.ascontiguousarray(over(paths.amplitude_terms, points, paths.aperture).T)
+            lean = np.ascontiguousarray(tilt(paths, paths.expansion.gradient(points, "delay")[1:]))
+    if paths.expansion.amplitude.shape[1]:
+        louder = np.ascontiguousarray(paths.expansion.over("amplitude", points).T)
     if paths.occluded.any():
         louder = np.where(paths.occluded.T[rows], -1.0, louder if louder.size else 0.0)
     farther = paths.attenuation * paths.sound_speed / rate  # dB a sample

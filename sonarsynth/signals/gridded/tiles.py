@@ -104,11 +104,10 @@ def _columns(front: ArrayPaths, probes: Floats, gradient: Floats) -> Floats:
     straight."""
     v = front.direction.T - front.curvature * probes[:, :, None]  # (point, xyz, path)
     u = v / np.sqrt(v[:, 0] ** 2 + v[:, 1] ** 2 + v[:, 2] ** 2)[:, None]
-    columns = [front.direction.T, front.curvature[None], front.loss[None], front.delay_terms.T]
-    if front.delay_terms.shape[1]:
-        u = u - front.sound_speed * np.einsum(
-            "et,ipt->pie", front.delay_terms, gradient[:, :, : front.delay_terms.shape[1]]
-        )
+    columns = [front.direction.T, front.curvature[None], front.loss[None], front.expansion.delay.T]
+    terms = front.expansion.delay
+    if terms.shape[1]:
+        u = u - front.sound_speed * np.einsum("et,ipt->pie", terms, gradient[:, :, : terms.shape[1]])
     columns.append(u.reshape(-1, front.count))
     return np.ascontiguousarray(np.concatenate(columns))
 
@@ -146,7 +145,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     columns = views.columns if all_paths else np.take(views.columns, paths, axis=1)
     low, high = columns.min(axis=1), columns.max(axis=1)
     over = rest(views.front, paths, aim.changes, 0.1 * aim.tolerance)
-    reference = reference_of(views.front, 0.5 * (low + high), over.phase_terms, over.delay_variance_terms)
+    reference = reference_of(views.front, 0.5 * (low + high), over.phase, over.delay_variance)
     probes = views.probes
     own = _columns(reference, probes.points, views.gradient)[:, 0]
     far = np.maximum(high - own, own - low)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
-from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES, probes
+from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
@@ -91,11 +91,5 @@ def _fit(array: FacetPaths, gain: Floats, strength: Floats, few: int | None) -> 
     loudest = float(np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0))
     if (gain == 1.0).all():
         return np.empty((len(gain), 0)), 0.0, loudest
-    probe = probes(array.context.receiver.elements)
-    residual = gain - 1.0
-    if few is None or len(probe.sensor) < QUADRATIC_PROBES:
-        terms = probe.fit(residual)
-        error = probe.misfit(residual, terms)
-    else:
-        terms, error = probe.fit_few(residual)
+    terms, error = probes(array.context.receiver.elements).expand(gain - 1.0)
     return terms, float((np.abs(strength) * error).max(initial=0.0)), loudest

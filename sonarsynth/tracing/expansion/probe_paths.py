@@ -13,15 +13,11 @@ from sonarsynth.geometry import Pose
 from sonarsynth.propagation.path_model import KnownRays
 from sonarsynth.propagation.reflections import at_boundaries
 from sonarsynth.state import Medium, Receiver
-from sonarsynth.tracing.expansion.wavefront_polynomials import BRANCH, Probes, pick_branch, sphere
+from sonarsynth.tracing.expansion.probe_sensors import BRANCH, Probes, pick_branch, sphere
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
-
-
-TERMS = 20
-"""Terms over the aperture (`apertures.aperture_terms`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,20 +34,19 @@ class ReceiverGeometry:
 class ApertureSamples:
     """Legs at the probes."""
 
-    terms: Floats  # (leg, term) s: delay over the sphere's
-    phase: Floats  # (leg, term) rad: of reflections, over that at the centre
-    delay_std: Floats  # (leg, term) s2: its square, over that at the centre
+    delay: Floats  # (leg, term) as of `ArrayExpansion`, and the next two
+    phase: Floats
+    delay_variance: Floats
     gain: Floats  # (leg, probe)
     departure: Floats  # (leg, probe, xyz)
     error: Floats  # (leg,) s
 
     @staticmethod
-    def room(count: int, sensors: int, degrees: int) -> ApertureSamples:
+    def room(count: int, sensors: int, terms: int) -> ApertureSamples:
         """Room for so many, at so many probes, with so many terms."""
-        terms, phase, delay_std = np.zeros((3, count, degrees))
-        return ApertureSamples(
-            terms, phase, delay_std, np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count)
-        )
+        delay, phase, variance = np.zeros((3, count, terms))
+        gain, departure = np.ones((count, sensors)), np.zeros((count, sensors, 3))
+        return ApertureSamples(delay, phase, variance, gain, departure, np.zeros(count))
 
     def put(self, rows: Ints, samples: ApertureSamples) -> None:
         """Write some of them."""
@@ -63,11 +58,8 @@ def traced(legs: ReceivePaths, geometry: ReceiverGeometry) -> ApertureSamples:
     """Legs at the probes, each of them traced."""
     samples = ApertureSamples.room(len(legs.row), *geometry.probe.basis.shape)
     if geometry.propagation.straight(geometry.medium.profile):
-        departure, residual, gain = (
-            image(legs, geometry.probe, geometry.receiver.pose),
-            np.zeros(samples.gain.shape),
-            samples.gain,
-        )
+        departure = image(legs, geometry.probe.position, geometry.receiver.pose)
+        residual, gain = np.zeros(samples.gain.shape), samples.gain
         if not legs.bounces.any():
             return replace(samples, departure=departure)
     else:
@@ -75,24 +67,18 @@ def traced(legs: ReceivePaths, geometry: ReceiverGeometry) -> ApertureSamples:
     probe, rate = geometry.probe, 2.0 * np.pi * geometry.receiver.band[1]
     turned, loss, softer = _boundaries(legs, departure, geometry.medium, geometry.receiver.centre)
     turned, softer = (np.where(np.isnan(residual), np.nan, value) for value in (turned, softer))
-    terms, phase, delay_std = probe.fit(residual), probe.fit(turned), probe.fit(softer)
-    error = (
-        probe.misfit(residual, terms)
-        + probe.misfit(turned, phase) / rate
-        + probe.misfit(softer, delay_std) * 0.5 * rate
-    )
-    return ApertureSamples(terms, phase, delay_std, gain * loss, departure, error)
+    (delay, late), (phase, off), (variance, soft) = (probe.expand(value) for value in (residual, turned, softer))
+    return ApertureSamples(delay, phase, variance, gain * loss, departure, late + off / rate + soft * 0.5 * rate)
 
 
-def image(
-    legs: ReceivePaths, probe: Probes, sonar_pose: Pose, few: int | None = None, rows: Ints | None = None
-) -> Floats:
-    """Unit vectors (leg, probe, xyz) from each point to the image of each probe, or the first few, as far as the ray is
-    long; of all legs, or some rows of them."""
+def image(legs: ReceivePaths, position: Floats, sonar_pose: Pose, rows: Ints | None = None) -> Floats:
+    """Unit vectors (leg, place, xyz) from each point to the image of each place (place, xyz) m of the sonar frame, as
+    far as the ray is long; of all legs, or some rows of them."""
     chosen = slice(None) if rows is None else rows
     mirrored = (legs.surface[chosen] + legs.bottom[chosen]) % 2 == 1
-    offset = sonar_pose.turn_to_world(probe.position)[:few]
-    return np.asarray(to_images(legs.length[chosen], legs.departure[chosen], mirrored, offset))
+    return np.asarray(
+        to_images(legs.length[chosen], legs.departure[chosen], mirrored, sonar_pose.turn_to_world(position))
+    )
 
 
 def _boundaries(legs: ReceivePaths, departure: Floats, medium: Medium, centre: float) -> tuple[Floats, Floats, Floats]:

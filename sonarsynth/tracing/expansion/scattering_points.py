@@ -14,8 +14,8 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry import Pose
-from sonarsynth.products import Arrivals
-from sonarsynth.tracing.expansion.wavefront_polynomials import ExpansionTerms, probes
+from sonarsynth.products import ArrayExpansion, Arrivals
+from sonarsynth.tracing.expansion.probe_sensors import probes
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def shift_to_scattering_points(arrivals: Arrivals, legs: ReceivePaths, spot: Flo
     return replace(arrivals, direction=direction, radius=radius)
 
 
-def delay_to_scattering_points(over: ExpansionTerms, array: FacetPaths, leg: Ints, spot: Floats) -> ExpansionTerms:
+def delay_to_scattering_points(over: ArrayExpansion, array: FacetPaths, leg: Ints, spot: Floats) -> ArrayExpansion:
     """Wavefronts of paths by legs (path,) through water that bends them, with what points `spot` (path, xyz) m, world,
     are farther from each hydrophone, beside the array centre: by the directions in which rays leave, for points much
     nearer to the middle than to the array."""
@@ -45,4 +45,4 @@ def delay_to_scattering_points(over: ExpansionTerms, array: FacetPaths, leg: Int
     late = -dot(spot[rows, None], away) / speed[:, None]
     delay = over.delay.copy()
     delay[rows] += probes(array.context.receiver.elements).fit(late)
-    return over._replace(delay=delay)
+    return replace(over, delay=delay)

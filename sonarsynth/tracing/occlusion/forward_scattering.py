@@ -21,7 +21,7 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.scattering import Component, FacetLaw
 from sonarsynth.scattering.components import Shadow
 from sonarsynth.state import FrameContext
-from sonarsynth.tracing.expansion.array_expansion import expansion_source
+from sonarsynth.tracing.expansion.aperture_paths import expansion_source
 from sonarsynth.tracing.receive_paths import facets_of, rays_to_centre
 
 if TYPE_CHECKING:

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, depth
-from sonarsynth.equations.arrays.apertures import aperture_terms
-from sonarsynth.equations.scattering.lobes import dot
+from sonarsynth.products.array_expansion import aperture_terms
 from sonarsynth.state import Medium, Receiver
-from sonarsynth.tracing.expansion.probe_paths import ReceiverGeometry, rays_to_probes
-from sonarsynth.tracing.expansion.wavefront_polynomials import probes
+from sonarsynth.tracing.expansion.probe_paths import ReceiverGeometry, image, rays_to_probes
+from sonarsynth.tracing.expansion.probe_sensors import probes
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
@@ -37,24 +36,15 @@ def launch_deviation(
     geometry = ReceiverGeometry(medium, receiver, probes(receiver.elements), propagation)
     probe, offset = geometry.probe, receiver.pose.turn_to_world(geometry.probe.position)
     away, arc = _arcs(legs, receiver.pose.position, offset, medium)
-    image = towards(legs, offset)
+    straight = image(legs, geometry.probe.position, receiver.pose)
     traced = np.flatnonzero(~arc)
     if len(traced):
         residual, _, bent = rays_to_probes(legs.select(traced), geometry)
-        away[traced] = np.where(np.isnan(residual)[..., None], image[traced], bent)
-    away -= image
+        away[traced] = np.where(np.isnan(residual)[..., None], straight[traced], bent)
+    away -= straight
     basis = aperture_terms(points, probe.aperture)
     coefficients = np.einsum("tp,lpx->ltx", probe.solve, away[:, : probe.fitted], optimize=True)
     return np.asarray(np.matmul(basis, coefficients))
-
-
-def towards(legs: ReceivePaths, offset: Floats) -> Floats:
-    """Unit vectors (leg, point, xyz) from the starts of legs to the images of places beside the centre (point, xyz),
-    world."""
-    ahead = (legs.length[:, None] * legs.departure)[:, None] + offset
-    odd = np.asarray(legs.bounces % 2 == 1)
-    ahead[odd, :, 2] -= 2.0 * offset[:, 2]  # of the mirrored array
-    return np.asarray(ahead / np.maximum(np.sqrt(dot(ahead, ahead)), 1e-300)[..., None])
 
 
 def _arcs(legs: ReceivePaths, centre: Floats, offset: Floats, medium: Medium) -> tuple[Floats, Bools]:

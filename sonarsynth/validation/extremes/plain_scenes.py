@@ -59,8 +59,8 @@ def traced(
     receiver = Receiver(POSE, elements, replace(SONAR, band=Band(low=band[0], high=band[1])))
     context = FrameContext(0.0, tuple(bodies), tuple(snaps), Medium(WATER, PROFILE), receiver, tuple(laws))
     arrivals = trace(context, AutoTracing())
-    for name, value in vars(arrivals).items():
-        if isinstance(value, np.ndarray) and not np.isfinite(value).all():
+    for name, value in arrivals.columns.items():
+        if not np.isfinite(value).all():
             raise ArithmeticError(f"{name} of a path is not finite")
     return arrivals
 

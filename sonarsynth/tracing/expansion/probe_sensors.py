@@ -1,23 +1,24 @@
-"""The wavefront of a path over the aperture: a reference sphere and a polynomial for what it leaves."""
+"""Probe sensors of an array, and the matrices from values there to the terms of `ArrayExpansion`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.kernels.row_products import row_products
 from sonarsynth.products import Paths
+from sonarsynth.products.array_expansion import aperture_terms
 from sonarsynth.receiver import Elements
 
 HELD_OUT = 3
 """Probes that only measure the error of a fit; those that it is fitted to are as many and as three in ten more."""
 QUADRATIC_PROBES = 9
 """Probes, the first ones, that a polynomial of the second degree is fitted to and measured at."""
+TERMS = 20
+"""Terms over the aperture, up to the third degree."""
 SECOND_DEGREE = 10
 """Terms up to the second degree."""
 BRANCH = 0.05
@@ -48,10 +49,14 @@ class Probes:
             terms[i, 1:] = np.linalg.lstsq(self.basis[: self.fitted][finite, 1:], fitted[i, finite], rcond=1e-10)[0]
         return terms
 
-    def fit_few(self, values: Floats) -> tuple[Floats, Floats]:
-        """Coefficients (path, term) of the second degree through values (path, FEW), and misfit (path,) there."""
-        few = row_products(values[:, : self.solve_few.shape[1]], self.solve_few.T)
-        terms = np.concatenate([few, np.zeros((len(few), self.basis.shape[1] - few.shape[1]))], axis=1)
+    def expand(self, values: Floats) -> tuple[Floats, Floats]:
+        """Terms (path, term) of `ArrayExpansion` from values (path, probe), and how much (path,) they miss these by; of
+        the second degree from values at the first `QUADRATIC_PROBES` alone."""
+        if values.shape[1] == len(self.sensor):
+            terms = self.fit(values)
+        else:
+            few = row_products(values[:, : self.solve_few.shape[1]], self.solve_few.T)
+            terms = np.concatenate([few, np.zeros((len(few), self.basis.shape[1] - few.shape[1]))], axis=1)
         return terms, self.misfit(values, terms)
 
     def misfit(self, values: Floats, terms: Floats) -> Floats:
@@ -63,25 +68,6 @@ class Probes:
         basis = self.basis[: values.shape[1], : terms.shape[1]]
         error = np.abs(values - row_products(terms, basis.T)).max(axis=1, initial=0.0)
         return np.where(np.isnan(values).any(axis=1), np.inf, error)
-
-
-class ExpansionTerms(NamedTuple):
-    """How paths vary over the aperture: polynomials, without columns where there is nothing to say."""
-
-    delay: Floats  # (path, term) s: over the sphere's
-    phase: Floats  # (path, term) rad: of reflections, over that of the centre
-    delay_std: Floats  # (path, term) s2: squares of blurs, over that of the centre
-    error: Floats  # (path,) s: misfit of the wavefront at the probes, the held-out ones among them
-
-    @staticmethod
-    def none(count: int) -> ExpansionTerms:
-        """Of spheres, all alike."""
-        nothing = np.empty((count, 0))
-        return ExpansionTerms(nothing, nothing, nothing, np.zeros(count))
-
-    def select(self, rows: Bools | Ints) -> ExpansionTerms:
-        """The paths picked by a mask or by indices."""
-        return ExpansionTerms(*(value[rows] for value in self))
 
 
 @lru_cache(maxsize=1024)

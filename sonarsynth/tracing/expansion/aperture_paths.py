@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.kernels.row_products import row_products
+from sonarsynth.products import ArrayExpansion
+from sonarsynth.products.array_expansion import aperture_terms
 from sonarsynth.state import Medium, Receiver
 from sonarsynth.tracing.expansion.probe_paths import ApertureSamples, ReceiverGeometry, image, traced
-from sonarsynth.tracing.expansion.wavefront_polynomials import ExpansionTerms, probes
+from sonarsynth.tracing.expansion.probe_sensors import probes
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
@@ -38,10 +39,10 @@ SMOOTH_DIRECTION = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class ArrayExpansion:
-    """Legs over the aperture."""
+class AperturePaths:
+    """Legs over the aperture, and at its probes."""
 
-    terms: ExpansionTerms  # (leg,)
+    expansion: ArrayExpansion  # (leg,) but for amplitudes
     legs: ReceivePaths
     place: ReceiverGeometry
     probe_departure: Floats | None  # (leg, probe, xyz) world; None: towards the images of the probes
@@ -51,7 +52,7 @@ class ArrayExpansion:
         """Where each probe, or the first few, is seen from the points of some legs: (row, probe, xyz), world."""
         if self.probe_departure is not None:
             return self.probe_departure[:, :few][rows]
-        return image(self.legs, self.place.probe, self.place.receiver.pose, few, rows)
+        return image(self.legs, self.place.probe.position[:few], self.place.receiver.pose, rows)
 
     def gain(self, rows: Ints, few: int | None = None) -> Floats:
         """Amplitude at each probe, or the first few, over that of the sphere (row, probe); 1 in uniform water."""
@@ -71,12 +72,12 @@ class ExpansionSource:
     ]  # legs of each; None: made from images
     plain: bool  # uniform water, no reflections: all are spheres
 
-    def of(self, block: slice) -> ArrayExpansion:
+    def of(self, block: slice) -> AperturePaths:
         """The wavefronts of some legs."""
         legs = self.legs.select(block)
-        count = len(legs.row)
+        count, aperture = len(legs.row), self.place.probe.aperture
         if self.plain:
-            return ArrayExpansion(ExpansionTerms.none(count), legs, self.place, None, None)
+            return AperturePaths(ArrayExpansion.none(count, aperture), legs, self.place, None, None)
         samples = ApertureSamples.room(count, *self.place.probe.basis.shape)
         for members, model in self.families:
             first, last = np.searchsorted(members, (block.start, block.stop))
@@ -87,21 +88,17 @@ class ExpansionSource:
                 samples.put(rows, model.at(legs.point[rows]))
             else:
                 samples.put(rows, ApertureSamples(**{name: value[first:last] for name, value in vars(model).items()}))
-        none = np.empty((count, 0))
-        terms = (
-            none
-            if self.place.propagation.straight(self.place.medium.profile) and not samples.terms.any()
-            else samples.terms
-        )
-        phase, delay_std = (value if value.any() else none for value in (samples.phase, samples.delay_std))
-        return ArrayExpansion(
-            ExpansionTerms(terms, phase, delay_std, samples.error), legs, self.place, samples.departure, samples.gain
-        )
+        straight = self.place.propagation.straight(self.place.medium.profile)
+        alike = [name for name in ("phase", "delay_variance") if not getattr(samples, name).any()]
+        alike += ["delay"] if straight and not samples.delay.any() else []
+        columns = samples.delay, np.empty((count, 0)), samples.phase, samples.delay_variance, samples.error
+        over = ArrayExpansion(*columns, aperture).without(*alike)
+        return AperturePaths(over, legs, self.place, samples.departure, samples.gain)
 
 
-def array_expansion(
+def aperture_paths(
     legs: ReceivePaths, group: Ints, medium: Medium, receiver: Receiver, propagation: Propagation
-) -> ArrayExpansion:
+) -> AperturePaths:
     """Wavefronts of all legs, as `expansion_source`."""
     return expansion_source(legs, group, medium, receiver, propagation).of(slice(0, len(legs.row)))
 
@@ -164,9 +161,9 @@ class _FacetInterpolant:
     def at(self, point: Floats) -> ApertureSamples:
         """Legs from points (point, xyz), some of the family."""
         values = row_products(aperture_terms((point - self.middle) / self.half, 1.0), self.coefficients)
-        terms, phase, delay_std, gain, away = np.split(values, self.parts, axis=1)
+        delay, phase, variance, gain, away = np.split(values, self.parts, axis=1)
         towards = away.reshape(*gain.shape, 3)
-        return ApertureSamples(terms, phase, delay_std, gain, towards, np.full(len(point), self.error))
+        return ApertureSamples(delay, phase, variance, gain, towards, np.full(len(point), self.error))
 
 
 def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: float) -> _FacetInterpolant | None:
@@ -174,9 +171,9 @@ def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: floa
     rate (rad/s): of the upper edge of the band."""
     middle, half = 0.5 * (point.min(axis=0) + point.max(axis=0)), np.maximum(0.5 * np.ptp(point, axis=0), 1e-9)
     at = aperture_terms((sample - middle) / half, 1.0)
-    degrees, sensors = exact.terms.shape[1], exact.gain.shape[1]
+    degrees, sensors = exact.delay.shape[1], exact.gain.shape[1]
     towards = exact.departure.reshape(len(sample), -1)
-    values = np.concatenate([exact.terms, exact.phase, exact.delay_std, exact.gain, towards], axis=1)
+    values = np.concatenate([exact.delay, exact.phase, exact.delay_variance, exact.gain, towards], axis=1)
     splits = np.cumsum([degrees, degrees, degrees, sensors])
     if not np.isfinite(values).all():
         return None

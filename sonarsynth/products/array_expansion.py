@@ -1,0 +1,116 @@
+"""The array expansion: what paths have at every sensor of an array, beside what they have at its middle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Bools, Floats, Ints
+
+QUANTITIES = ("delay", "amplitude", "phase", "delay_variance")
+"""What varies over the aperture."""
+
+
+def aperture_terms(position: npt.ArrayLike, aperture: float, terms: int = 20) -> Floats:
+    """Polynomials over the aperture (..., term) at positions (..., xyz) in the sonar frame.
+
+    Coordinates are divided by `aperture` (m). The basis is the monomials of x, y, z, degree by degree: 1; x, y, z; xx,
+    xy, xz, yy, yz, zz; xxx, xxy, xxz, xyy, xyz, xzz, yyy, yyz, yzz, zzz; and so on. So many of them: 20 are those up to
+    the third degree, 56 up to the fifth. On a planar array those with x vanish.
+    """
+    axes = np.moveaxis(np.asarray(position, float) / aperture, -1, 0)
+    monomials = [np.ones_like(axes[0])]
+    degree = list(enumerate(axes))  # the last axis of each monomial, and its value
+    while len(monomials) < terms:
+        monomials += [value for _, value in degree]
+        degree = [(axis, value * axes[axis]) for last, value in degree for axis in range(last, 3)]
+    return np.stack(monomials[:terms], axis=-1)
+
+
+def _terms_at(position: Floats, aperture: float, terms: int) -> Floats:
+    """`aperture_terms` at positions (point, xyz) that are asked for in every frame: hydrophones, nodes between them."""
+    return _kept_terms(position.tobytes(), aperture, terms)
+
+
+@lru_cache(maxsize=256)
+def _kept_terms(position: bytes, aperture: float, terms: int) -> Floats:
+    polynomials = aperture_terms(np.frombuffer(position).reshape(-1, 3), aperture, terms)
+    polynomials.setflags(write=False)
+    return polynomials
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayExpansion:
+    """Paths over an aperture: polynomials through values at probe sensors, and one matrix from there to all sensors.
+
+    Terms belong to the polynomials b(q) of a place q in the sonar frame (`aperture_terms`), the first to 1; a
+    quantity of which all sensors have what the middle has, has none. About a path with a delay tau and an amplitude A
+    at the middle, from the direction d and R away:
+
+    delay           (path, term)  s    beside the sphere's: tau(q) = tau + (|R d - q| - R)/c + delay b(q)
+    amplitude       (path, term)  1    beside the sphere's: A(q) = A R/|R d - q| (1 + amplitude b(q))
+    phase           (path, term)  rad  phi(q) = phi + phase b(q)
+    delay_variance  (path, term)  s2   sigma(q)^2 = sigma^2 + delay_variance b(q)
+    """
+
+    delay: Floats
+    amplitude: Floats
+    phase: Floats
+    delay_variance: Floats
+    error: Floats  # (path,) s: all that it misses at the probes, those held out among them, as a delay
+    aperture: float  # m: scale of q
+
+    @staticmethod
+    def none(count: int, aperture: float = 0.0) -> ArrayExpansion:
+        """Of spheres, all alike."""
+        nothing = np.empty((count, 0))
+        return ArrayExpansion(nothing, nothing, nothing, nothing, np.zeros(count), aperture)
+
+    def __getitem__(self, rows: Bools | Ints | slice) -> ArrayExpansion:
+        """The paths picked by a mask, by indices or by a slice."""
+        columns: dict[str, Any] = {name: getattr(self, name)[rows] for name in (*QUANTITIES, "error")}
+        return ArrayExpansion(**columns, aperture=self.aperture)
+
+    def without(self, *names: str) -> ArrayExpansion:
+        """The same, but of some quantities all sensors have what the middle has."""
+        return replace(self, **{name: getattr(self, name)[:, :0] for name in names})
+
+    def over(self, name: str, points: Floats) -> Floats:
+        """A quantity at places (point, xyz) m: (path, point)."""
+        terms = getattr(self, name)
+        if not terms.shape[1]:
+            return np.zeros((len(terms), len(points)))
+        return np.asarray(terms @ _terms_at(points, self.aperture, terms.shape[1]).T)
+
+    def largest(self, name: str) -> Floats:
+        """Bound (path,) on the modulus of a quantity over the aperture."""
+        return np.asarray(np.abs(getattr(self, name)).sum(axis=1))
+
+    def gradient(self, points: Floats, *names: str) -> Floats:
+        """Gradient (xyz, point, term) in 1/m of as many polynomials as some quantities have, at places (point, xyz)."""
+        terms, step = max(getattr(self, name).shape[1] for name in names), 1e-4 * self.aperture
+        if not terms:
+            return np.zeros((3, 0, 0))
+        sides = [
+            [_terms_at(points + sign * axis, self.aperture, terms) for sign in (1, -1)] for axis in step * np.eye(3)
+        ]
+        return np.array([(ahead - behind) / (2.0 * step) for ahead, behind in sides])
+
+    @staticmethod
+    def join(parts: Sequence[ArrayExpansion]) -> ArrayExpansion:
+        """The paths of all parts over one aperture; terms that some of them lack are 0."""
+        columns = {name: stacked([getattr(part, name) for part in parts]) for name in (*QUANTITIES, "error")}
+        return ArrayExpansion(**columns, aperture=max(part.aperture for part in parts))
+
+
+def stacked(blocks: Sequence[Any]) -> Any:
+    """Rows of all blocks, one after the other; columns that some of them lack are 0."""
+    if blocks[0].ndim == 2:
+        width = max(block.shape[1] for block in blocks)
+        blocks = [b if b.shape[1] == width else np.zeros((len(b), width), b.dtype) for b in blocks]
+    return np.concatenate(blocks)
