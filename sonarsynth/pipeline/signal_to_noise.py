@@ -21,7 +21,7 @@ from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.pipeline.stored_values import Values, table
 from sonarsynth.pipeline.synthesis import array_signals, known_elements, true_elements
 from sonarsynth.planning import Plan
-from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE, sound_parts
+from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE
 from sonarsynth.products import Arrivals, EnergyImage, Kind, Signals, Snapshots, Truth
 from sonarsynth.recipe.scene import Frame
 
@@ -38,7 +38,7 @@ class SoundParts:
     """What each part of the sound of a frame adds, kept while it is made: told by `synthesise`."""
 
     def __init__(self, plan: Plan) -> None:
-        self.names = sound_parts(plan.scene)
+        self.names = plan.scene.sound_parts
         self.signals: Signals | None = None  # the last that was told: when samples are
         self.pressure: dict[str, Part] = {}
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from sonarsynth.description.method import FrameSize
 from sonarsynth.planning.choices import OF_BEAMS
-from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE, noise_rows, sound_parts
+from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE, noise_rows
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.reverberation_rows import reverberation_rows
@@ -201,7 +201,7 @@ def _trace_rows(plan: Plan, size: FrameSize) -> list[Row]:
 def _signal_rows(plan: Plan, size: FrameSize) -> list[Row]:
     """Signals, where any product needs them, and paths measured in signals of their own."""
     rows = [_synthesis(plan, size), *reverberation_rows(plan), *noise_rows(plan, size)] if plan.products else []
-    if plan.products and (parts := sound_parts(plan.scene)):
+    if plan.products and (parts := plan.scene.sound_parts):
         rows.append(_signal_to_noise(plan, size, len(parts)))
     if "signals" in plan.products:
         seconds = max(size.emissions, 1) * (plan.sizes["target"] + 1) * SECONDS["measure path"]

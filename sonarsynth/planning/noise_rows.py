@@ -13,7 +13,6 @@ from sonarsynth.environment.noise import Noise
 from sonarsynth.environment.noise.noise_field import SECONDS as DRAW_SECONDS
 from sonarsynth.geometry.motion import pose
 from sonarsynth.receiver import SensorErrors
-from sonarsynth.recipe.scene import Scene
 from sonarsynth.signals.noise.drawing import coherence_error, seconds
 from sonarsynth.sources.noise_source import NoiseRecording
 
@@ -31,18 +30,6 @@ ERROR_SECONDS = 40e-9
 """Of one core to filter a sample of one channel."""
 NoiseRow = tuple[str, str, str, str, float, int]
 """As `costs.Row`."""
-
-
-def sound_parts(scene: Scene) -> tuple[str, ...]:
-    """What echoes of a scene are heard against."""
-    world = scene.world
-    present = {
-        "chorus": world.chorus is not None,
-        "reverberation": world.reverberation is not None or bool(world.scatterers),
-        "noise": bool(world.environment.noises or world.noise_sources),
-        "electronics": scene.sonar.electronics is not None,
-    }
-    return tuple(name for name, is_present in present.items() if is_present)
 
 
 def part_names(noises: tuple[Noise, ...]) -> tuple[str, ...]:

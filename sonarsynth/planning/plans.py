@@ -20,7 +20,6 @@ from sonarsynth.planning.measured.chorus_reach import band_frequencies, chorus_r
 from sonarsynth.planning.measured.distant_chorus import DistantChorus, distant_chorus
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.measured.thinned_profile import thinned
-from sonarsynth.planning.noise_rows import sound_parts
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
 from sonarsynth.planning.plan_tables import Omission, Stage, as_html, as_text
 from sonarsynth.propagation import Propagation
@@ -200,7 +199,7 @@ class Plan:
         lines.append(", ".join(counted(count, name) for name, count in self.sizes.items()))
         if self.odds:
             lines.append(f"in frames that were tried: {self.odds}")
-        elif "image" in self.products and sound_parts(self.scene):
+        elif "image" in self.products and self.scene.sound_parts:
             lines.append("odds of finding targets: schedule.predict(plan).tried(plan) makes some frames and says them")
         return self.recipe.title, self.stages, self.left_out, lines
 

@@ -207,6 +207,18 @@ class Scene:
         """What each target is traced with: kept by content, so that asking again costs nothing."""
         return tuple(self.mesh_of(i) for i in range(len(self.world.targets)))
 
+    @property
+    def sound_parts(self) -> tuple[str, ...]:
+        """What echoes are heard against."""
+        world = self.world
+        present = {
+            "chorus": world.chorus is not None,
+            "reverberation": world.reverberation is not None or bool(world.scatterers),
+            "noise": bool(world.environment.noises or world.noise_sources),
+            "electronics": self.sonar.electronics is not None,
+        }
+        return tuple(name for name, is_present in present.items() if is_present)
+
     def mesh_of(self, target: int) -> Mesh:
         """What a target is traced with. Raises ValueError, or OSError, where it has no mesh."""
         return self.world.targets[target].mesh(self.laws[target], self.sonar.shortest_wavelength)

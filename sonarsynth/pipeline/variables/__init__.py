@@ -15,7 +15,6 @@ from sonarsynth.pipeline.variables.truth_variables import HOW_LEVELS_ADD_UP
 from sonarsynth.pipeline.variables.variable import Variable, flags
 from sonarsynth.pipeline.variables.variable_groups import VARIABLES
 from sonarsynth.planning import OF_BEAMS, Plan
-from sonarsynth.planning.noise_rows import sound_parts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,7 +41,7 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
         wanted.add("sensors")
     if plan.scene.world.chorus is not None:
         wanted |= {"chorus"} | ({"chorus and levels"} if plan.products else set())
-    if plan.products and (parts := sound_parts(plan.scene)):
+    if plan.products and (parts := plan.scene.sound_parts):
         wanted |= {"snr", *(f"snr {name}" for name in parts)}
     chosen = [v for v in VARIABLES if v.product in wanted]
     if not plan.windows.direct_removed:
