@@ -28,8 +28,10 @@ from sonarsynth.signals.pulse_sums.pulse_modes import FRACTIONS, PulseModes, sha
 from sonarsynth.signals.segments import fast_length
 from sonarsynth.sources.pulse_model import PulseModel
 
-SHORT, LONGEST = 0.3e-3, 1e-3
-"""s: of a snap behind the gentle filter; and of one that keeps its low frequencies."""
+SHORT, LONGEST = 0.3e-3, 4e-3
+"""s: of a snap behind the gentle filter; and of one that keeps frequencies under `SLOW` (1.1 to 2.1 ms were met)."""
+SLOW = 15e3
+"""Hz."""
 
 
 @lru_cache(maxsize=32)
@@ -109,7 +111,7 @@ def _check_length(modes: PulseModes, longest: float, rate: float) -> None:
 def spare_time(elements: Elements, sonar: Sonar, sound_speed: float) -> float:
     """Time (s) before and after a window in which a path may reach the centre of the array and still be heard."""
     chosen = fir(sonar.antialias)
-    pulse = SHORT if chosen.low > 0.0 else LONGEST
+    pulse = SHORT if chosen.low >= SLOW else LONGEST
     return elements.aperture / sound_speed + 0.5 * filters.duration(chosen) + pulse
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.receiver import Filter, Sonar, stop_frequency
@@ -22,7 +24,7 @@ def gentle(chosen: Filter, rate: float) -> Fir:
     """A filter that passes what the sonar's does, and stops what would fold into that on a grid of that rate (Hz)."""
     own = fir(chosen)
     low, stop = max(own.low - own.transition, 0.0), stop_frequency(chosen)
-    width = min(rate - 2.0 * stop, *([2.0 * low] if low else []))
+    width = min(rate - 2.0 * stop, 1.05 * low or np.inf)
     return Fir(max(low - 0.5 * width, 0.0), stop + 0.5 * width, width, GENTLE)
 
 
