@@ -92,7 +92,7 @@ def read_grid_text(data: bytes) -> Surface:
 
 
 def read_bathymetry(data: bytes) -> Surface:
-    """A `.bty` of Bellhop, ranges in km and depths in m: along x, and alike across it for half as far to either side; or
+    """A `.bty` of Bellhop, ranges in km and depths in m: along x, and alike across for half as far to either side, or
     over a grid of x and y, of Bellhop3D. Between its points it is flat, whatever the file says. Raises MeshError.
     """
     lines = [line.decode("utf-8", "replace") for line in lines_of(data)]
