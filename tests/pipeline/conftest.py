@@ -12,25 +12,13 @@ from sonarsynth.pipeline import Values
 from sonarsynth.planning import Plan, plan
 from sonarsynth.recipe import Recipe, reading
 from sonarsynth.store import layout_of
+from tools.fault_injection.corrupt import RECIPE
 
-SMALL = """\
-title: small
-seed: 3
-scene:
-  world:
-    environment: {depth: 12 m, sound_speed: {kind: isovelocity, speed: 1540}, noise: {kind: flat, level: 40 dB}}
-    targets:
-      - name: box
-        shape: {kind: box, size: [1, 1, 1], edge: 0.25}
-        motion: {kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}
-    sources:
-      - position: [12, 8]
-        kind: snapping_shrimp
-  sonar:
-    array: {kind: planar_lattice, columns: 5, rows: 4, pitch: 5 cm}
-    beams: {azimuths: 11, elevations: 9, azimuth_span: 30 deg, elevation_span: 30 deg}
-  trajectory: {frames: 20, interval: 0.1}
-"""
+SMALL = (
+    RECIPE.replace("edge: 0.5", "edge: 0.25")
+    .replace("columns: 4, rows: 3", "columns: 5, rows: 4")
+    .replace("azimuths: 5, elevations: 3", "azimuths: 11, elevations: 9")
+)
 
 
 @pytest.fixture(scope="session")

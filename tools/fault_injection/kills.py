@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from fault_injection.cluster import Cluster
+from fault_injection.corrupt import RECIPE as SMALL
 from fault_injection.processes import LONGEST, end_hung, ended, fork, kill_worker, strike, wait
 from sonarsynth import planning, schedule, store
 from sonarsynth.recipe import reading
@@ -30,24 +31,12 @@ from sonarsynth.store.files.place import record
 from sonarsynth.store.marks import ABSENT, all_files, load_mark, marked
 from sonarsynth.store.provenance import PROVENANCE
 
-RECIPE = """\
-title: tiny
-seed: 3
-scene:
-  world:
-    environment: {depth: 12 m, sound_speed: {kind: isovelocity, speed: 1540}, noise: {kind: flat, level: 40 dB}}
-    targets:
-      - name: box
-        shape: {kind: box, size: [1, 1, 1], edge: 1.0}
-        motion: {kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}
-    sources:
-      - position: [12, 8]
-        kind: snapping_shrimp
-  sonar:
-    array: {kind: planar_lattice, columns: 3, rows: 2, pitch: 5 cm}
-    beams: {azimuths: 5, elevations: 3, azimuth_span: 30 deg, elevation_span: 30 deg}
-  trajectory: {frames: 40, interval: 0.02}
-"""
+RECIPE = (
+    SMALL.replace("title: small", "title: tiny")
+    .replace("edge: 0.5", "edge: 1.0")
+    .replace("columns: 4, rows: 3", "columns: 3, rows: 2")
+    .replace("frames: 20, interval: 0.1", "frames: 40, interval: 0.02")
+)
 
 POINTS = ("random time", "lock", "laying out", "laid out", "first file of a shard", "mark", "files")
 VICTIMS = ("client", "worker", "client", "group", "client", "scheduler", "client", "client of workers")

@@ -20,22 +20,6 @@ MODEL = LogarithmicBubble()
 BUBBLE = snap_pressure.Bubble(MODEL.a, MODEL.k, MODEL.m, MODEL.q, MODEL.density)
 TAU = 1.0 / abs(BUBBLE.q)
 
-WALL: Final = np.array(
-    [
-        [-1e-3, 3.52237389815e-4, 2.45465275512, 12757.8888076, 5.82757238674],
-        [-6.172539e-4, 2.15816862664e-3, 5.75148805193, -5826.65160123, 115.644026228],
-        [-5e-4, 2.76465467209e-3, 4.37185412275, -17079.3116843, -24.86027771],
-        [-3e-4, 3.22159373731e-3, -0.0726494674525, -25652.3809623, -266.203492664],
-        [-1e-4, 2.56902250565e-3, -8.10965448584, -89814.9063812, -254.856085993],
-        [-3e-5, 1.59819751731e-3, -25.3905600289, -706006.202619, 257.347704633],
-        [-1e-5, 8.60483598328e-4, -56.3076805892, -3391937.59041, 2944.92175469],
-        [-3.1e-6, 3.58614020993e-4, -96.1760084114, -9845072.00622, 5368.1177839],
-        [-1e-6, 1.31231474904e-4, -122.490681213, -15949602.2535, 3663.30616824],
-        [-1e-7, 1.39779179399e-5, -138.746338251, -20453915.5656, 534.168784329],
-        [0.0, 0.0, -140.822279346, -21069470.5597, 0.0],
-    ]
-)
-"""(time, 5): time (s), R (m), R' (m/s), R'' (m/s2), pressure (Pa at 1 m), of a density of 1000 kg/m3."""
 SPECTRUM: Final = {2: -3.91, 5: -5.00, 10: -6.36, 20: -9.16, 25: -10.43, 50: -15.71, 85: -21.22, 100: -23.15} | {
     150: -28.50,
     200: -32.67,
@@ -71,12 +55,8 @@ def _computed(t: Floats) -> Floats:
 
 
 def _wall_rows(quick: bool) -> Iterator[Row]:
-    cost = _timed(lambda: _computed(WALL[:, 0]), len(WALL))
-    tabulated = WALL[:, 1:].T
-    miss = np.abs(_computed(WALL[:, 0]) - tabulated) / np.where(tabulated == 0.0, 1.0, np.abs(tabulated))
-    for name, error in zip(("radius", "speed", "acceleration", "pressure"), miss, strict=True):
-        yield _row(TABLE, name, "1", 1e-10, error.max(), cost, len(WALL))
     times = -np.geomspace(1e-9, 2e-3, 6 if quick else 40)
+    cost = _timed(lambda: _computed(times), len(times))
     exact = np.array([_many_digits(float(t)) for t in times]).T
     miss = np.abs(_computed(times) - exact) / np.abs(_scale(exact))
     for name, error in zip(("radius", "speed", "acceleration", "pressure"), miss, strict=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -128,29 +128,11 @@ def layered(quick: bool) -> Iterator[Case]:
     yield drawn("noisy cast", cast, 10.0, 1e3, many // 2, 3, reflections=2, bounds=LOOSE, check=few // 4)
 
 
-@dataclass(frozen=True, eq=False)
-class Approach:
-    """A smooth sound speed and the layers that stand for it, to falling tolerances (s) at each turning point."""
-
-    name: str
-    start: float  # m
-    ends: Floats  # (pair,) m
-    distance: float  # m
-    vertices: int
-    layers: Callable[[float], tuple[Floats, Floats]]
-    tolerances: tuple[float, ...]
-
-    def case(self, tolerance: float) -> Case:
-        """The case of one tolerance."""
-        count = len(self.ends)
-        same = np.full(count, self.start), self.ends, np.full(count, self.distance)
-        return Case(f"Munk, layers to {tolerance:g} s", *self.layers(tolerance), *same, self.vertices, 0)
+MUNK = "Munk, over the layers' tolerance"
+MUNK_START, MUNK_ENDS, MUNK_VERTICES = 1000.0, np.array([310.0, 800.0, 1310.0, 2000.0]), 12  # m, m
 
 
-def munk_approach(quick: bool) -> Approach:
-    """The canonical profile, joined over 50 or 100 km."""
-    ends = np.array([310.0, 800.0, 1310.0, 2000.0])
-    tolerances = (1e-4, 1e-5) if quick else (1e-4, 1e-5, 1e-6)
-    return Approach(
-        "Munk, over the layers' tolerance", 1000.0, ends, 5e4 if quick else 1e5, 12, munk_layers, tolerances
-    )
+def munk_case(tolerance: float, distance: float) -> Case:
+    """The canonical profile in layers to a tolerance (s) at each turning point, joined over a distance (m)."""
+    same = np.full(len(MUNK_ENDS), MUNK_START), MUNK_ENDS, np.full(len(MUNK_ENDS), distance)
+    return Case(f"Munk, layers to {tolerance:g} s", *munk_layers(tolerance), *same, MUNK_VERTICES, 0)
