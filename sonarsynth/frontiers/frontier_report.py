@@ -39,6 +39,11 @@ def write(measured: AccuracyReport, out: Path, name: str = "recipe") -> list[Pat
     return files
 
 
+def _name(point: Point) -> str:
+    """Of its line: a knob, whose settings are joined; of images other than ours, each stands by itself."""
+    return f"{point.knob}: {point.setting}" if point.role == "peer" and point.stage == "image" else point.knob
+
+
 def _panel(stage: str, points: Sequence[Point]) -> Panel | None:
     """The panel of a stage; None where it was not walked."""
     of_stage = [p for p in points if p.stage == stage and p.role != "check" and isfinite(p.error)]
@@ -48,9 +53,9 @@ def _panel(stage: str, points: Sequence[Point]) -> Panel | None:
     lines = []
     for role in ("point", "peer"):
         of_role = [p for p in of_stage if p.role == role]
-        for knob in dict.fromkeys(p.knob for p in of_role if p.knob != "chosen"):
-            line = [p for p in of_role if p.knob == knob]
+        for name in dict.fromkeys(_name(p) for p in of_role if p.knob != "chosen"):
+            line = [p for p in of_role if _name(p) == name]
             if role == "point" and not any(p.chosen for p in line) and len(line) > 1 and stage != "synthesis":
                 line = [*line, chosen]
-            lines.append(Line(knob, tuple(1e3 * p.seconds for p in line), tuple(p.error for p in line), role == "peer"))
+            lines.append(Line(name, tuple(1e3 * p.seconds for p in line), tuple(p.error for p in line), role == "peer"))
     return Panel(TITLES[stage], chosen.unit, chosen.allowed, tuple(lines), (1e3 * chosen.seconds, chosen.error))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,15 +26,6 @@ LOBED = 20.0
 LOBE_POINTS = 24
 """Frequencies of the band at which a grating lobe is drawn."""
 POINTS = ("x", "y", "z", "azimuth", "elevation", "energy", "delay", "target")
-READ = (
-    *("time", "image/energy", "truth/sonar_position", "truth/sonar_orientation", "truth/emissions/position"),
-    *(f"truth/beams/{name}" for name in ("target", "range")),
-    *(f"truth/targets/{name}" for name in ("target", "group", "position", "orientation", "scale", "mesh", "family")),
-    *(f"truth/targets/echo_{name}" for name in ("level", "azimuth", "elevation")),
-    *(f"cloud/{name}" for name in POINTS),
-    *("signals/position", "truth/beams/azimuth", "truth/beams/elevation"),
-)
-"""Variables that frames are drawn from, beside the meshes."""
 FAINTEST = 40.0
 """Ghosts this many dB under the direct echo of their target are not drawn."""
 
@@ -64,51 +55,23 @@ def pictures_of(store: str | Folder, name: str = "") -> Path:
     return path.with_name(f"{name or path.name}.pictures")
 
 
-@dataclass(frozen=True, eq=False)
-class FrameVariables:
-    """Variables of some frames of a store, read at once: each by itself takes xarray a millisecond."""
-
-    attrs: Mapping[Any, Any]
-    values: Mapping[str, np.ndarray]
-    by_frame: frozenset[str]  # those with an axis of frames, the first
-
-
-Source: TypeAlias = "xr.DataTree | FrameVariables"
-"""What frames are read from; frames of what is held are counted from 0."""
-
-
-def held(tree: xr.DataTree, frames: Sequence[int]) -> FrameVariables:
-    """What pictures need of some frames."""
-    values, by_frame = {}, []
-    meshes = [f"{g.path.strip('/')}/{n}" for g in tree.subtree if g.path[:9] == "/targets/" for n in g.dataset]
-    for name in (*READ, *meshes):
-        data = _variable(tree, name)
-        if data is not None:
-            values[name] = np.asarray((data.isel(frame=list(frames)) if "frame" in data.dims else data).values)
-            by_frame += [name] if "frame" in data.dims else []
-    return FrameVariables(tree.attrs, values, frozenset(by_frame))
-
-
 def _variable(tree: xr.DataTree, name: str) -> xr.Variable | None:
     group, _, variable = name.rpartition("/")
     try:
-        return (tree[group] if group else tree).dataset.variables[variable]
+        return (tree[group] if group else tree).variables[variable]
     except KeyError:
         return None
 
 
-def read(source: Source, name: str, frame: int | None = None) -> np.ndarray | None:
+def read(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray | None:
     """A variable ("image/energy"), of one frame or whole; None where the store does not hold it."""
-    if isinstance(source, FrameVariables):
-        values = source.values.get(name)
-        return values[frame] if values is not None and frame is not None and name in source.by_frame else values
-    data = _variable(source, name)
+    data = _variable(tree, name)
     if data is None:
         return None
     return np.asarray((data if frame is None or "frame" not in data.dims else data.isel(frame=frame)).values)
 
 
-def needed(tree: Source, name: str, frame: int | None = None) -> np.ndarray:
+def needed(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray:
     """As `read`, for what pictures cannot do without. Raises NothingToDraw."""
     if (values := read(tree, name, frame)) is None:
         raise NothingToDraw(f"the store has no variable {name}")
@@ -150,16 +113,15 @@ class StoredFrame:
 
 def every_stored(tree: xr.DataTree, frames: Sequence[int]) -> list[StoredFrame]:
     """Some frames as stored. A frame that was not built comes back full of NaN."""
-    source = held(tree, frames)
     labelled = points(tree, frames) if has_labels(tree) else None
     stored_frames = []
-    for row, index in enumerate(frames):
+    for index in frames:
         cloud: dict[str, Floats] = dict.fromkeys((*POINTS, "range_error"), np.zeros(0))
         if labelled is not None:
             own = labelled.frame == index
-            cloud = {name: needed(source, f"cloud/{name}", row)[labelled.row[own]].astype(float) for name in POINTS}
+            cloud = {name: needed(tree, f"cloud/{name}", index)[labelled.row[own]].astype(float) for name in POINTS}
             cloud["range_error"] = np.where(labelled.judged[own], labelled.error[own], np.nan)
-        stored_frames.append(_stored(source, row, index, cloud))
+        stored_frames.append(_stored(tree, index, cloud))
     return stored_frames
 
 
@@ -168,10 +130,10 @@ def stored(tree: xr.DataTree, index: int) -> StoredFrame:
     return every_stored(tree, [index])[0]
 
 
-def _stored(tree: FrameVariables, row: int, index: int, cloud: Mapping[str, Floats]) -> StoredFrame:
-    energy = read(tree, "image/energy", row)
-    pose = _sonar(tree, row)
-    time = read(tree, "time", row)
+def _stored(tree: xr.DataTree, index: int, cloud: Mapping[str, Floats]) -> StoredFrame:
+    energy = read(tree, "image/energy", index)
+    pose = _sonar(tree, index)
+    time = read(tree, "time", index)
     return StoredFrame(
         index=index,
         time=float("nan") if time is None else float(time),
@@ -183,21 +145,21 @@ def _stored(tree: FrameVariables, row: int, index: int, cloud: Mapping[str, Floa
         point_direction=np.stack([cloud["azimuth"], cloud["elevation"]], axis=-1),
         point_delay=cloud["delay"],
         point_target=cloud["target"].astype(int),
-        target=needed(tree, "truth/beams/target", row),
-        true_range=needed(tree, "truth/beams/range", row).astype(float),
-        snap=pose.to_body(needed(tree, "truth/emissions/position", row)),
-        poses=_poses(tree, row),
-        hulls=hulls(tree, row),
-        ghosts=ghosts(tree, row),
-        lobes=lobes(tree, row),
+        target=needed(tree, "truth/beams/target", index),
+        true_range=needed(tree, "truth/beams/range", index).astype(float),
+        snap=pose.to_body(needed(tree, "truth/emissions/position", index)),
+        poses=_poses(tree, index),
+        hulls=hulls(tree, index),
+        ghosts=ghosts(tree, index),
+        lobes=lobes(tree, index),
     )
 
 
-def _sonar(tree: Source, index: int) -> Pose:
+def _sonar(tree: xr.DataTree, index: int) -> Pose:
     return Pose(needed(tree, "truth/sonar_position", index), needed(tree, "truth/sonar_orientation", index))
 
 
-def _poses(tree: Source, index: int) -> tuple[Pose, ...]:
+def _poses(tree: xr.DataTree, index: int) -> tuple[Pose, ...]:
     """The poses of the targets; none in a store without."""
     position, orientation = (read(tree, f"truth/targets/{name}", index) for name in ("position", "orientation"))
     if position is None or orientation is None:
@@ -205,7 +167,7 @@ def _poses(tree: Source, index: int) -> tuple[Pose, ...]:
     return tuple(Pose(*pose) for pose in zip(position, orientation, strict=True))
 
 
-def echo_levels(tree: Source, frame: int) -> tuple[Floats, list[str]] | None:
+def echo_levels(tree: xr.DataTree, frame: int) -> tuple[Floats, list[str]] | None:
     """Levels (target, family) in dB re the direct echo of each target, and the families; None where none are stored.
 
     A target without a direct echo: re its strongest.
@@ -219,7 +181,7 @@ def echo_levels(tree: Source, frame: int) -> tuple[Floats, list[str]] | None:
     return level - np.where(np.isfinite(direct), direct, strongest)[:, None], names
 
 
-def ghosts(tree: Source, frame: int) -> tuple[Ghost, ...]:
+def ghosts(tree: xr.DataTree, frame: int) -> tuple[Ghost, ...]:
     """Ghosts of all targets that are less than `FAINTEST` under the direct echo; none in a store without echoes."""
     levels = echo_levels(tree, frame)
     azimuth, elevation = (read(tree, f"truth/targets/echo_{name}", frame) for name in ("azimuth", "elevation"))
@@ -236,7 +198,7 @@ def ghosts(tree: Source, frame: int) -> tuple[Ghost, ...]:
     return tuple(drawn)
 
 
-def lobes(tree: Source, frame: int) -> tuple[Floats, ...]:
+def lobes(tree: xr.DataTree, frame: int) -> tuple[Floats, ...]:
     """Lines (frequency, azimuth and elevation) in deg along which the image has grating lobes of the loudest echoes.
 
     None in a store without echoes, or of an array that is no lattice.
@@ -274,13 +236,13 @@ def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: in
     return bool((near[once] <= near[family]).any())
 
 
-def mesh_group(tree: Source, target: int, index: int) -> str:
+def mesh_group(tree: xr.DataTree, target: int, index: int) -> str:
     """Where the mesh is that a target has in a frame: its group, or one of those in it where there are several."""
     group, which = (needed(tree, f"truth/targets/{n}", i)[target] for n, i in (("group", None), ("mesh", index)))
     return f"targets/{group}" if read(tree, f"targets/{group}/0/faces") is None else f"targets/{group}/{int(which)}"
 
 
-def hulls(tree: Source, index: int) -> tuple[Hull, ...]:
+def hulls(tree: xr.DataTree, index: int) -> tuple[Hull, ...]:
     """The targets of a frame where they truly are; none of a frame that was not built."""
     sonar = _sonar(tree, index)
     names = read(tree, "truth/targets/target")

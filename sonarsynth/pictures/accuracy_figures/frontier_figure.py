@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHAPES = ("o", "s", "^", "D", "v", "P", "<", ">")
-PEERS = ("X", "*", "p", "h")
+PEERS = ("X", "*", "p", "P", "d", "^", "v", "s")
 DECADES = 1.5
 """Errors of 0 are drawn so many decades below the smallest other one."""
 CHOSEN = "#D55E00"
