@@ -142,7 +142,8 @@ def _section(rays: Mapping[str, Any], geometry: SceneGeometry) -> Iterator[Any]:
         for line in union_outline(geometry.on_plane(hull.vertices), hull.faces):
             shade = {"fill": "toself", "fillcolor": GREY, "mode": "lines", "line_color": INK, "line_width": 1}
             yield go.Scatter(x=line[:, 0], y=line[:, 1], name=escape(hull.name), **shade, **quiet)
-    places = geometry.places | {escape(h.name): h.vertices[h.vertices[:, 2].argmax()] for h in geometry.hulls}
+    tops = {escape(hull.name): hull.vertices[hull.vertices[:, 2].argmax()] for hull in geometry.hulls}
+    places = {**geometry.places, **tops}
     x, y = geometry.on_plane(np.array(list(places.values()))).T
     words = {"text": list(places), "mode": "markers+text", "textposition": "top center", "cliponaxis": False}
     yield go.Scatter(x=x, y=y, marker_color=INK, name="", zorder=1, **words, **quiet)
