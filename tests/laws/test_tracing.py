@@ -129,6 +129,14 @@ def test_legs_of_the_array_side_serve_a_moved_shrimp(profile: Profile) -> None:
             np.testing.assert_array_equal(again.columns[name], value, err_msg=name)
 
 
+@pytest.mark.parametrize("time", [-50.0, 1e4])
+def test_whatever_the_clock_says_when_the_snap_sounds_changes_nothing_but_delays(time: float) -> None:
+    now, then = run(profile=LAYERED).columns, run(profile=LAYERED, snaps=(snap((3.0, 6.0, -30.0), time),)).columns
+    np.testing.assert_allclose(then.pop("delay") - time, now.pop("delay"), rtol=0, atol=1e-11)
+    for name, value in now.items():
+        np.testing.assert_array_equal(then[name], value, err_msg=name)
+
+
 def test_moving_everything_together_changes_nothing() -> None:
     turn = Pose(np.array([120.0, -70.0, 0.0]), quaternion(1.1))  # heading about the vertical only
     here = run()
