@@ -243,12 +243,9 @@ def measure(
     lag = slope / np.where(weight > 0, weight, np.inf)
     live = elements.gain != 0
     dof = max(2 * (np.sum(live) - 1) * len(omega) - np.sum(live), 1)
-    noise = float(np.sum(residuals[live]))
-    explained = float(wave.power @ np.abs(wave.template) ** 2)
+    noise, explained = float(np.sum(residuals[live])), float(wave.power @ np.abs(wave.template) ** 2)
     share = noise / (explained + noise) if explained + noise > 0 else 1.0
-    if (
-        share > ranging_kernels.UNLIKE
-    ):  # gains of sensors are no noise; of another wave they take what is in phase, half
+    if share > ranging_kernels.UNLIKE:  # gains are no noise; of another wave they take what is in phase, half of it
         noise, power = ranging_kernels.beyond_gains(wave.spectrum[live], wave.response[live], wave.template)
         share, dof = min(share, 2.0 * noise / power) if power > 0.0 else share, max(dof - np.sum(live), 1)
     return Pulse(aligned.frequency, wave.template, time, lag, weight, 2 * noise / dof, wave.power, share, None, deaf)
