@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.surfaces import sides, weld
+from sonarsynth.geometry.surfaces import shared_sides, weld
 
 CREASE: Final = 1.0
 """|n1 - n2| of the normals of two facets from which on their edge is one of the body itself: 60 degrees."""
@@ -32,12 +32,8 @@ class Neighbours(NamedTuple):
 def neighbours(mesh: Mesh) -> Neighbours:
     """Facets that share an edge; vertices in the same place are one."""
     _, faces = weld((mesh.vertices, mesh.faces.astype(np.int64)))
-    edge = sides(faces)[1].ravel()
-    order = np.argsort(edge, kind="stable")
-    first, count = np.unique(edge[order], return_index=True, return_counts=True)[1:]
-    shared = first[count == 2]
-    edge_start, neighbour = order[shared], order[shared + 1] // 3
-    facet, corner = edge_start // 3, edge_start % 3
+    edge_start, beyond = shared_sides(faces)
+    facet, neighbour, corner = edge_start // 3, beyond // 3, edge_start % 3
     turn = np.linalg.norm(mesh.normal[facet] - mesh.normal[neighbour], axis=1)
     start, stop = (mesh.vertices[mesh.faces[facet, n]] for n in (corner, (corner + 1) % 3))
     return Neighbours(facet, neighbour, start, stop, turn)

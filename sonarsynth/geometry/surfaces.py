@@ -164,6 +164,15 @@ def sides(faces: Ints) -> tuple[Ints, npt.NDArray[np.intp]]:
     return pairs[first], edge.reshape(-1, 3)
 
 
+def shared_sides(faces: Ints) -> tuple[Ints, Ints]:
+    """Sides (pair,) and (pair,), 3 facet + corner, of two facets that share an edge with no third."""
+    edge = sides(faces)[1].ravel()
+    order = np.argsort(edge, kind="stable")
+    first = np.flatnonzero(np.diff(edge[order], prepend=-1))
+    pair = first[np.diff(np.append(first, len(edge))) == 2]
+    return order[pair], order[pair + 1]
+
+
 def cut(vertices: Floats, faces: Ints, middle: Ints) -> Ints:
     """Facets cut at the middles (facet, 3) of their sides, -1 where a side is whole; in the order of the facets."""
     cuts = np.count_nonzero(middle >= 0, axis=1)

@@ -26,7 +26,8 @@ from sonarsynth.recipe.reading.json_schema import schema, schema_text
 from sonarsynth.recipe.reading.messages import explain
 from sonarsynth.recipe.reading.model_tables import with_models
 from sonarsynth.recipe.reading.old_keys import new_setting, with_new_keys
-from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, Where, override, read_file, read_text
+from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, override, read_file, read_text
+from sonarsynth.recipe.variation.values import Where
 
 __all__ = [
     "RecipeError",

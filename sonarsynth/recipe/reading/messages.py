@@ -10,7 +10,8 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, Where, dotted
+from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, dotted
+from sonarsynth.recipe.variation.values import Where
 from sonarsynth.targets.target import NAME
 
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from sonarsynth.recipe.reading.yaml_source import Source, Where, dotted
+from sonarsynth.recipe.reading.yaml_source import Source, dotted
 from sonarsynth.recipe.renamed_keys import RENAMED, new_path
+from sonarsynth.recipe.variation.values import Where
 
 
 def new_setting(text: str) -> tuple[str, tuple[str, ...]]:

@@ -19,8 +19,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-Where = tuple[str | int, ...]
-"""Path of a value: keys and list indices from the top."""
+from sonarsynth.recipe.variation.values import Where
 
 MAX_BYTES: Final = 2_000_000
 MAX_VALUES: Final = 50_000

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description.memory import max_facets
-from sonarsynth.geometry.surfaces import MeshError, Surface, cut, require_possible, sides
+from sonarsynth.geometry.surfaces import MeshError, Surface, cut, require_possible, shared_sides, sides
 
 FLAT: Final = 1e-6
 """Angle (rad) up to which two facets are one plane."""
@@ -120,10 +120,7 @@ def _parts(number: int, first: Ints, second: Ints) -> Ints:
 def _pairs(faces: Ints) -> tuple[Ints, Ints, Ints]:
     """Facets (pair,) and (pair,) that share an edge with no third, and their corners (pair, 4) at its ends: the
     first facet's at one end and at the other, the second's at the same ends. A corner is 3 facet + place."""
-    edge = sides(faces)[1].ravel()
-    order = np.argsort(edge, kind="stable")
-    first, count = np.unique(edge[order], return_index=True, return_counts=True)[1:]
-    half_edge, opposite = order[first[count == 2]], order[first[count == 2] + 1]
+    half_edge, opposite = shared_sides(faces)
     ends = [np.stack([x, x - x % 3 + (x + 1) % 3], axis=1) for x in (half_edge, opposite)]
     same = faces.ravel()[ends[0][:, 0]] == faces.ravel()[ends[1][:, 0]]  # wound against each other
     second = np.where(same[:, None], ends[1], ends[1][:, ::-1])

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.description.memory import max_facets
-from sonarsynth.geometry.surfaces import MeshError, Surface, sides, weld
+from sonarsynth.geometry.surfaces import MeshError, Surface, shared_sides, sides, weld
 
 SMALLEST, LARGEST = 1e-3, 10e3  # m, of the whole mesh
 SAME_VERTEX = 1e-7  # of the size: what single precision leaves of equal coordinates
@@ -116,17 +116,13 @@ def _winding(faces: Ints) -> tuple[Bools, Ints, int]:
     agreement join like with like, others like with unlike. The side of each part with more facets as they are is kept.
     """
     number = len(faces)
-    edge = sides(faces)[1].ravel()
-    facet = np.repeat(np.arange(number), 3)
     forward = (faces < np.roll(faces, -1, axis=1)).ravel()
-    order = np.argsort(edge, kind="stable")
-    first = np.flatnonzero(np.diff(edge[order], prepend=-1))
-    pair = first[np.diff(np.append(first, len(edge))) == 2]  # edges of exactly two facets
-    first_side, second_side = order[pair], order[pair + 1]
+    first_side, second_side = shared_sides(faces)
+    first, second = first_side // 3, second_side // 3
     differ = number * (forward[first_side] == forward[second_side])
     ends = (
-        np.concatenate([facet[first_side], facet[first_side] + number]),
-        np.concatenate([facet[second_side] + differ, facet[second_side] + number - differ]),
+        np.concatenate([first, first + number]),
+        np.concatenate([second + differ, second + number - differ]),
     )
     graph = coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(2 * number, 2 * number))
     label = connected_components(graph, directed=False)[1]
