@@ -84,6 +84,8 @@ class SteeredZone:
     rows: Ints  # of the image, ascending: those of the zone and of its mirror image
     columns: Ints
     shared: bool  # whether it and its mirror images take the same delays
+    places: Ints  # sensors as by `fold` where shared, else as by `fold_parts`
+    heights: Ints  # rows in use, likewise
     delay: Floats  # s: (half column, half row) where shared, else (part, half column, half row, 4 mirrored sensors)
     rise: Floats  # (row, part, side of y, half column) s: half of what a wave is sooner at the next row up
     across: Floats  # (part, row, column) s: the same at the next column to port
@@ -97,7 +99,8 @@ def steered(zone: Zone, elements: Elements, beams: BeamGrid, glass: Lens) -> Ste
     if zone.shared:
         y, z = (half_coordinates(count, elements.pitch) for count in (elements.columns, elements.rows))
         up, port = (np.arcsin(s) for s in zone.sines(glass, beams.elevation[rows], beams.azimuth[columns]))
-        return SteeredZone(rows, columns, True, glass.even(y[:, None], z, zone.centre), up, port, np.empty(0))
+        delay = glass.even(y[:, None], z, zone.centre)
+        return SteeredZone(rows, columns, True, *fold(elements), delay, up, port, np.empty(0))
     y, z = (half_coordinates(count, elements.pitch) for count in (glass.part_columns, glass.part_rows))
     middle_z, middle_y = (m.ravel()[:, None, None] for m in np.meshgrid(*_middles(glass), indexing="ij"))
     delay = np.stack(
@@ -111,7 +114,8 @@ def steered(zone: Zone, elements: Elements, beams: BeamGrid, glass: Lens) -> Ste
     middle = glass.bulge(middle_y, middle_z, u) - glass.bulge(middle_y, middle_z, zone.centre)
     middle -= (u[..., 0] * middle_y + u[..., 1] * middle_z) / glass.sound_speed
     half = 0.5 * elements.pitch
-    return SteeredZone(rows, columns, False, delay, half * rise, half * across, middle)
+    folded = fold_parts(elements, glass.parts)
+    return SteeredZone(rows, columns, False, *folded, delay, half * rise, half * across, middle)
 
 
 def _middles(glass: Lens) -> tuple[Floats, Floats]:
@@ -181,17 +185,15 @@ def zoned_energies(
     image = np.empty((beams.elevations, beams.azimuths))
     for zone in zones:
         if zone.shared:
-            places, heights = fold(elements)
             odd, half = (elements.rows % 2 == 1, elements.columns % 2 == 1), 0.5 * elements.pitch / sound_speed
             image[np.ix_(zone.rows, zone.columns)] = lattice_energies(
-                pairs, bins, places, live, zone.delay, heights, *odd, half, *band, zone.across, zone.rise
+                pairs, bins, zone.places, live, zone.delay, zone.heights, *odd, half, *band, zone.across, zone.rise
             )
             continue
         parts = round(len(zone.delay) ** 0.5)
-        places, heights = fold_parts(elements, parts)
         odd = -(-elements.rows // parts) % 2 == 1, -(-elements.columns // parts) % 2 == 1
         energy = part_energies(
-            pairs, bins, places, live, zone.delay, heights, *odd, zone.rise, zone.across, zone.middle, *band
+            pairs, bins, zone.places, live, zone.delay, zone.heights, *odd, zone.rise, zone.across, zone.middle, *band
         )
         rows, columns = zone.rows[-energy.shape[1] :], zone.columns[-energy.shape[2] :]
         # From the far corner on: beams on an axis are their own mirror images, and are taken from the zone itself.
