@@ -23,11 +23,11 @@ from sonarsynth.receiver import Band, BandPass, PlanarLattice, Sonar
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import EchoWindow, Processing, Scene, Trajectory, World
 from sonarsynth.recipe.tolerance import Accuracy
-from sonarsynth.scattering.boundaries import Lambert
+from sonarsynth.scattering.boundaries import Lambert, WindySurface
 from sonarsynth.signals.filtered_pulse import pulse_spectrum, snap_gains
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import path_error
 from sonarsynth.sources.shrimp import SnappingShrimp
-from sonarsynth.tracing.reverberation.cells import texture
+from sonarsynth.tracing.reverberation.cells import cells_about, scatterers, texture
 from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
 
 SPEED, DEPTH, HEIGHT, MU = 1500.0, 60.0, 8.0, -15.0
@@ -190,6 +190,32 @@ def test_patches_are_gamma_of_mean_1_and_stay_where_they_are(shape: float) -> No
     inside = np.floor(place) + draw.uniform(0.0, 1.0, place.shape)
     assert np.array_equal(texture(3, inside, 1.0, shape), bright)
     assert not np.array_equal(texture(4, inside, 1.0, shape), bright)
+
+
+def test_scatterers_are_the_same_wherever_and_however_many_are_asked_for() -> None:
+    """The first of each cell: for another place, a wider reach and more of them."""
+    few, wide = (
+        cells_about(np.array(at), reach, 2.0, "bottom", DEPTH) for at, reach in (((3.0, 1.0), 6.0), ((0.0, 0.0), 20.0))
+    )
+    place, cell, _ = scatterers(5, few, np.full(len(few.key), 2))
+    more, cell_of_more, _ = scatterers(5, wide, np.full(len(wide.key), 3))
+    by_key = {tuple(key): more[cell_of_more == n] for n, key in enumerate(wide.key.tolist())}
+    for n, key in enumerate(few.key.tolist()):
+        assert np.array_equal(place[cell == n], by_key[tuple(key)][:2])
+
+
+@pytest.mark.parametrize(("depth", "height"), [(0.011, DEPTH - 5.0), (DEPTH - 0.011, 0.5)])
+def test_at_surface_and_bottom_every_number_is_finite(depth: float, height: float) -> None:
+    """Of an array 1 mm from there, and a snap so high over the bottom: grazing angles of nearly 0."""
+    described = replace(LAMBERT, surface=WindySurface(wind_speed=10.0), bounces=1)
+    found = heard(plan(recipe(described, sonar=Still(position=(0.0, 0.0, -depth)), source_height=height)))
+    for value in (found.gain, found.energy, found.delay, found.direction):
+        assert np.isfinite(value).all()
+    assert len(found.gain) and (found.energy >= 0.0).all()
+
+
+def test_nothing_that_scatters_is_silent() -> None:
+    assert not len(heard(plan(recipe(replace(LAMBERT, bottom=None)))).delay)
 
 
 def test_patches_change_no_mean_energy() -> None:
