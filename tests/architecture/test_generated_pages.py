@@ -13,7 +13,7 @@ import pytest
 from sonarsynth.conventions import UNITS
 from sonarsynth.recipe.reading import schema_text
 from tools.page_building import ROOT, generated
-from tools.page_building.pictures import FRAMES, ghosts, images, labels, likeness, thumbnail
+from tools.page_building.pictures import FRAMES, ghosts, images, labels, likeness, noises, thumbnail
 from tools.page_building.site import lay_out
 
 MADE = generated()
@@ -83,6 +83,7 @@ def test_thumbnails_show_what_their_recipes_make(name: str, tmp_path: Path) -> N
     ("drawing", "names"),
     [
         (labels, ("label_boxes", "label_beams")),
+        (noises, ("noises",)),
         pytest.param(ghosts, ("ghosts",), marks=pytest.mark.long),
         pytest.param(images, ("images",), marks=pytest.mark.long),
     ],

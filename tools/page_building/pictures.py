@@ -19,6 +19,7 @@ from sonarsynth.pictures.compare import show_beside
 from sonarsynth.pictures.figures.frame_figure import FramePicture
 from sonarsynth.pictures.store_reading import beam_grid, opened, stored
 from tools.page_building.label_pictures import labels
+from tools.page_building.sea_pictures import choruses, noises
 from tools.same_numbers import harbour
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -186,10 +187,11 @@ QUICK: dict[str, Callable[[Path, Path], None]] = {
     "images": images,
     "labels": labels,
     "cloud": cloud,
+    "noises": noises,
 }
 """Two minutes of one core in all. Each takes a folder for datasets, and one for pictures."""
-DRAWN = QUICK | {"laws": laws, "accuracy": accuracy, "odds": odds}
-"""All: the last three take minutes each, and tell of times or of many windows."""
+DRAWN = QUICK | {"laws": laws, "accuracy": accuracy, "odds": odds, "choruses": choruses}
+"""All: the last four take minutes each, and tell of times, of many windows, or of sounds of seconds."""
 
 
 def draw(names: Iterable[str]) -> None:

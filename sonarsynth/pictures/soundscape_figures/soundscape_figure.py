@@ -117,6 +117,8 @@ def _rates(axes: Axes, both: list[_Curve], model: PredictedFigures) -> None:
     for curve in both:
         data, colour, zero = curve.figures, curve.colour, curve.zero
         positive = data.figures.rates > 0.0
+        if not positive.any():
+            continue
         x = data.levels[positive] + zero
         axes.errorbar(
             x,
@@ -241,3 +243,4 @@ def _gaps(axes: Axes, both: list[_Curve], model: PredictedFigures) -> None:
 
 def _nothing(axes: Axes, why: str) -> None:
     axes.text(0.5, 0.5, why, transform=axes.transAxes, ha="center", color=PALE)
+    axes.set(xticks=[], yticks=[])
