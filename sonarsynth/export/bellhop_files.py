@@ -179,6 +179,8 @@ def _unsaid(plan: Plan) -> tuple[str, ...]:
     for name, boundary in (("surface", environment.surface), ("bottom", environment.bottom)):
         if (height := rms_height(boundary)) > 0.0:
             notes.append(f"the {name} is smooth: a roughness of {height:.3g} m rms takes nothing from the amplitudes")
+    if plan.recipe.scene.world.relief is not None:
+        notes.append("the bottom is flat: the relief is left out")
     if environment.surface.bubbles:
         notes.append("there are no bubbles under the surface")
     if environment.absorption.formula == "ainslie_mccolm":

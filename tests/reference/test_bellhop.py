@@ -265,6 +265,10 @@ def test_a_bathymetry_is_a_surface_over_its_ranges(tmp_path):
     along = np.unique(vertices[:, [0, 2]], axis=0)
     assert along.tolist() == [[0.0, -20.0], [10.0, -15.0], [30.0, -20.0]] and len(faces) == 4
     assert set(vertices[:, 1]) == {-15.0, 15.0}
+    told = []
+    for relief in ("null", f"{{shape: {{path: {line}, offset: [0, 0, 20], edge: 2 m}}}}"):
+        told.append(write_bellhop(plan_of("uniform", f"scene.world.relief={relief}"), 0, tmp_path, "x")[1])
+    assert set(told[1]) - set(told[0]) == {"the bottom is flat: the relief is left out"}
     surfaces = []
     for axis in ("0 0.010 0.020", "0 0.020 /"):
         grid.write_text(f"'R'\n3\n{axis}\n2\n-0.005 0.005\n20 15 20\n20 14 20\n")
