@@ -26,6 +26,5 @@ def test_compiled_functions_with_fast_mathematics_that_others_call_are_inlined(f
     module = import_module(".".join(file.relative_to(PACKAGE.parent).with_suffix("").parts))
     compiled = {name: value for name, value in vars(module).items() if isinstance(value, Dispatcher)}
     called = {name for value in compiled.values() for name in value.py_func.__code__.co_names if name in compiled}
-    assert called
     loose = [n for n in called if compiled[n].targetoptions.get("fastmath")]
     assert [name for name in loose if not compiled[name].targetoptions.get("forceinline")] == []

@@ -85,7 +85,7 @@ def seen(density: float, distance: float, more: tuple[str, ...] = ()) -> list[Se
     settings = [
         f"scene.world.sources.0.position=[{x:.3f}, {y:.3f}]",
         f"scene.world.sources.0.source_level={LEVELS[0]} dB",
-        f"scene.world.chorus={{density: {density:f}, reach: {400 if density < 5e-3 else 150} m, images: 6}}",
+        f"scene.world.chorus={{density: {density:f}, images: 6}}",
         "scene.sonar.electronics={level: 30 dB}",
         "scene.sonar.converter=null",
         *more,
