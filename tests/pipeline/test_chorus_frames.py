@@ -105,7 +105,10 @@ def test_a_frame_without_a_clock_has_an_image_of_its_record() -> None:
 
 
 def test_plan_says_what_the_chorus_is_and_leaves_out() -> None:
-    for more, far in ((", distant: false", "re all of the chorus"), (", reach: 1 km", "Gaussian noise of their spectrum")):
+    for more, far in (
+        (", distant: false", "re all of the chorus"),
+        (", reach: 1 km", "Gaussian noise of their spectrum"),
+    ):
         recipe = reading.load(str(REMUS), [*SMALL, f"scene.world.chorus={{density: reef{more}}}"])
         text = " ".join(str(plan(recipe)).split())
         for words in ("an estimate", "excess kurtosis", "echoes of the chorus off targets", far):
