@@ -15,7 +15,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description.method import Demand
-from sonarsynth.planning.choices import OF_BEAMS, Choices
+from sonarsynth.planning.choices import OF_BEAMS, OWN_VIEW, Choices
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.image_errors import beamformer
 from sonarsynth.planning.measured.ray_bending import ranging_error
@@ -150,6 +150,8 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
     hydrophone's own view of the targets is tried first, then fainter echoes."""
     physics, count = plan.scene.physics, plan.elements.count
     seeing: OcclusionPoint = "centre" if physics.occlusion == "auto" else physics.occlusion
+    if physics.occlusion == "auto" and plan.recipe.accuracy.signal < OWN_VIEW:
+        seeing = "sensors"
     if physics.subarrays == "sensors" or (physics.subarrays == "auto" and plan.recipe.accuracy.exact):
         return _ArrayModel(count, "centre", 0.0)
     measures = [PerSensorReference.of(plan, index) for index in indices]
@@ -159,7 +161,7 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
     enough = np.inf if fixed else allowed
     undivided = error = _worst(measures, first, seeing, enough)
     unseen = plan.recipe.sequences > len(measures)  # in which another body may stand in the way
-    if physics.occlusion == "auto" and (error > allowed or unseen):
+    if seeing == "centre" and physics.occlusion == "auto" and (error > allowed or unseen):
         better = _worst(measures, first, "sensors", enough)
         if better < WORTHWHILE_GAIN * error:
             seeing, error = "sensors", better

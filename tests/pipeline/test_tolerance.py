@@ -12,7 +12,7 @@ import pytest
 
 from sonarsynth import planning
 from sonarsynth.pipeline import beamform_frame, range_frame, synthesise, trace_frame
-from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
+from sonarsynth.planning import Choices, Plan, arrivals_of, choosing, frame_start
 from sonarsynth.planning.choosing import HEARD_AT, heard_at
 from sonarsynth.receiver.subarrays import subarray, subarrays
 from sonarsynth.recipe import Accuracy, reading
@@ -108,6 +108,17 @@ def test_bending_that_moves_nothing_is_left_out() -> None:
     )
     assert (even.propagation.kind, bent.propagation.kind) == ("straight", "refracted")
     assert even.errors.expansion <= Accuracy().signal
+
+
+def test_what_only_a_rim_of_the_array_sees_is_seen_at_a_thousandth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In frame 58 of the pass a facet is hidden from one rim of the array alone. Hydrophones there, traced by
+    themselves, hear echoes to a thousandth as they are planned, and by the view of the middle not to two."""
+    recipe = replace(reading.load(CONFIGS / "remus.yaml"), accuracy=Accuracy(signal=1e-3))
+    made = planning.plan(recipe, {"signals"})
+    assert (made.choices.subarrays, made.choices.occlusion) == (1, "sensors")
+    monkeypatch.setattr(choosing, "heard_at", lambda elements: np.array([0, 227, 504]))
+    rim = choosing.PerSensorReference.of(made, 58)
+    assert rim.error(1, "sensors") < 1e-3 < 0.5 * rim.error(1, "centre")
 
 
 def test_exact_is_every_slow_way() -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonarsynth.environment.sea import Profile
-from sonarsynth.planning.choices import OF_BEAMS
+from sonarsynth.planning.choices import OF_BEAMS, OWN_VIEW
 from sonarsynth.planning.measured.lost_echoes import lost_echoes
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.formula_validity import validity
@@ -134,10 +134,14 @@ def _accuracy(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
             f"{errors.whole:.2g}"
         )
     if plan.choices.occlusion == "sensors" and plan.scene.physics.occlusion == "auto":
-        unseen = "" if errors.whole > allowed.signal else ", and may be more in sequences that were not measured in"
+        why = f"the error is {errors.whole:.2g}"
+        if allowed.signal < OWN_VIEW:
+            why = f"what is hidden from a few alone errs by up to {OWN_VIEW:g} at these"
+        elif errors.whole <= allowed.signal:
+            why += ", and may be more in sequences that were not measured in"
         lines.append(
             f"accuracy.signal {allowed.signal:g} needs the targets' occlusion from each hydrophone: with that from "
-            f"the array centre the error is {errors.whole:.2g}{unseen}"
+            f"the array centre {why} (scene.physics.occlusion)"
         )
     if np.hypot(np.nan_to_num(errors.expansion), np.nan_to_num(errors.synthesis)) > allowed.signal:
         lines.append(
