@@ -191,9 +191,12 @@ def test_the_section_shows_the_profile_as_it_is() -> None:
     assert np.interp(-0.1, *profile.lines[0].get_xydata()[::-1, ::-1].T) == pytest.approx(1510.0)
 
 
-def test_rays_in_space_keep_one_scale_on_all_axes() -> None:
-    rays = [np.array([[0.0, 0.0, 0.0], [6.0, 0.1 * i, -1.0], [1.0, 10.0, -10.0]]) for i in range(3)]
+@pytest.mark.parametrize(("deep", "words"), [(10.0, "one scale"), (200.0, "times as large")])
+def test_rays_in_space_keep_one_scale_on_all_axes_or_say_what_heights_have(deep: float, words: str) -> None:
+    rays = [np.array([[0.0, 0.0, 0.0], [6.0, 0.1 * i, -1.0], [1.0, 10.0, -deep]]) for i in range(3)]
     made = space_figure("fan", rays, [fan(c) for c in (1.0, 0.5, 0.1)], around(10.0))
     axes = made.axes[0]
-    spans = [np.ptp(limits) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())]
+    assert made.get_suptitle().endswith(words)
+    spans = np.array([np.ptp(limits) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())])
+    spans[2] = min(spans[2], spans[:2].max())
     assert spans / np.linalg.norm(spans) == pytest.approx(axes._box_aspect / np.linalg.norm(axes._box_aspect), rel=1e-6)

@@ -16,9 +16,9 @@ from sonarsynth.pictures.ray_figures.scene_drawing import (
     TRACK,
     VIEW,
     bodies_in_space,
+    frame_space,
     lift_names,
     name_beside,
-    one_scale,
     profile_axes,
     scale_words,
     surface_and_bottom,
@@ -167,8 +167,8 @@ def _in_space(axes: Axes3D, overview: Overview) -> None:
     axes.scatter(*geometry.sensors.T, s=0.5, color=INK, depthshade=False)
     over = np.append(geometry.array[:2], geometry.sensors[:, 2].max())
     axes.text(*over, "array", fontsize=9, color=INK, ha="center", va="bottom")
-    one_scale(axes, overview.points, geometry.bearing)
-    axes.set_title("in space, one scale", fontsize=10, color=INK, loc="left")
+    factor = frame_space(axes, overview.points, geometry.bearing)
+    axes.set_title(f"in space, {scale_words(factor)}", fontsize=10, color=INK, loc="left")
 
 
 def _limits(axes: Axes, points: Floats) -> None:

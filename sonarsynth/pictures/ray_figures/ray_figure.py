@@ -23,8 +23,8 @@ from sonarsynth.pictures.ray_figures.scene_drawing import (
     TRACK,
     VIEW,
     bodies_in_space,
+    frame_space,
     name_beside,
-    one_scale,
     profile_axes,
     scale_words,
     surface_and_bottom,
@@ -142,7 +142,7 @@ def _colour_bar(fig: Figure, axes: Axes, looks: Sequence[Look], pad: float = 0.0
 
 
 def space_figure(title: str, rays: Sequence[Floats], looks: Sequence[Look], geometry: SceneGeometry) -> Figure:
-    """Rays (each (point, xyz) in m, world) in space on one scale, with tracks and field of view, and the array."""
+    """Rays (each (point, xyz) in m, world) in space, with tracks and field of view, and the array."""
     fig = figure(11.0, 5.6, dpi=110)
     layout = fig.add_gridspec(2, 2, width_ratios=[3.4, 1.0])
     axes: Axes3D = fig.add_subplot(layout[:, 0], projection="3d")
@@ -166,11 +166,12 @@ def space_figure(title: str, rays: Sequence[Floats], looks: Sequence[Look], geom
         top = hull.vertices[np.argmax(hull.vertices[:, 2])]
         axes.text(*top, f"{hull.name}\n", fontsize=9, color=INK, ha="center", va="bottom", linespacing=0.5)
     every = [*rays, *(hull.vertices for hull in geometry.hulls), *geometry.tracks.values(), geometry.view["across"]]
-    one_scale(axes, np.concatenate([*every, *(p[None] for p in geometry.places.values())]), geometry.bearing)
+    every += [p[None] for p in geometry.places.values()]
+    factor = frame_space(axes, np.concatenate(every), geometry.bearing)
     _face(fig.add_subplot(layout[0, 1]), geometry)
     _legend(fig, looks, lines)
     _colour_bar(fig, axes, looks, pad=0.14)
-    fig.suptitle(f"{title}; one scale", x=0.01, ha="left", fontsize=11, color=INK)
+    fig.suptitle(f"{title}; {scale_words(factor)}", x=0.01, ha="left", fontsize=11, color=INK)
     return fig
 
 

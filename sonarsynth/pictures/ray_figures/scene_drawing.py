@@ -27,6 +27,10 @@ def surface_and_bottom(axes: Axes, bottom: float) -> None:
         axes.text(0.995, z, name, transform=axes.get_yaxis_transform(), **style)
 
 
+TALLEST = 1.0
+"""Heights over widths of what is drawn in space on one scale."""
+
+
 def vertical_scale(axes: Axes) -> float:
     """How many times larger heights are drawn than distances, in axes that have found their place."""
     box, (left, right), (low, high) = axes.get_window_extent(), axes.get_xlim(), axes.get_ylim()
@@ -82,15 +86,21 @@ def bodies_in_space(axes: Axes3D, hulls: Iterable[Hull]) -> None:
         axes.add_collection3d(body, autolim=False)
 
 
-def one_scale(axes: Axes3D, points: Floats, bearing: float) -> None:
-    """Limits that hold points (point, xyz) in boxes of their size, seen with `bearing` (rad) to the right."""
+def frame_space(axes: Axes3D, points: Floats, bearing: float) -> float:
+    """Limits that hold points (point, xyz), seen with `bearing` (rad) to the right; how much larger heights are drawn.
+
+    All axes have one scale, but for heights of more than TALLEST times the width.
+    """
     span = np.maximum(np.ptp(points, axis=0), 0.05 * np.ptp(points, axis=0).max())
     middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
     axes.set(**{f"{axis}lim": (m - 0.5 * s, m + 0.5 * s) for axis, m, s in zip("xyz", middle, span, strict=True)})
+    factor = min(TALLEST * float(span[:2].max()) / float(span[2]), 1.0)
+    span[2] *= factor
     axes.set_box_aspect(tuple(span), zoom=1.05)
     axes.view_init(elev=30.0, azim=-60.0 + float(np.rad2deg(bearing)))
     for axis, name, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), AXES, span, strict=True):
         axis.set_label_text(name, fontsize=8)
         axis.labelpad = 10.0
         axis.get_major_locator().set_params(nbins=max(2, round(7 * float(size / span.max()))))
+    return factor
     axes.tick_params(labelsize=7)
