@@ -150,8 +150,10 @@ def build(
     chosen = product_names(products)
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
-    with reading.locating(source):
-        wanted = chosen_frames(frames, sequences, made_from.spanned.first_frames.tolist())
+    wanted = None
+    if frames is not None or sequences is not None:
+        with reading.locating(source):
+            wanted = chosen_frames(frames, sequences, made_from.spanned.first_frames.tolist())
     stores.try_writing(stores.folder_of(store))
     with reading.locating(source), printing.planning():
         plan = planning.plan(made_from, chosen)

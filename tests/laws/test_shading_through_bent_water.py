@@ -12,7 +12,8 @@ from sonarsynth.receiver import Elements
 from sonarsynth.scattering import FacetLaw, Scatterers
 from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.targets.shapes import Sphere
-from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation, towards
+from sonarsynth.tracing.expansion.probe_paths import image
+from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion
 from sonarsynth.tracing.receive_paths import Facets, ReceivePaths, facets_of, receive_paths
 from tests.laws.test_shading_by_cones import SONAR, WATER, array_of, body, some_bodies
@@ -91,7 +92,7 @@ def test_rays_leave_for_hydrophones_as_those_traced_from_them(profile: Profile) 
     bound = legs.swerve(water, receiver, ARRAY.aperture)
     assert (size <= bound).all()
     assert size.max() > 2e-4
-    away = towards(legs, SONAR.turn_to_world(ARRAY.position)) + swerve
+    away = image(legs, ARRAY.position, SONAR) + swerve
     for sensor in (0, 17, 44):
         pose = Pose(SONAR.to_world(ARRAY.position[[sensor]])[0], SONAR.orientation)
         own = receive_paths(facets, water, Receiver(pose, ARRAY), rays, 2.0 * ARRAY.aperture)
