@@ -150,10 +150,8 @@ def build(
     chosen = product_names(products)
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
-    wanted = None
-    if frames is not None or sequences is not None:
-        with reading.locating(source):
-            wanted = chosen_frames(frames, sequences, made_from.spanned.first_frames.tolist())
+    some = frames is not None or sequences is not None
+    wanted = chosen_frames(frames, sequences, made_from.spanned.first_frames.tolist()) if some else None
     stores.try_writing(stores.folder_of(store))
     with reading.locating(source), printing.planning():
         plan = planning.plan(made_from, chosen)
