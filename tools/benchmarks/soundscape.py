@@ -49,7 +49,7 @@ def bench() -> dict[str, Any]:
     found["noise"] = {name: _noise(_planned(f"scene.world.environment.noise={text}")) for name, text in NOISES.items()}
     default = _planned("scene.world.chorus={}")
     found["chorus, default"] = _chorus(default) | {"snaps_per_second": _often(default)}
-    found["distant chorus"] = _distant(default)
+    found["distant chorus"] = _distant(_planned("scene.world.chorus={reach: 1 km}"))
     at = {snaps: _chorus(_at(snaps)) for snaps in SNAPS}
     found["chorus"] = {f"{snaps:g} snaps/s": row for snaps, row in at.items()}
     found["exponents"] = {
