@@ -232,19 +232,6 @@ def set_up() -> None:
     say(f"done in {time.monotonic() - began:.0f} s")
 
 
-def forget_stale_kernels() -> None:
-    """Remove cached compiled kernels when any of their sources is newer.
-
-    Numba looks only at the file that a kernel stands in, not at those that it imports kernels from.
-    """
-    cached = list((ROOT / "sonarsynth").glob("**/__pycache__/*.nb[ic]"))
-    sources = (ROOT / "sonarsynth").glob("**/*.py")
-    newest = max((path.stat().st_mtime for path in sources if b"numba" in path.read_bytes()), default=0.0)
-    if cached and newest > min(path.stat().st_mtime for path in cached):
-        for path in cached:
-            path.unlink(missing_ok=True)
-
-
 def main() -> int:
     """Exit status 0 when the project can run."""
     try:
@@ -252,7 +239,6 @@ def main() -> int:
             raise CannotSetUp(f"needs Python {OLDEST[0]}.{OLDEST[1]} or newer, this is {sys.version.split()[0]}")
         if not up_to_date():
             set_up()
-        forget_stale_kernels()
     except (CannotSetUp, OSError) as problem:
         say(f"failed: {problem}")
         return 1

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats
 
 Int32s = npt.NDArray[np.int32]
@@ -22,7 +22,7 @@ def tree(vertices: Floats, faces: Int32s) -> tuple[Floats, Int32s]:
     return boxes(vertices, faces, order, leaves), order
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _select(order: Int32s, key: Any, axis: int, low: int, high: int, middle: int) -> None:
     """Part order[low:high] at `middle`: nothing before it has a larger key than what is after (Hoare 1961)."""
     first, last = low, high - 1
@@ -44,7 +44,7 @@ def _select(order: Int32s, key: Any, axis: int, low: int, high: int, middle: int
             return
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def order_of(vertices: Floats, faces: Int32s, leaves: int) -> Int32s:
     """The facets, ordered by halving each range at its median along its longest side until there are `leaves`."""
     count, order, ranges = len(faces), np.arange(len(faces)).astype(np.int32), 1
@@ -66,7 +66,7 @@ def order_of(vertices: Floats, faces: Int32s, leaves: int) -> Int32s:
     return order
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def boxes(vertices: Floats, faces: Int32s, order: Int32s, leaves: int) -> Floats:
     """Nodes (2 leaves, 6) of the tree: centres (xyz) of boxes and half of their sides, -inf where they are empty; leaf
     n has the facets order[n N/leaves : (n + 1) N/leaves]."""

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Bools, Floats, Ints
 
 Int32s = npt.NDArray[np.int32]
@@ -15,7 +15,7 @@ EDGE = 1e-14  # of the square of the body's size: rays this close to an edge hit
 SPHERE = 1.0 + 1e-5  # square of the radius of a sphere a little over the unit sphere
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def distance_to_facet(o: Floats, d: Floats, vertices: Floats, faces: Int32s, facet: int, tolerance: float) -> float:
     """Distance along the ray o + t d to a facet, from either side; NaN where it misses.
 
@@ -39,7 +39,7 @@ def distance_to_facet(o: Floats, d: Floats, vertices: Floats, faces: Int32s, fac
     return float((nx * ax + ny * ay + nz * az) / along)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def confirm(
     origin: Floats,
     direction: Floats,
@@ -72,7 +72,7 @@ def confirm(
                     best, facet[i], distance[i] = t, around[j], t
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def search(
     origin: Floats,
     direction: Floats,
@@ -95,7 +95,7 @@ def search(
                 best, facet[i], distance[i] = t, j, t
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def round_vertices(faces: Int32s, vertices: int) -> tuple[Int32s, Int32s]:
     """Facets round each vertex, in order: (vertex + 1,) where each list begins, and the lists."""
     first, around = np.zeros(vertices + 1, np.int32), np.empty(faces.size, np.int32)
@@ -113,7 +113,7 @@ def round_vertices(faces: Int32s, vertices: int) -> tuple[Int32s, Int32s]:
     return first, around
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def into_mesh(
     start: Floats, end: Floats, skip: Bools, rotation: Floats, position: Floats, centre: Floats, size: float,
     origin: Floats, heading: Floats, far: Floats, segment: Ints,
@@ -155,7 +155,7 @@ def into_mesh(
     return count
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def folded_pass_near(
     start: Floats, end: Floats, up: Bools, bounces: Ints, bottom: float, skip: Floats, reach: Floats, centre: Floats,
     radius: float, near: Bools,

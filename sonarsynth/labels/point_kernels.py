@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Bools, Floats, Ints
 
 Complexes = npt.NDArray[np.complex128]
@@ -28,7 +28,7 @@ class Pattern(NamedTuple):
     weight: Floats  # (sensor,) of sum one
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def path_spectra(
     amplitude: Floats,
     phase: Floats,
@@ -59,7 +59,7 @@ def path_spectra(
     return spectrum
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _tabulated(
     response: Complexes, apart: Floats, curvature: float, focus: float, frequency: Floats, pattern: Pattern
 ) -> None:
@@ -80,14 +80,14 @@ def _tabulated(
         )
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _delay(q: Floats, square: float, u: Floats, curvature: float) -> float:
     """Delay (s) of a sphere after the middle of the array: (sqrt(R^2 - 2 R u.q + q^2) - R)/c, q over c."""
     bulge = curvature * square - 2.0 * (u[0] * q[0] + u[1] * q[1] + u[2] * q[2])
     return float(bulge / (1.0 + math.sqrt(max(1.0 + curvature * bulge, 0.0))))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _summed(
     response: Complexes,
     path: Floats,
@@ -114,7 +114,7 @@ def _summed(
             phasor *= turned
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def attribute(
     beam: Floats,
     moment: Floats,
@@ -186,7 +186,7 @@ def attribute(
     return power, total, owner, share
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _compare(
     power: Floats, total: Floats, sums: Complexes, peaks: Complexes, energy: Floats, pulse: Bools, beam_energy: float
 ) -> None:
@@ -205,7 +205,7 @@ def _compare(
             total[g] = remainder
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def distances(points: Floats, vertices: Floats, faces: Int32s, nodes: Floats, order: Int32s, distance: Floats) -> None:
     """Distance (point,) of points (point, xyz) to the nearest facet of a mesh, exact; nodes, order: `facet_tree`."""
     leaves, count = len(nodes) // 2, len(order)
@@ -232,7 +232,7 @@ def distances(points: Floats, vertices: Floats, faces: Int32s, nodes: Floats, or
         distance[p] = math.sqrt(best)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _to_box(point: Floats, node: Floats) -> float:
     """Square of the distance to a box; infinite to an empty one."""
     square = 0.0
@@ -243,7 +243,7 @@ def _to_box(point: Floats, node: Floats) -> float:
     return square
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _to_triangle(p: Floats, a: Floats, b: Floats, c: Floats) -> float:
     """Square of the distance to a triangle: to its plane where the foot is inside all edges, else to the nearest edge.
 
@@ -261,7 +261,7 @@ def _to_triangle(p: Floats, a: Floats, b: Floats, c: Floats) -> float:
     return min(_to_edge(p, a, b), _to_edge(p, b, c), _to_edge(p, c, a))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _to_edge(p: Floats, a: Floats, b: Floats) -> float:
     """Square of the distance to an edge."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]

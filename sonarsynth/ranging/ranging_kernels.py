@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba as nb
 import numpy as np
+
+from sonarsynth.compiling import compiled
 
 UNLIKE = 1e-3
 """Share of a pulse that is not explained, from which on sensors are asked for gains of their own: 0.3 dB of them make
 as much."""
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def power_and_peak(pressure: Any, live: Any) -> Any:
     """Sum of squares over live sensors (sample,) in Pa2, and the largest |pressure| of them; pressure (sensor, sample).
 
@@ -30,7 +31,7 @@ def power_and_peak(pressure: Any, live: Any) -> Any:
     return power, float(high.max()) if samples > 0 else 0.0
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def powers(waves: Any, power: Any) -> None:
     """Write |.|^2 of the first samples of complex waves (beam, sample) into power (beam, sample), as many as it has."""
     for b in range(power.shape[0]):
@@ -38,7 +39,7 @@ def powers(waves: Any, power: Any) -> None:
             power[b, t] = waves[b, t].real * waves[b, t].real + waves[b, t].imag * waves[b, t].imag
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def cut_out(pressure: Any, arrival: Any, half: int, gain: Any) -> Any:
     """Samples (sensor, 2 half) about `arrival` (sensor,), counted in samples, times gain and a flat top.
 
@@ -61,7 +62,7 @@ def cut_out(pressure: Any, arrival: Any, half: int, gain: Any) -> Any:
     return cut
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def turned(spectrum: Any, delay: Any, first: float, spacing: float) -> Any:
     """spectrum * exp(+i 2 pi f delay): (sensor, bin) at f = first + spacing * bin (Hz), delay (sensor,) s."""
     sensors, bins = spectrum.shape
@@ -75,7 +76,7 @@ def turned(spectrum: Any, delay: Any, first: float, spacing: float) -> Any:
     return shifted
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int) -> Any:
     """sinc(f across) sinc(f up): (row, bin) at f = first + spacing * bin (Hz); across, up (row,) s: face times sine/c.
 
@@ -101,7 +102,7 @@ def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int
     return response
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def template_sums(spectrum: Any, response: Any) -> Any:
     """Sums over sensors of response * spectrum and of response^2: (bin,) each; spectrum, response (sensor, bin)."""
     sensors, bins = spectrum.shape
@@ -114,7 +115,7 @@ def template_sums(spectrum: Any, response: Any) -> Any:
     return total, power
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def beyond_gains(spectrum: Any, response: Any, template: Any) -> tuple[float, float]:
     """What the model of `lag_sums` does not explain of a pulse, each sensor with the gain that suits it best; and the
     power of the pulse, both (Pa s)^2 summed over sensors and bins.
@@ -132,7 +133,7 @@ def beyond_gains(spectrum: Any, response: Any, template: Any) -> tuple[float, fl
     return power - explained, power
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def lag_sums(spectrum: Any, response: Any, template: Any, omega: Any) -> Any:
     """Sums over bins for each sensor (sensor,), with the model M = response * template and the rest R = spectrum - M:
 
@@ -150,7 +151,7 @@ def lag_sums(spectrum: Any, response: Any, template: Any, omega: Any) -> Any:
     return slope, weight, residual
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def loudest_near(
     power: Any, top: Any, about: int, row: Any, column: Any, index: Any, up: int, across: int, beam: Any, reach: float
 ) -> Any:

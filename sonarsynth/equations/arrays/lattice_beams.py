@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba as nb
 import numpy as np
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.kernels.lanes import LANES, load, splat, store, store_complex
 from sonarsynth.equations.kernels.phasors import ZERO, Spectra, padded_bins, phasors, turned, weighted
@@ -24,7 +24,7 @@ TERM = 4 * LANES
 """float32 numbers of one term of a sum: two complex numbers (sum and difference of a pair) of sixteen frequencies."""
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _store_pair(terms: Any, start: int, x: Any, y: Any, p: Any, q: Any) -> None:
     store(terms, start, x + p)
     store(terms, start + LANES, y + q)
@@ -32,7 +32,7 @@ def _store_pair(terms: Any, start: int, x: Any, y: Any, p: Any, q: Any) -> None:
     store(terms, start + 3 * LANES, y - q)
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _sum(terms: Any, start: int, stop: int, c: Any, s: Any, by_c: Any, by_s: Any) -> Any:
     """Sum of cosine times sums plus i sine times differences, the phasor (c, s) turned on by another every term."""
     x = y = splat(ZERO)
@@ -43,7 +43,7 @@ def _sum(terms: Any, start: int, stop: int, c: Any, s: Any, by_c: Any, by_s: Any
     return x, y
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _focus_and_fold(
     pairs: Any, bins: int, low: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float, terms: Any
 ) -> None:
@@ -61,7 +61,7 @@ def _focus_and_fold(
                 _store_pair(terms, ((half * columns + n) * rows + m) * TERM, x, y, p, q)
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _lattice_sums(
     pairs: Any, bins: int, places: Any, weight: Any, delay: Any, rise: Any, across: Any, bounds: Any, odd_rows: bool,
     odd_columns: bool, frequency: float, spacing: float, beams: Any,

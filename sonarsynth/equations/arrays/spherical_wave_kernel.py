@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba as nb
 import numpy as np
 
+from sonarsynth.compiling import compiled
 
-@nb.njit(cache=True, nogil=True)
+
+@compiled
 def normal_equations(
     position: Any, delay: Any, weight: Any, u: Any, curvature: float, sound_speed: float, tangents: Any
 ) -> Any:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba as nb
 import numpy as np
 import numpy.typing as npt
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.kernels.lanes import LANES, load, load_complex, nearest, ramp, splat, store, store_complex
 
@@ -42,7 +42,7 @@ GROUPS = 4
 CHUNK = GROUPS * LANES
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def half_phasor(turns: Any, more: Any) -> Any:
     """Cosine and sine (lanes) of `turns` + `more` (lanes, |more| small) up to one sign; error 1e-7."""
     t = turns + more
@@ -54,7 +54,7 @@ def half_phasor(turns: Any, more: Any) -> Any:
     return c - low * s, s + low * c
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def half_phasors(delay: float, frequency: float, spacing: float) -> Any:
     """Cosine and sine (lanes) of 2 pi delay (frequency + spacing * 0..15), up to one sign a lane. s, Hz, Hz."""
     turns = delay * frequency
@@ -63,27 +63,27 @@ def half_phasors(delay: float, frequency: float, spacing: float) -> Any:
     return half_phasor(splat(high), splat(np.float32(turns - high)) + splat(np.float32(delay * spacing)) * ramp())
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def turned(c: Any, s: Any, by_c: Any, by_s: Any) -> Any:
     """Phasor (c, s) turned on by another."""
     return c * by_c - s * by_s, s * by_c + c * by_s
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def phasors(delay: float, frequency: float, spacing: float) -> Any:
     """Cosine and sine (lanes) of 2 pi delay (frequency + spacing * 0..15): the half angle, doubled; error 3e-7."""
     c, s = half_phasors(0.5 * delay, frequency, spacing)
     return turned(c, s, c, s)
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def weighted(pairs: Any, at: int, weight: float) -> Any:
     """Real and imaginary parts (lanes) of weight times sixteen complex numbers, pairs of float32 from pairs[at] on."""
     x, y = load_complex(pairs, at)
     return splat(weight) * x, splat(weight) * y
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def group_steps(delays: Any, spacing: float, cosines: Any, sines: Any) -> None:
     """Fill cosines, sines (float32) with half phasors of 2 pi delay * 16 spacing: one group of frequencies on.
 
@@ -100,13 +100,13 @@ def group_steps(delays: Any, spacing: float, cosines: Any, sines: Any) -> None:
         store(sines, i, s)
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _accumulate(pairs: Any, at: int, c: Any, s: Any, real: Any, imaginary: Any) -> Any:
     x, y = load_complex(pairs, at)
     return real + c * x - s * y, imaginary + c * y + s * x
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _steered_sums(pairs: Any, delay: Any, weight: Any, frequency: float, spacing: float, bins: int, beams: Any) -> None:
     sensors = len(weight)
     padded = sensors + -sensors % LANES

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from sonarsynth.compiling import compiled
 
 
 def multiples(values: npt.NDArray[Any], step: float) -> npt.NDArray[np.int16]:
@@ -16,7 +17,7 @@ def multiples(values: npt.NDArray[Any], step: float) -> npt.NDArray[np.int16]:
     return out
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _multiples(values: npt.NDArray[Any], step: Any, out: npt.NDArray[np.int16]) -> None:
     for i in range(values.shape[0]):
         row, counts = values[i], out[i]
@@ -24,7 +25,7 @@ def _multiples(values: npt.NDArray[Any], step: Any, out: npt.NDArray[np.int16]) 
             counts[j] = np.int16(np.rint(row[j] / step))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def round_off(values: npt.NDArray[Any], step: Any, limit: Any, out: npt.NDArray[Any]) -> tuple[int, int]:
     """Write values (row, column) rounded to whole steps, at most `limit` steps either way, into out. Returns how
     many were beyond that, and how many are not a number."""

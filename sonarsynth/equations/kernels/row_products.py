@@ -7,8 +7,8 @@ and each processor does it in its own way: what is made a block of facets at a t
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats
 
 
@@ -17,7 +17,7 @@ def row_products(rows: Floats, matrix: Floats) -> Floats:
     return np.asarray(_products(np.ascontiguousarray(rows, float), np.ascontiguousarray(matrix, float)))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _products(rows: Floats, matrix: Floats) -> Floats:
     out = np.zeros((len(rows), matrix.shape[1]))
     for i in range(len(rows)):

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Bools, Floats
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def to_images(length: Floats, departure: Floats, mirrored: Bools, offset: Floats) -> Floats:
     """Unit vectors (leg, place, xyz) from where legs of some length (leg,) in directions (leg, xyz) start to places
     beside their ends (place, xyz), or beside what a level surface mirrors them to."""
@@ -26,7 +26,7 @@ def to_images(length: Floats, departure: Floats, mirrored: Bools, offset: Floats
     return out
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def moved(length: Floats, away: Floats, apart: Floats) -> Floats:
     """Unit vectors (leg, place, xyz) of length (leg,) times away (leg, place, xyz) plus apart (leg, xyz)."""
     out = np.empty(away.shape)

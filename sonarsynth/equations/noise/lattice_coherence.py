@@ -13,9 +13,9 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from scipy.fft import fft2, ifft2, next_fast_len
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.equations.noise.filters import kaiser_bessel, kaiser_bessel_beta, kaiser_bessel_transform
 
@@ -58,7 +58,7 @@ def _kernel() -> Floats:
     return kaiser_bessel(np.minimum(distance, 0.5 * WIDTH), WIDTH, kaiser_bessel_beta(WIDTH, OVERSAMPLING))
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath=True)
+@compiled(fastmath=True)
 def _deposit(
     grid: Floats, toward: Floats, weight: Floats, turn_y: float, turn_z: float, face: float, kernel: Floats
 ) -> None:
@@ -77,12 +77,12 @@ def _deposit(
                 row[z + j] += scaled * along_z[j]
 
 
-@njit(cache=True, error_model="numpy", nogil=True, inline="always")
+@compiled(inline="always")
 def _sinc(x: float) -> float:
     return math.sin(x) / x if abs(x) > 1e-8 else 1.0
 
 
-@njit(cache=True, error_model="numpy", nogil=True, inline="always")
+@compiled(inline="always")
 def _spread(values: Floats, cycles: float, count: int, kernel: Floats) -> int:
     """Values of the kernel about a phase, and the point of the grid that is the first of them."""
     position = (cycles - math.floor(cycles)) * count

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.scattering.kirchhoff_kernels import divided, series
 
@@ -22,7 +22,7 @@ PARTS = 4
 """Sums of each group: of the paths, and of the paths times each component of their direction."""
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def coherent_sums(
     group: Ints,
     snap: Ints,
@@ -64,13 +64,13 @@ def coherent_sums(
     return real, imaginary, power
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _add(total: Floats, factor: float, values: Floats) -> None:
     for k in range(values.size):
         total[k] += factor * values[k]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _turn(x: Floats, y: Floats, phase: float, delay: float, omega: Floats, room: Floats) -> None:
     """Multiplies x + iy (bin,) by exp(i phase - i omega delay)."""
     c, s = room[0], room[1]
@@ -79,7 +79,7 @@ def _turn(x: Floats, y: Floats, phase: float, delay: float, omega: Floats, room:
         x[k], y[k] = x[k] * c[k] - y[k] * s[k], x[k] * s[k] + y[k] * c[k]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _fade(
     x: Floats, y: Floats, amplitude: float, decay: float, half: float, relative: Floats, square: Floats, largest: float
 ) -> None:
@@ -95,7 +95,7 @@ def _fade(
             x[k], y[k] = x[k] * factor, y[k] * factor
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _facet_mean(x: Floats, y: Floats, corners: Floats, omega: Floats, square: Floats, room: Floats) -> None:
     """Real and imaginary part (bin,) of the mean over a facet of exp(-i omega t) about the mean of its corners (3,),
     and the turn that this mean makes."""
@@ -125,7 +125,7 @@ def _facet_mean(x: Floats, y: Floats, corners: Floats, omega: Floats, square: Fl
         _turn(x, y, 0.0, middle, omega, room)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _phasors(c: Floats, s: Floats, first: float, step: float, count: int) -> None:
     """Cosines and sines of first + step * bin, of `count` bins, by doubling: error 1e-16 of their number."""
     c[0], s[0] = math.cos(first), math.sin(first)
@@ -137,7 +137,7 @@ def _phasors(c: Floats, s: Floats, first: float, step: float, count: int) -> Non
         by_c, by_s, done = by_c * by_c - by_s * by_s, 2.0 * by_c * by_s, 2 * done
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def mean_powers(
     snap: Ints,
     coherent: Bools,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
 
 _X, _W = np.polynomial.legendre.leggauss(24)
@@ -17,7 +17,7 @@ LEAST_SINE = 1e-6
 """rad: of a ray that turns."""
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def at(x: float, xs: Floats, ys: Floats) -> float:
     """Linear interpolation, constant beyond the ends."""
     n = len(xs)
@@ -31,7 +31,7 @@ def at(x: float, xs: Floats, ys: Floats) -> float:
     return float(ys[i - 1] + (ys[i] - ys[i - 1]) * (x - xs[i - 1]) / (xs[i] - xs[i - 1]))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def vertex(z: float, down: bool, fastest: float, bottom: float, depth: Floats, speed: Floats) -> float:
     """Depth (m) at which a ray that goes down, or up, from z meets its turning speed (m/s), or the boundary."""
     last_z, last_c = z, at(z, depth, speed)
@@ -50,7 +50,7 @@ def vertex(z: float, down: bool, fastest: float, bottom: float, depth: Floats, s
     return edge
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def leg(a: float, b: float, p: float, bent: bool, water: tuple[Floats, Floats], table: tuple[Floats, Floats],
         times: float, sums: Floats) -> None:  # fmt: skip
     """Add a monotone leg between two depths, so many times: its length, and the value along it, to sums (2,)."""
@@ -65,7 +65,7 @@ def leg(a: float, b: float, p: float, bent: bool, water: tuple[Floats, Floats], 
         sums[1] += length * at(z, table[0], table[1])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: bool, bottom: float,
           water: tuple[Floats, Floats], table: tuple[Floats, Floats], out: Floats) -> None:  # fmt: skip
     """Mean (ray,) along rays from depths start to end (ray,) m of a value of depth.

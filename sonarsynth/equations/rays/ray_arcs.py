@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.rays.ray_chain import node_above
 from sonarsynth.equations.rays.ray_in_layer import atanc, chord_time
@@ -19,7 +18,7 @@ ON, TURN, SURFACE, BOTTOM, OVER = range(5)
 """Why a step ended: step length or layer boundary, turning point, surface, bottom, time over."""
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def arc(phi: float, bend: float, s: float) -> tuple[float, float, float]:
     """Horizontal and downward displacement (m) along an arc of length s, and the angle at its end; bend: p g (1/m)."""
     half = 0.5 * bend * s
@@ -27,7 +26,7 @@ def arc(phi: float, bend: float, s: float) -> tuple[float, float, float]:
     return chord * math.cos(phi - half), chord * math.sin(phi - half), phi - 2.0 * half
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def heading(depth: Floats, speed: Floats, layer: int, z: float, phi: float) -> tuple[int, float]:
     """Layer and sense (1 down, -1 up, 0 level for good) of a ray about to leave z; a level ray goes where it bends."""
     if phi != 0.0:
@@ -44,7 +43,7 @@ def heading(depth: Floats, speed: Floats, layer: int, z: float, phi: float) -> t
     return layer, -1.0 if rise > 0.0 else (1.0 if rise < 0.0 else 0.0)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def across(depth: Floats, layer: int, sense: float) -> tuple[int, int]:
     """Next layer beyond the boundary reached, and what the boundary is."""
     if sense < 0.0:
@@ -52,7 +51,7 @@ def across(depth: Floats, layer: int, sense: float) -> tuple[int, int]:
     return (layer + 1, ON) if layer < len(depth) - 2 else (layer, BOTTOM)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def length_to_edge(sine: float, p: float, c: float, c_edge: float, dz: float) -> tuple[float, float]:
     """Arc length to the edge of the layer `dz` (m) away, and the sine there; NaN where the ray turns before it."""
     square = sine * sine - p * p * (c_edge - c) * (c_edge + c)
@@ -62,7 +61,7 @@ def length_to_edge(sine: float, p: float, c: float, c_edge: float, dz: float) ->
     return 2.0 * dz / total * atanc(p * (c_edge - c) / total) if dz > 0.0 else 0.0, math.sqrt(square)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def along_arc(phi: float, bend: float, s: float, c: float, gradient: float) -> tuple[float, float, float, float]:
     """Time (s), displacements and angle at the end of an arc that begins where the speed is c."""
     dx, dz, turned = arc(phi, bend, s)
@@ -70,7 +69,7 @@ def along_arc(phi: float, bend: float, s: float, c: float, gradient: float) -> t
     return chord_time(math.hypot(dx, dz), c, c_after, gradient), dx, dz, turned
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def step(
     depth: Floats,
     speed: Floats,
@@ -124,7 +123,7 @@ def step(
     return why, after, dx, z_after, phi_after, s, time
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def steps(
     depth: Floats,
     speed: Floats,
@@ -147,7 +146,7 @@ def steps(
         )
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def chords(
     depth: Floats, speed: Floats, z: Floats, phi: Floats, p: Floats, length: Floats, sagitta: float, nodes: Floats
 ) -> int:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.rays.ray_chain import lay, node_above, offsets, speed_at
 from sonarsynth.equations.rays.ray_families import COLUMNS, families_of_pair
@@ -34,7 +34,7 @@ SAME_DEPTH = 1e-140  # m: depths that differ by less are equal
 MANY = 64  # layers
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def level_speed(depth: Floats, speed: Floats, z: float) -> float:
     """Speed of the layer of one speed at z (below first, then above); NaN where there is none."""
     j = node_above(depth, z)
@@ -47,7 +47,7 @@ def level_speed(depth: Floats, speed: Floats, z: float) -> float:
     return math.nan
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def straight_of_pair(
     depth: Floats, speed: Floats, start: float, end: float, distance: float, chain: Chain, out: Floats, row: int
 ) -> int:
@@ -80,7 +80,7 @@ def straight_of_pair(
     return 1
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def level_of_pair(
     depth: Floats, speed: Floats, z: float, distance: float, reflections: int, known: int, out: Floats, row: int
 ) -> int:
@@ -111,7 +111,7 @@ def level_of_pair(
     return count
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def rays_of_pairs(
     depth: Floats,
     speed: Floats,
@@ -154,13 +154,13 @@ def rays_of_pairs(
     return count, len(start)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _down(c1: float, c2: float, dz: float) -> float:
     """Time (s) straight down a layer: dz over its logarithmic mean speed."""
     return 2.0 * dz / (c1 + c2) * float(atanhc((c2 - c1) / (c2 + c1)))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def mean_slowness(depth: Floats, speed: Floats, start: Floats, end: Floats, out: Floats) -> None:
     """Mean of 1/c (s/m) over the depths between the ends of each pair: what a straight line takes a metre."""
     work, down = np.empty((2, len(depth) + 8)), np.zeros(len(depth))

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.rays.ray_chain import GRAZING, offsets, sweep, time_of
 from sonarsynth.equations.rays.ray_families import ABOVE, BELOW, BETWEEN, COLUMNS, family_of, weigh
@@ -34,7 +34,7 @@ from sonarsynth.equations.rays.ray_vertices import (
 )
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def lay_for(depth: Floats, speed: Floats, start: float, end: float, p: float, up: int, vertices: int, chain: Chain,
             family: Ints) -> tuple[int, int, float, float]:  # fmt: skip
     """Lay the weighted chain of a family for rays of about this p: first and last node, and its turns."""
@@ -60,7 +60,7 @@ def lay_for(depth: Floats, speed: Floats, start: float, end: float, p: float, up
     return first, last, above * reals[GRADIENT_UP], below * reals[GRADIENT_DOWN]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def approach(
     p: float, distance: float, chain: Chain, first: int, last: int, turn_up: float, turn_down: float
 ) -> tuple[float, float, float, float]:
@@ -84,7 +84,7 @@ def approach(
     return math.nan, math.nan, math.nan, math.nan
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def rays_nearby(
     depth: Floats, speed: Floats,
     start: Floats, slowness: Floats, up: Ints, vertices: Ints, depth_of_end: Ints, end: Floats, distance: Floats,

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.rays.ray_chain import GRAZING, bounds, sweep
 
@@ -19,13 +18,13 @@ CLOSE = 1e-8  # relative miss of the range that one more Newton step removes
 ENOUGH = 2e-17  # relative error of the travel time at which Newton stops: it is second order in what is left of X - R
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def settled(misfit: float, distance: float, slope: float) -> bool:
     """Whether one more Newton step ends the search: X - R is small for the travel time, and for angle and amplitude."""
     return misfit * misfit <= ENOUGH * distance * slope and abs(misfit) <= CLOSE * distance
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def refine(
     low: float,
     high: float,
@@ -63,13 +62,13 @@ def refine(
     return max(v * p, GRAZING), p
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def flattest(d: Floats, k: Floats, first: int, last: int) -> float:
     """Range of the flattest ray through a chain: horizontal at its fastest depth."""
     return float(bounds(GRAZING, GRAZING, d, k, first, last, 0.0, 0.0)[0])
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def straight(
     distance: float, fastest: float, d: Floats, k: Floats, first: int, last: int, reached: bool
 ) -> tuple[bool, float, float]:
@@ -104,7 +103,7 @@ def straight(
     return True, s_m, q * s_m
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def first_guess(
     low: float, high: float, x_low: float, x_high: float, distance: float,
     d: Floats, first: int, last: int, turn_up: float, turn_down: float,
@@ -119,7 +118,7 @@ def first_guess(
     return float(low + (high - low) * (distance - x_low) / (x_high - x_low))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def turns(
     below_start: bool,
     fastest: float,

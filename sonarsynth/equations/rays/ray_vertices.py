@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.rays.ray_chain import lay
 
@@ -36,7 +36,7 @@ class Chain(NamedTuple):
     roots: Floats  # (root, 2)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def new_chain(nodes: int) -> Chain:
     """Room for a chain in water of so many nodes."""
     work = np.empty((5, 2 * nodes + 16))
@@ -45,7 +45,7 @@ def new_chain(nodes: int) -> Chain:
     return Chain(work[0], work[1], work[2], work[3], work[4], ints, reals, sums, np.empty(64), roots)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def begin(depth: Floats, speed: Floats, start: float, end: float, chain: Chain) -> None:
     """Lay the chain between the two ends."""
     ints, reals = chain.ints, chain.reals
@@ -65,7 +65,7 @@ def begin(depth: Floats, speed: Floats, start: float, end: float, chain: Chain) 
         reals[FASTEST], reals[SLOWEST] = max(reals[FASTEST], chain.c[i]), min(reals[SLOWEST], chain.c[i])
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def extend_up(depth: Floats, speed: Floats, chain: Chain) -> int:
     """Lay the chain on upwards through all that is no faster than its fastest depth: how many layers."""
     ints, reals = chain.ints, chain.reals
@@ -83,7 +83,7 @@ def extend_up(depth: Floats, speed: Floats, chain: Chain) -> int:
     return int(last_first - ints[FIRST])
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def extend_down(depth: Floats, speed: Floats, chain: Chain) -> int:
     """Lay the chain on downwards through all that is no faster than its fastest depth: how many layers."""
     ints, reals = chain.ints, chain.reals

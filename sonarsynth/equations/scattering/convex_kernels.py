@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.scattering.convex_bodies import DARK, LIT, STEP, curvature_along, field_table
 from sonarsynth.equations.scattering.kirchhoff_kernels import ROOM, half_means, spacing
@@ -55,7 +55,7 @@ def convex_amplitude(
     return out
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _add(
     out: Complexes,
     corners: Floats,
@@ -91,7 +91,7 @@ def _add(
             out[i] += field * row[i] * complex(0.0, k[i] * math.exp(-decay * k[i] * k[i]) * size)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _field(cosine: float, m: float, table: Complexes, soft: bool) -> complex:
     """`convex_bodies.surface_field` where the incident wave meets a facet at that cosine, over that wave without a
     body."""

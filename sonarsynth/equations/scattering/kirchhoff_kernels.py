@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats
 
 Complexes = npt.NDArray[np.complex128]
@@ -58,7 +58,7 @@ def _prepared(
     return x, along[0], along[1], np.ascontiguousarray(np.atleast_1d(np.asarray(wavenumber, float))), factor, height
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _add(
     out: Complexes, corners: Floats, incident: Floats, scattered: Floats, k: Floats, weight: Complexes, height: Floats
 ) -> None:
@@ -69,7 +69,7 @@ def _add(
             out += row
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _facet(
     out: Complexes,
     v: Floats,
@@ -92,7 +92,7 @@ def _facet(
         out[i] *= factor * (k[i] * math.exp(-decay * k[i] * k[i]) if decay > 0.0 else k[i])
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def spacing(k: Floats) -> float:
     """Step of equally spaced wavenumbers, within rounding errors; NaN of others."""
     if k.size < 3:
@@ -104,7 +104,7 @@ def spacing(k: Floats) -> float:
     return step
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def half_means(
     out: Complexes, v: Floats, ux: float, uy: float, uz: float, k: Floats, room: Floats, pace: float
 ) -> tuple[float, float, float]:
@@ -131,7 +131,7 @@ def half_means(
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _turned(out: Complexes, path: float, k: Floats, pace: float) -> None:
     """Multiplies `out` (frequency,) by exp(-i k path)."""
     even = not math.isnan(pace)
@@ -145,7 +145,7 @@ def _turned(out: Complexes, path: float, k: Floats, pace: float) -> None:
         out[i] *= phase
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _powers(out: Complexes, a: float, b: float, c: float, limit: float, k: Floats, room: Floats) -> None:
     """`divided` of k times paths a <= b <= c (m): one series in k up to the `limit`."""
     scale = min(k.max(), limit)
@@ -164,7 +164,7 @@ def _powers(out: Complexes, a: float, b: float, c: float, limit: float, k: Float
             out[i] = divided(k[i] * a, k[i] * b, k[i] * c)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def series(room: Floats, e2: float, e3: float, gap: float, tolerance: float) -> int:
     """Terms (even or odd, j) of `divided` of q times phases with mean 0: sum_j of q^(2j) (even + i q odd).
 
@@ -185,7 +185,7 @@ def series(room: Floats, e2: float, e3: float, gap: float, tolerance: float) -> 
     return j
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def divided(a: float, b: float, c: float) -> complex:
     """`kirchhoff_integral.divided_exponential` of phases a <= b <= c with mean 0."""
     gap = c - a
@@ -209,6 +209,6 @@ def divided(a: float, b: float, c: float) -> complex:
     return complex(re, im)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _sinc(x: float) -> float:
     return math.sin(x) / x if x > 1e-160 else 1.0

@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba as nb
 import numpy as np
 
+from sonarsynth.compiling import compiled
 from sonarsynth.equations.kernels.lanes import LANES, least, load, splat, store, total, with_sign
 from sonarsynth.equations.kernels.phasors import (
     C0,
@@ -41,7 +41,7 @@ TERM = 8 * LANES
 FOUR = np.float32(4.0)
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def seeds(c: Any, s: Any, odd: bool) -> Any:
     """The recurrence from the phasor (c, s) of half a step t: cosines and sines at o and o - 1 steps, and 2 cos(2t)."""
     cc, ss = c * c, s * s
@@ -53,7 +53,7 @@ def seeds(c: Any, s: Any, odd: bool) -> Any:
     return c, c, s, zero - s, twice
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _sums(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, t: Any) -> Any:
     """Sums of cosine times four numbers, of sine times four more, for two directions with half steps (c, s), (d, t).
 
@@ -85,7 +85,7 @@ def _sums(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, 
     return (a0, a1, a2, a3, a4, a5, a6, a7), (b0, b1, b2, b3, b4, b5, b6, b7)
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _add_energies(sums: Any, energies: Any) -> Any:
     """Add |B|^2 of the beams (+el, +az), (+el, -az), (-el, +az), (-el, -az), from real and imaginary a, c, b, d."""
     a, a_, c, c_, b, b_, d, d_ = sums
@@ -103,7 +103,7 @@ def _add_energies(sums: Any, energies: Any) -> Any:
     return upper_port, upper_starboard, lower_port, lower_starboard
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _focus_and_fold(
     pairs: Any, bins: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float, low: int, folded: Any
 ) -> None:
@@ -124,14 +124,14 @@ def _focus_and_fold(
             _store_turned(folded, at + 6 * LANES, (x0 - x1) - (x2 - x3), (y0 - y1) - (y2 - y3), c, s)
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _store_turned(folded: Any, at: int, real: Any, imaginary: Any, c: Any, s: Any) -> None:
     x, y = turned(real, imaginary, c, s)
     store(folded, at, x)
     store(folded, at + LANES, y)
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _store_line(line: Any, at: int, sums: Any) -> None:
     """Store the sums over rows in the order of the second pass: Ss Ds take its cosines, Sd Dd its sines."""
     a, a_, b, b_, c, c_, d, d_ = sums
@@ -145,7 +145,7 @@ def _store_line(line: Any, at: int, sums: Any) -> None:
     store(line, at + 7 * LANES, d_)
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _first_pass(
     folded: Any, size: int, rows: int, heights: Any, odd: bool, inner: float, outer: float, frequency: float,
     spacing: float, groups: int, lines: Any,
@@ -163,7 +163,7 @@ def _first_pass(
             _store_line(lines, ((GROUPS + group) * columns + n) * TERM, lower)
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _second_pass(
     lines: Any, start: int, columns: int, odd: bool, steps: Any, turns_c: Any, turns_s: Any, frequency: float,
     spacing: float, groups: int, sums: Any,
@@ -189,7 +189,7 @@ def _second_pass(
         )
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _add_mirrored(energy: Any, elevation: int, sums: Any) -> None:
     """Add the sums (azimuth, 4) of one elevation >= 0 to the four quadrants of the image; beams on an axis once."""
     elevations, azimuths = energy.shape
@@ -206,7 +206,7 @@ def _add_mirrored(energy: Any, elevation: int, sums: Any) -> None:
             energy[below, starboard] += sums[i, 3]
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def lattice_energies(
     pairs: Any, bins: int, places: Any, weight: Any, delay: Any, heights: Any, odd_rows: bool, odd_columns: bool,
     half_pitch: float, frequency: float, spacing: float, azimuth: Any, elevation: Any,

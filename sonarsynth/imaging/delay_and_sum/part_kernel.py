@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba as nb
 import numpy as np
 
+from sonarsynth.compiling import compiled
 from sonarsynth.equations.kernels.lanes import LANES, load, splat, store, total
 from sonarsynth.equations.kernels.phasors import CHUNK, GROUPS, ZERO, group_steps, phasors, turned, weighted
 from sonarsynth.imaging.delay_and_sum.lattice_kernel import seeds
@@ -32,7 +32,7 @@ BEAM = 2 * GROUPS * LANES
 """float32 numbers of a beam: a complex number for each frequency of a chunk."""
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _sums(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, t: Any) -> Any:
     """Sum of cosine times sums minus i sine times differences, for two directions with half steps (c, s), (d, t)."""
     c, c_, s, s_, p = seeds(c, s, odd)
@@ -52,7 +52,7 @@ def _sums(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, 
     return (a0 + a3, a1 - a2), (b0 + b3, b1 - b2)
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _store_pair(terms: Any, at: int, above: Any, below: Any) -> None:
     store(terms, at, above[0] + below[0])
     store(terms, at + LANES, above[1] + below[1])
@@ -60,14 +60,14 @@ def _store_pair(terms: Any, at: int, above: Any, below: Any) -> None:
     store(terms, at + 3 * LANES, above[1] - below[1])
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _focused(pairs: Any, at: int, weight: float, delay: float, frequency: float, spacing: float) -> Any:
     x, y = weighted(pairs, at, weight)
     c, s = phasors(delay, frequency, spacing)
     return turned(x, y, c, s)
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _focus_and_fold(
     pairs: Any, bins: int, low: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float,
     groups: int, folded: Any,
@@ -85,7 +85,7 @@ def _focus_and_fold(
                     _store_pair(folded, (((group * 2 + side) * columns + n) * rows + m) * TERM, above, below)
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _group_turns(delays: Any, spacing: float) -> Any:
     """Cosines and sines (float32, flat) of 2 pi delay * 16 spacing: one group of frequencies on."""
     count = delays.size
@@ -102,7 +102,7 @@ def _group_turns(delays: Any, spacing: float) -> Any:
     return cosines, sines
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _first_pass(
     folded: Any, rows: int, heights: Any, odd: bool, rise: Any, turns: Any, inner: int, outer: int, frequency: float,
     spacing: float, groups: int, lines: Any,
@@ -124,7 +124,7 @@ def _first_pass(
                 _put_side(lines, ((GROUPS + group) * columns + n) * TERM, side, lower)
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _put_side(lines: Any, at: int, side: int, line: Any) -> None:
     """The line at +y, then its sum and difference with that at -y."""
     if side == 0:
@@ -134,14 +134,14 @@ def _put_side(lines: Any, at: int, side: int, line: Any) -> None:
         _store_pair(lines, at, (load(lines, at), load(lines, at + LANES)), line)
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
+@compiled(forceinline=True)
 def _add_turned(beams: Any, at: int, beam: Any, c: Any, s: Any) -> None:
     x, y = turned(beam[0], beam[1], c, s)
     store(beams, at, load(beams, at) + x)
     store(beams, at + LANES, load(beams, at + LANES) + y)
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _second_pass(
     lines: Any, start: int, columns: int, odd: bool, across: Any, steps: Any, middle: Any, turns: Any, at: int,
     azimuths: int, frequency: float, spacing: float, groups: int, beams: Any, row: int,
@@ -166,7 +166,7 @@ def _second_pass(
             f, v = turned(f, v, splat(turns[0][j]), splat(turns[1][j]))
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _add_energies(beams: Any, groups: int, energy: Any) -> None:
     """Add |B|^2 (elevation, azimuth) of a chunk."""
     elevations, azimuths = energy.shape
@@ -180,7 +180,7 @@ def _add_energies(beams: Any, groups: int, energy: Any) -> None:
             energy[i, j] += total(power)
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def part_energies(
     pairs: Any, bins: int, places: Any, weight: Any, delay: Any, heights: Any, odd_rows: bool, odd_columns: bool,
     rise: Any, across: Any, middle: Any, frequency: float, spacing: float,

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats
 from sonarsynth.receiver import BeamGrid
 
@@ -52,7 +52,7 @@ def cells_of(beams: BeamGrid) -> Cells:
     return Cells(first, (steps[0], steps[1]), azimuth, level, sine, np.sqrt(1.0 - sine**2))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _planes(corners: tuple[Floats, Floats, Floats], planes: Floats) -> bool:
     """Write inward normals (3, xyz) of the planes through the origin and each side of a triangle; returns whether its
     outer side, from which its corners are counter-clockwise, is seen."""
@@ -70,7 +70,7 @@ def _planes(corners: tuple[Floats, Floats, Floats], planes: Floats) -> bool:
     return bool(outer)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _mark(
     planes: Floats, box: Floats, azimuth: Floats, level: Floats, sine: Floats, cosine: Floats, covered: Words
 ) -> int:
@@ -92,7 +92,7 @@ def _mark(
     return count
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _cover(
     corners: Floats, faces: npt.NDArray[np.int32], boxes: Floats, first: tuple[float, float], step: tuple[float, float],
     azimuth: Floats, level: Floats, sine: Floats, cosine: Floats, outside: bool, covered: Words,

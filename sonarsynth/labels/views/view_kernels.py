@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Bools, Floats, Ints
 
 SIDES = 4
@@ -20,7 +20,7 @@ MOST = 3 + 2 * SIDES
 HALVINGS = 60
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def depth_in_view(p: Floats, side: int, half: Floats) -> float:
     """How far (m) a point (xyz) is on the inner side of one of the four edges of a view; half: sines and cosines."""
     if side < 2:
@@ -28,7 +28,7 @@ def depth_in_view(p: Floats, side: int, half: Floats) -> float:
     return float(math.sqrt(p[0] * p[0] + p[1] * p[1]) * half[2] + (5 - 2 * side) * p[2] * half[3])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def cross(a: Floats, b: Floats, side: int, half: Floats, out: Floats) -> None:
     """Where the edge from a, in view, to b, out of it, leaves."""
     low, high = 0.0, 1.0
@@ -42,7 +42,7 @@ def cross(a: Floats, b: Floats, side: int, half: Floats, out: Floats) -> None:
             high = middle
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def cut(corner: Floats, count: int, side: int, half: Floats, clipped: Floats) -> int:
     """The part (corner, xyz) of a polygon on the inner side of one edge of the view: how many corners."""
     size = 0
@@ -61,7 +61,7 @@ def cut(corner: Floats, count: int, side: int, half: Floats, clipped: Floats) ->
     return size
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def widen(p: Floats, slopes: Floats) -> None:
     """Widen bounds (4,) on the tangents of azimuth and elevation by a point at x >= 0, but for rounding."""
     across, up = p[1] / abs(p[0]), p[2] / math.sqrt(p[0] * p[0] + p[1] * p[1])
@@ -69,7 +69,7 @@ def widen(p: Floats, slopes: Floats) -> None:
     slopes[2], slopes[3] = min(slopes[2], up), max(slopes[3], up)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def steepest(a: Floats, b: Floats, out: Floats) -> bool:
     """The point between two ends where the elevation of an edge is extreme, if there is one."""
     d0, d1, d2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -80,7 +80,7 @@ def steepest(a: Floats, b: Floats, out: Floats) -> bool:
     return 0.0 < t < 1.0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def whole(corner: Floats, count: int, side: int, half: Floats) -> bool:
     """Whether all corners of a polygon are on the inner side of an edge of the view."""
     inner = True
@@ -89,7 +89,7 @@ def whole(corner: Floats, count: int, side: int, half: Floats) -> bool:
     return inner
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def bounds(corners: Floats, faces: Ints, azimuth: float, elevation: float, out: Floats) -> tuple[bool, bool]:
     """Bounds (4,) in azimuth and elevation (rad) of triangles (facet, 3) of points (vertex, xyz) within +-azimuth and
     +-elevation, in `out`; whether any part is in that view, and whether any is out of it."""
@@ -119,7 +119,7 @@ def bounds(corners: Floats, faces: Ints, azimuth: float, elevation: float, out: 
     return inside, outside
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def boxes_ahead(corners: Floats, faces: Ints, boxes: Floats) -> None:
     """Write bounds (facet, 4) in azimuth and elevation (rad) of the part of each triangle (facet, 3) of points (vertex,
     xyz) that is ahead, x > 0; NaN where none is, or a corner is NaN."""
@@ -146,7 +146,7 @@ def boxes_ahead(corners: Floats, faces: Ints, boxes: Floats) -> None:
             boxes[f, i] = math.atan(slopes[i]) if furthest > 0.0 else np.nan
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def bounds_of_whole(boxes: Floats, azimuth: float, elevation: float, inner: Bools, out: Floats) -> None:
     """Bounds (4,) of those of boxes (facet, 4) that are wholly within +-azimuth and +-elevation, in `out`: NaN of
     none; and write which."""
@@ -161,7 +161,7 @@ def bounds_of_whole(boxes: Floats, azimuth: float, elevation: float, inner: Bool
         out[:] = np.nan
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def under_arc(a: Floats, b: Floats) -> float:
     """Signed solid angle between the horizon and the arc of directions from a to b (xyz): the integral of the sine of
     elevation over azimuth."""
@@ -174,7 +174,7 @@ def under_arc(a: Floats, b: Floats) -> float:
     return float(2.0 * math.atan(math.tan(0.5 * turn) * (low + high) / (1.0 + low * high)))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def under_edge(a: Floats, b: Floats, half: Floats, ends: Floats) -> float:
     """As `under_arc`, of the part of an edge from a to b whose elevation is in view, and of the view's edge where that
     of a to b is beyond; half: as of `depth_in_view`."""
@@ -207,7 +207,7 @@ def under_edge(a: Floats, b: Floats, half: Floats, ends: Floats) -> float:
     return total
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def solid_angles(corners: Floats, faces: Ints, azimuth: float, elevation: float) -> tuple[float, float]:
     """Sums of the solid angles (sr) of triangles (facet, 3) of points (vertex, xyz) within +-azimuth and +-elevation,
     and of them whole. Source of the latter: Van Oosterom & Strackee (1983), IEEE Trans. Biomed. Eng. 30, 125, eq. 8."""

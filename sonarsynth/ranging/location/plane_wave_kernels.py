@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba as nb
 import numpy as np
 
+from sonarsynth.compiling import compiled
 from sonarsynth.ranging.ranging_kernels import template_sums
 
 
-@nb.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def tilted_energies(spectrum: Any, response: Any, late: Any, first: float, spacing: float, steps: int) -> Any:
     """Energy of beams tilted by -steps..steps of two tilts (tilt, tilt): sum over bins of |sum over sensors|^2.
 
@@ -43,7 +43,7 @@ def tilted_energies(spectrum: Any, response: Any, late: Any, first: float, spaci
     return energy
 
 
-@nb.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def shares(spectrum: Any, response: Any) -> Any:
     """Of each bin (bin,): energy that the best common wave explains, energy of all, and the power of the response.
 
@@ -62,7 +62,7 @@ def shares(spectrum: Any, response: Any) -> Any:
     return np.where(power > 0, wave / np.where(power > 0, power, 1.0), 0.0), energy, power
 
 
-@nb.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def explained(spectrum: Any, response: Any) -> Any:
     """What the best common wave makes each sensor hear (sensor, bin): an orthogonal projection, bin by bin."""
     sensors, bins = spectrum.shape
@@ -76,7 +76,7 @@ def explained(spectrum: Any, response: Any) -> Any:
     return projection
 
 
-@nb.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def add(pressure: Any, arrival: Any, wave: Any, sign: float) -> Any:
     """Add sign * wave (sensor, 2 half) to pressure (sensor, sample) about `arrival`, with the window of `cut_out`.
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba as nb
 import numpy as np
 
+from sonarsynth.compiling import compiled
 
-@nb.njit(cache=True, nogil=True)
+
+@compiled
 def exceeded(power: Any, index: Any, i: int, j: int, t: int, about: int) -> Any:
     """Whether the value of the beam at (i, j) and delay t has a neighbour that exceeds it, or equals it and comes
     before; neighbours: within one beam and `about` delays. Arrays as for `local_maxima`."""
@@ -27,7 +28,7 @@ def exceeded(power: Any, index: Any, i: int, j: int, t: int, about: int) -> Any:
     return False
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def local_maxima(power: Any, index: Any, row: Any, column: Any, floor: Any, edge: Any, about: int, end: int) -> Any:
     """Beams and delays (peak,) of values over `floor` (beam,) that no neighbour exceeds.
 
@@ -47,7 +48,7 @@ def local_maxima(power: Any, index: Any, row: Any, column: Any, floor: Any, edge
     return np.nonzero(peaks)
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def lobe_power(
     direction: Any, delay: Any, power: Any, position: Any, weight: Any, frequency: Any, taper: Any, near: Any
 ) -> Any:
@@ -64,7 +65,7 @@ def lobe_power(
     return brought
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def _brought(
     i: int, direction: Any, delay: Any, power: Any, position: Any, weight: Any, frequency: Any, taper: Any, near: Any
 ) -> Any:
@@ -95,7 +96,7 @@ def _brought(
     return brought
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def farthest(position: Any) -> Any:
     """Largest distance (m) of positions (sensor, xyz) from the origin."""
     reach = 0.0
@@ -104,7 +105,7 @@ def farthest(position: Any) -> Any:
     return reach
 
 
-@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _lobe(x: float, y: float, z: float, at: float, across: Any, weight: Any, real: Any, imaginary: Any) -> Any:
     """Modulus of the sum over sensors of what a table (delay,) has at `at` and what positions (xyz, sensor) add."""
     a = b = 0.0
@@ -117,7 +118,7 @@ def _lobe(x: float, y: float, z: float, at: float, across: Any, weight: Any, rea
     return np.sqrt(a * a + b * b)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def over_lobes(
     direction: Any, delay: Any, power: Any, position: Any, weight: Any, frequency: Any, taper: Any, near: Any,
     least: Any, table: Any, rate: float, error: float,
@@ -155,7 +156,7 @@ def over_lobes(
     return own
 
 
-@nb.njit(cache=True, nogil=True)
+@compiled
 def power_centres(
     power: Any, index: Any, row: Any, column: Any, b: Any, t: Any, offset: Any, width: Any, about: float, least: Any
 ) -> Any:

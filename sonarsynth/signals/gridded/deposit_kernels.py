@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.equations.kernels.vectors import add_scaled, cubics
 
 BLOCK = 128
@@ -25,7 +25,7 @@ ROWS = 7
 deviation). Weights of the modes may follow, then those of what they change by."""
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _wavefront(
     block: Any, node: Any, middle: Any, scale: Any, absorbed: Any, rate: float, steer: float, level: float, late: Any,
     position: Any, value: Any,
@@ -51,37 +51,37 @@ def _wavefront(
         value[4 * BLOCK + i] = block[5 * BLOCK + i] * near * gain
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _multiply(a: Any, b: Any, out: Any) -> None:
     for i in range(BLOCK):
         out[i] = a[i] * b[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _copy(row: Any, out: Any) -> None:
     for i in range(row.size):
         out[i] = row[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _amplify(out: Any, more: Any) -> None:
     for i in range(more.size):
         out[i] *= 1.0 + more[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _lean(out: Any, more: Any, scale: float) -> None:
     for i in range(more.size):
         out[i] += scale * more[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _recur(out: Any, earlier: Any) -> None:
     for i in range(BLOCK):
         out[i] = 2.0 * out[i] - earlier[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _mix(weight: Any, share: Any, node: int, first: int, size: int, modes: int, out: Any) -> None:
     """Weights of modes (mode * BLOCK,) at a node: of the pulses, and of what they change by, (change * mode * BLOCK,),
     in shares (change, node, path)."""
@@ -98,7 +98,7 @@ def _mix(weight: Any, share: Any, node: int, first: int, size: int, modes: int, 
                     mixed[i] += factor[i] * row[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _expand(value: Any, weight: Any, term_products: Any, modes: bool) -> None:
     """Terms of a block of paths, from row 4 of value on; there is the amplitude, which with modes moves to row 3."""
     if modes:
@@ -114,7 +114,7 @@ def _expand(value: Any, weight: Any, term_products: Any, modes: bool) -> None:
             _recur(value[c : c + BLOCK], value[d : d + BLOCK])
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _split(position: Any, half: float, rows: int, length: int, begin: Any, row: Any, fraction: Any) -> None:
     """First sample of the kernel on the circle, row of its table, and place in the row, from -1/2 to 1/2."""
     for i in range(BLOCK):
@@ -127,7 +127,7 @@ def _split(position: Any, half: float, rows: int, length: int, begin: Any, row: 
         fraction[i] = x - r - 0.5
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@compiled(fastmath=True)
 def deposit(
     table: Any,
     rows: int,
@@ -195,7 +195,7 @@ def deposit(
             grid[line * stride + i] += grid[line * stride + length + i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@compiled(fastmath=True)
 def combine(spectra: Any, first: int, factors: Any, pair: Any, power: Any, response: Any, mode: Any, out: Any) -> None:
     """Sum over terms of spectra (node, term, bin) times real factors (node, pair of term, bin) and power (term, bin).
 
@@ -223,7 +223,7 @@ def combine(spectra: Any, first: int, factors: Any, pair: Any, power: Any, respo
                     out[m, 1, b] += re[b] * response[k, 1, b] + im[b] * response[k, 0, b]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _turn(real: Any, imaginary: Any, c: Any, s: Any, re: Any, im: Any, out: Any) -> None:
     for i in range(real.size):
         cr, ci = re * c[i] - im * s[i], re * s[i] + im * c[i]
@@ -231,7 +231,7 @@ def _turn(real: Any, imaginary: Any, c: Any, s: Any, re: Any, im: Any, out: Any)
         out[2 * i + 1] += cr * imaginary[i] + ci * real[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _phasors(turn: complex, c: Any, s: Any) -> complex:
     """Powers 0 to RUN - 1 of turn, real and imaginary part, in four chains that do not wait for each other; power
     RUN."""
@@ -246,13 +246,13 @@ def _phasors(turn: complex, c: Any, s: Any) -> complex:
     return p3
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _accumulate(field: Any, weight: float, out: Any) -> None:
     for i in range(out.size):
         out[i] += weight * field[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@compiled(fastmath=True)
 def steer_back(field: Any, column: Any, weight: Any, delay: Any, gain: Any, first: int, out: Any) -> None:
     """Add the field at each hydrophone, delayed and amplified, to out (sensor, 2 * bin): pairs of real and imaginary
     part.

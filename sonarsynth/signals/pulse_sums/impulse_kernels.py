@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.equations.kernels.vectors import WIDTH, add_two
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@compiled(fastmath=True)
 def add_impulses(
     impulses: Any, angles: int, fractions: int, taps: int, source: Any, length: Any, gain: Any, start: Any,
     position: Any, scale: Any, cavity: Any, samples: int, pitch: int, out: Any,

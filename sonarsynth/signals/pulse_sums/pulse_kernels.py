@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from sonarsynth.compiling import compiled
 from sonarsynth.equations.kernels.vectors import WIDTH, add_two
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(fastmath=True, forceinline=True)
 def _mix(modes: Any, weight: Any, size: int, table: Any) -> None:
     """The sum (size,) of modes (mode * size,) times weight (mode,): an even number of them."""
     table[:] = 0.0
@@ -19,7 +19,7 @@ def _mix(modes: Any, weight: Any, size: int, table: Any) -> None:
             add_two(table, i, modes, k * size + i, weight[k], (k + 1) * size + i, weight[k + 1])  # type: ignore[call-arg]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@compiled(fastmath=True)
 def add_pulses(
     modes: Any, taps: int, fractions: int, weight: Any, first: Any, last: Any, source: Any, length: Any, start: Any,
     position: Any, rate: float, slowness: float, cavity: float, samples: int, pitch: int, out: Any,

@@ -1,0 +1,68 @@
+"""One way to compile kernels: cached on disk, and compiled anew when anything that they are made of has changed.
+
+Numba keeps what it compiled beside the file of a function, and forgets it when that file changes; not when another
+changes, from which the function calls something or takes a constant. Old and new code would be mixed after an update.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, TypeVar, overload
+
+import numpy as np
+from numba import njit
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+@overload
+def compiled(function: F, /) -> F: ...
+@overload
+def compiled(function: None = None, /, **options: Any) -> Callable[[F], F]: ...
+def compiled(function: Any = None, /, **options: Any) -> Any:
+    """The decorator of kernels: numba's `njit` without the interpreter lock, with NumPy's division by zero, cached.
+
+    Parameters: function, of what numba can compile; options, of `numba.njit`, besides.
+    Returns: the compiled function.
+    """
+    if function is None:
+        return partial(compiled, **options)
+    kernel = njit(nogil=True, error_model="numpy", **options)(function)
+    if isinstance(kernel, Dispatcher):  # it is the function itself where NUMBA_DISABLE_JIT is set
+        kernel._cache = _Cache(function)  # type: ignore[attr-defined, no-untyped-call]
+        list(_made_of(function, {function}))  # files as they are now, which may change before it is compiled
+    return kernel
+
+
+class _Cache(FunctionCache):
+    """Compiled code by the types of its arguments, the processor, and the code that it was made of."""
+
+    def _index_key(self, *types_and_processor: Any) -> tuple[Any, ...]:
+        made_of = sorted(set(_made_of(self._py_func, {self._py_func})))
+        key = super()._index_key(*types_and_processor)  # type: ignore[no-untyped-call]
+        return (*key, hashlib.sha256("\n".join(made_of).encode()).hexdigest())
+
+
+def _made_of(function: Any, seen: set[Any]) -> Iterator[str]:
+    """Constants that a function names, as text, and digests of the files of what it calls, and of what that calls."""
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        if isinstance(value, (bool, int, float, complex, str, tuple, np.generic, np.ndarray)):
+            yield f"{name} {value.tobytes().hex() if isinstance(value, np.ndarray) else repr(value)}"
+        elif file := getattr(sys.modules.get(getattr(value, "__module__", "")), "__file__", None):
+            yield _digest(file)
+        if isinstance(value, Dispatcher) and value.py_func not in seen:
+            seen.add(value.py_func)
+            yield from _made_of(value.py_func, seen)
+
+
+@cache
+def _digest(file: str) -> str:
+    """Digest of a file of this package, as it was when first asked for: when what it holds was imported."""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()

@@ -1,0 +1,58 @@
+"""A kernel is compiled anew when a file changes from which it calls something or takes a constant."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[2] / "sonarsynth"
+CALLED = """
+from sonarsynth.compiling import compiled
+FACTOR = {factor}
+@compiled
+def term(x):
+    return x + {term}
+"""
+CALLER = """
+from sonarsynth.compiling import compiled
+from called import FACTOR, term
+@compiled
+def product(x):
+    return FACTOR * middle(x)
+@compiled
+def middle(x):
+    return term(x)
+if __name__ == "__main__":
+    from caller import product
+    print(product(1.0), sum(product.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture
+def product(tmp_path: Path):  # type: ignore[no-untyped-def]
+    (tmp_path / "caller.py").write_text(CALLER)
+
+    def value(factor: float, term: float) -> list[float]:
+        called = tmp_path / "called.py"
+        text = CALLED.format(factor=factor, term=term)
+        if not called.exists() or called.read_text() != text:
+            called.write_text(text)
+        run = subprocess.run([sys.executable, "caller.py"], cwd=tmp_path, check=True, capture_output=True, text=True)
+        return [float(word) for word in run.stdout.split()]
+
+    return value
+
+
+def test_what_a_kernel_calls_and_the_constants_it_takes_are_those_of_today(product) -> None:  # type: ignore[no-untyped-def]
+    assert product(2.0, 1.0) == [4.0, 0]
+    assert product(2.0, 1.0) == [4.0, 1], "it is cached"
+    assert product(2.0, 9.0) == [20.0, 0], "what is called two calls down has changed"
+    assert product(3.0, 9.0) == [30.0, 0], "a constant has changed"
+
+
+def test_kernels_are_compiled_in_this_one_way() -> None:
+    apart = {PACKAGE / "compiling.py", *(PACKAGE / "validation" / "references").rglob("*.py")}
+    assert [file.name for file in PACKAGE.rglob("*.py") if "njit" in file.read_text() and file not in apart] == []
