@@ -121,9 +121,9 @@ def _row(entry: object, where: str) -> dict[str, Any]:
     """One entry of a file as columns."""
     if not isinstance(entry, dict):
         raise DetectionsError(f"{where}: must be an object with image_id, score and bbox")
-    row: dict[str, Any] = {"frame": _whole(entry, "image_id", where), "score": _number(entry, "score", where)}
+    row: dict[str, Any] = {"frame": _whole_number(entry, "image_id", where), "score": _number(entry, "score", where)}
     if "category_id" in entry:
-        row["category"] = _whole(entry, "category_id", where) - 1
+        row["category"] = _whole_number(entry, "category_id", where) - 1
     row |= {name: _number(entry, name, where) for name in MEASURED if entry.get(name) is not None}
     if row.get("range", 0.0) < 0.0:
         raise DetectionsError(f"{where}: range must not be negative")
@@ -147,7 +147,7 @@ def _number(entry: Mapping[str, Any], name: str, where: str) -> float:
     return float(value)
 
 
-def _whole(entry: Mapping[str, Any], name: str, where: str) -> int:
+def _whole_number(entry: Mapping[str, Any], name: str, where: str) -> int:
     value = _number(entry, name, where)
     if value != int(value) or not 0 <= value < 2**31:
         raise DetectionsError(f"{where}: {name} must be a whole number, 0 or more")

@@ -70,7 +70,7 @@ def _profile_of(sound_speed: SoundSpeed, stamps: tuple[tuple[int, int], ...] | N
             return _profile(sound_speed.depth, sound_speed.speed)
         case TemperatureSalinity():
             water = (sound_speed.temperature, sound_speed.salinity, sound_speed.depth)
-            return _profile(sound_speed.depth, *sea_water_speed(sound_speed.formula, *water, *_place(sound_speed)))
+            return _profile(sound_speed.depth, *sea_water_speed(sound_speed.formula, *water, *_site(sound_speed)))
         case Linear() | Thermocline() | Munk() | Catenary():
             return _profile(*sound_speed.nodes)
         case Cast():
@@ -84,7 +84,7 @@ def _profile(depth: npt.ArrayLike, speed: npt.ArrayLike, notes: tuple[str, ...] 
     return Profile(*nodes, notes)
 
 
-def _place(source: TemperatureSalinity | Cast, table: CastTable | None = None) -> tuple[float, float | None]:
+def _site(source: TemperatureSalinity | Cast, table: CastTable | None = None) -> tuple[float, float | None]:
     """Latitude and longitude in degrees, as they are written, else as the file says, else 45 degrees and None."""
     latitude, longitude = (None, None) if table is None else (table.latitude, table.longitude)
     latitude = latitude if source.latitude is None else float(np.degrees(source.latitude))
@@ -99,7 +99,7 @@ def _cast_profile(cast: Cast) -> Profile:
     salt = table.columns.get("salinity")
     if cast.salinity is not None and salt is not None and not np.isfinite(salt.values).any():  # its sensor failed
         table = replace(table, columns={name: column for name, column in table.columns.items() if name != "salinity"})
-    site = _place(cast, table)
+    site = _site(cast, table)
     water = {name: column.values for name, column in table.columns.items()}
     if "sound speed" in water:
         water["sound speed"] = np.where(water["sound speed"] == 0.0, np.nan, water["sound speed"])  # out of the water

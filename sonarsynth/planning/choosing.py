@@ -79,7 +79,7 @@ def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     scene, accuracy = plan.scene, plan.recipe.accuracy
     if not plan.products:  # nothing is traced
         return plan
-    sampled = _some(looks, 1 if _facets(scene) > LARGE_MESH_FACETS else MEASURED)
+    sampled = _measured_in(looks, 1 if _facets(scene) > LARGE_MESH_FACETS else MEASURED)
     bent = max((ranging_error(look.scene, look.profile, look.frames) for look in sampled), default=0.0)
     synthesis, by_synthesis = scene.physics.synthesis.resolve(
         Demand(np.sqrt(SYNTHESIS) * accuracy.cheap, accuracy.exact, lambda method: 0.0, plan.elements)
@@ -109,7 +109,7 @@ def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
             beamforming=steering,
             negligible=cut.faint * choices.negligible,
         ),
-        errors=Errors(cut.error, cut.whole, by_synthesis, by_rays, blurred),
+        errors=Errors(cut.error, cut.uncut, by_synthesis, by_rays, blurred),
     )
 
 
@@ -117,7 +117,7 @@ def _facets(scene: Scene) -> int:
     return sum(len(mesh.faces) for mesh in scene.meshes)
 
 
-def _some(looks: Sequence[SampledScene], count: int) -> list[SampledScene]:
+def _measured_in(looks: Sequence[SampledScene], count: int) -> list[SampledScene]:
     """Frames of the dataset to measure in, one a look: of different sequences, and along them."""
     real = [look for look in looks if look.real]
     chosen = [real[n] for n in np.unique(np.linspace(0, len(real) - 1, count).round().astype(int))]
@@ -141,7 +141,7 @@ class _ArrayModel:
     parts: int  # that the array is cut into
     occlusion: OcclusionPoint
     error: float  # of signals
-    whole: float = np.nan  # the same, where the array is not cut and its middle sees for all
+    uncut: float = np.nan  # the same, where the array is not cut and its middle sees for all
     faint: float = 1.0  # share of the echoes left out that is left out
 
 
@@ -169,7 +169,7 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
         return _ArrayModel(first, seeing, error)
     if error <= allowed:
         return _ArrayModel(1, seeing, error, undivided)
-    return replace(_finer(plan, measures, seeing, error, allowed), whole=undivided)
+    return replace(_finer(plan, measures, seeing, error, allowed), uncut=undivided)
 
 
 def _finer(

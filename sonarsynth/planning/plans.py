@@ -62,7 +62,7 @@ class Errors:
     """What a plan's choices err by."""
 
     expansion: float = float("nan")  # of signals, relative: of expanding paths over the array, and of faint ones
-    whole: float = float("nan")  # the same, where the array is not cut into subarrays
+    uncut: float = float("nan")  # the same, where the array is not cut into subarrays
     synthesis: float = float("nan")  # of signals, relative to their peak
     ranging: float = float("nan")  # m: of the method that turns delays into places
     image: float = float("nan")  # dB: of the energy of beams, root mean square within 20 dB of the brightest

@@ -90,8 +90,8 @@ class SnappingShrimp(SoundSource):
     times_field: ClassVar[str] = "snap_times"
     pulse_field: ClassVar[str] = "snap"
 
-    def place(self, bottom: float, time: float = 0.0) -> Floats:
-        """As `SoundSource.place`."""
+    def position_at(self, bottom: float, time: float = 0.0) -> Floats:
+        """As `SoundSource.position_at`."""
         x, y, *z = self.position
         return np.array([x, y, z[0] if z else self.height - bottom])
 
@@ -108,7 +108,7 @@ class SnappingShrimp(SoundSource):
 
     def model(self, bottom: float) -> PulseModel:
         """As `SoundSource.model`."""
-        return self.snap.at_depth(-float(self.place(bottom)[2]))
+        return self.snap.at_depth(-float(self.position_at(bottom)[2]))
 
     @property
     def level(self) -> float | None:

@@ -52,7 +52,7 @@ class SoundSource(Method):
     illuminates: bool = True
     """Whether its echoes are traced; if not, it is heard directly alone."""
 
-    def place(self, bottom: float, time: float = 0.0) -> Floats:
+    def position_at(self, bottom: float, time: float = 0.0) -> Floats:
         """Where it is (xyz) in m, over a bottom at this depth (m), at a time (s) since the start of the motions."""
         raise NotImplementedError(f"{type(self).__name__} is nowhere")
 
@@ -97,4 +97,4 @@ class SoundSource(Method):
         """What it emits `time` (s) after the instant of a frame, gain times as loud and width times as long."""
         now, model = start + time, self.model(bottom)
         motion = self.velocity(now), self.directivity(now)
-        return Emission(self.place(bottom, now), time, model, self.level, gain, width, *motion, self.illuminates)
+        return Emission(self.position_at(bottom, now), time, model, self.level, gain, width, *motion, self.illuminates)

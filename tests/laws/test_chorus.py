@@ -146,7 +146,7 @@ def test_snaps_are_poisson() -> None:
     snaps = draw_snaps(*_draw(heard_by(1e-2, 0.0, 30.0)))
     gaps = np.diff(np.sort(snaps.time)) * 1e-2 * np.pi * 50.0**2
     assert kstest(gaps, "expon").pvalue > 1e-3
-    assert kstest((np.hypot(*snaps.place.T) / 50.0) ** 2, "uniform").pvalue > 1e-3
+    assert kstest((np.hypot(*snaps.position.T) / 50.0) ** 2, "uniform").pvalue > 1e-3
     assert kstest((snaps.level - 185.0) / 5.0, "norm").pvalue > 1e-3
 
 
@@ -170,7 +170,7 @@ def test_windows_that_overlap_hear_the_same_snaps(clusters: Clusters | None) -> 
         both = [(n, index[row]) for n, row in enumerate(map(tuple, part.key.tolist())) if row in index]
         assert len(both) > 20 and (against is other or len(both) == len(part.key))
         a, b = (one.select(np.array(n)) for one, n in zip((part, against), zip(*both, strict=True), strict=True))
-        for name in ("place", "time", "level", "width", "sign", "thinning"):
+        for name in ("position", "time", "level", "width", "sign", "thinning"):
             assert (getattr(a, name) == getattr(b, name)).all(), name
 
 
@@ -180,7 +180,7 @@ def test_levels_and_widths_change_no_place() -> None:
     plain, other = (
         draw_snaps(Chorus(density=1e-2, **more), seed, who) for more in ({}, {"level": 170.0, "width": 0.3})
     )
-    assert (plain.place == other.place).all() and (plain.time == other.time).all()
+    assert (plain.position == other.position).all() and (plain.time == other.time).all()
     assert np.allclose(plain.level - other.level, 15.0)
 
 

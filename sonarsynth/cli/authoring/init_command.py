@@ -25,8 +25,8 @@ def ask(folder: Path) -> Answers:
             target=_asked(f"Target: {', '.join(SHAPES)}, or a mesh file in this folder", d.target, _shape(folder)),
             range=_asked("Range of the target (m)", d.range, positive),
             array=_asked("Array: romanis (508 hydrophones), or columns x rows 5 cm apart", "20x16", array_of),
-            frames=_asked("Frames", d.frames, _whole(1)),
-            seed=_asked("Seed of everything that is drawn at random", d.seed, _whole(0)),
+            frames=_asked("Frames", d.frames, _whole_number(1)),
+            seed=_asked("Seed of everything that is drawn at random", d.seed, _whole_number(0)),
         )
     except typer.Abort:
         raise KeyboardInterrupt from None
@@ -49,7 +49,7 @@ def _printable(text: str) -> str:
     return text.strip()
 
 
-def _whole(least: int) -> Callable[[str], int]:
+def _whole_number(least: int) -> Callable[[str], int]:
     def read(text: str) -> int:
         if int(text) < least:
             raise ValueError(f"{least} at least")

@@ -130,16 +130,19 @@ class DetectorReport:
     def conditions(self) -> Iterator[tuple[str, list[tuple[str, np.ndarray]]]]:
         """Masks (row,) of objects by category, range, aspect, snr and visibility; empty ones are left out."""
         objects = self.objects
-        yield "category", _held((name, objects.category == n) for n, name in enumerate(self.categories))
+        yield "category", _not_empty((name, objects.category == n) for n, name in enumerate(self.categories))
         for name, (unit, edges) in EDGES.items():
             values = getattr(objects, name)
             last = len(edges) - 2  # its upper limit belongs to it
             interval = np.minimum(np.searchsorted(edges, values, "right") - 1, last)
             interval = np.where(np.isfinite(values), interval, -1)
-            yield name, _held((_said(low, high, unit), interval == n) for n, (low, high) in enumerate(pairwise(edges)))
+            yield (
+                name,
+                _not_empty((_said(low, high, unit), interval == n) for n, (low, high) in enumerate(pairwise(edges))),
+            )
 
 
-def _held(groups: Iterator[tuple[str, np.ndarray]]) -> list[tuple[str, np.ndarray]]:
+def _not_empty(groups: Iterator[tuple[str, np.ndarray]]) -> list[tuple[str, np.ndarray]]:
     return [(name, rows) for name, rows in groups if rows.any()]
 
 

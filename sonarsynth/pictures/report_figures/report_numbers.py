@@ -48,7 +48,7 @@ def numbers_of(tree: xr.DataTree, warnings: Sequence[str] = (), progress: Progre
         "histograms": {name: _histogram(getattr(objects, name), whose) for name in QUANTITIES},
         "leakage": leakage(tree, built, split),
         "range_errors": _range_errors(tree, built),
-        "clouds": cloud_scores(tree, _some(built)) if "cloud" in tree.children else {},
+        "clouds": cloud_scores(tree, _judged_frames(built)) if "cloud" in tree.children else {},
         "baselines": {},
         "hardest": [],
         "warnings": list(warnings),
@@ -121,14 +121,14 @@ def _range_errors(tree: xr.DataTree, frames: Ints) -> dict[str, Any]:
     }
 
 
-def _some(frames: Ints) -> Ints:
+def _judged_frames(frames: Ints) -> Ints:
     """Those that are judged."""
     return frames if len(frames) <= MOST_JUDGED else frames[np.linspace(0, len(frames) - 1, MOST_JUDGED).astype(int)]
 
 
 def _judge(numbers: dict[str, Any], tree: xr.DataTree, built: Ints, progress: Progress | None) -> None:
     """Baselines on some frames, and the frames that the first of them is worst in."""
-    judged = _some(built)
+    judged = _judged_frames(built)
     methods = {kind: by_kind(kind) for kind in BASELINES}
     rows: dict[str, list[dict[str, Any]]] = {kind: [] for kind in methods}
     for done, (frame, view) in enumerate(views(tree, judged), 1):

@@ -13,7 +13,7 @@ from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.formula_validity import validity
 from sonarsynth.planning.notes.population_notes import once, population_notes
 from sonarsynth.planning.notes.source_notes import assumed_speed_notes, off_the_bottom
-from sonarsynth.planning.notes.target_notes import held, law_notes, mirror_notes, overlap_notes, view_notes
+from sonarsynth.planning.notes.target_notes import law_notes, mirror_notes, overlap_notes, view_notes, where_laws_hold
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import SUPPORT, extreme_waveforms
 from sonarsynth.recipe import Recipe
@@ -76,7 +76,7 @@ def stored_validity(recipe: Recipe, looks: Sequence[SampledScene]) -> tuple[str,
     """Where formulas and laws of the scenes hold and do not, one line each: as the store has them."""
     lines: list[str] = []
     for look in noted(looks):
-        lines += [*held(look), *validity(look.scene, look.profile)]
+        lines += [*where_laws_hold(look), *validity(look.scene, look.profile)]
     return once(lines, recipe)
 
 
@@ -101,7 +101,7 @@ def _shared(recipe: Recipe, looks: Sequence[SampledScene]) -> list[str]:
             split, world = recipe.split(look.frames[0].index), look.scene.world
             trajectory = look.scene.trajectory
             poses = tuple((t.motion, trajectory.start, trajectory.interval) for t in world.targets)
-            snaps = tuple(tuple(s.place(world.environment.depth).tolist()) for s in world.sources)
+            snaps = tuple(tuple(s.position_at(world.environment.depth).tolist()) for s in world.sources)
             for name, value in (("target poses", poses), ("snap positions", snaps)):
                 if value:  # scenes without any have nothing in common
                     splits_by_value[name].setdefault(value, set()).add(split)
@@ -128,16 +128,16 @@ def _cut(scene: Scene, uniform: bool) -> tuple[str, ...]:
 def _accuracy(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
     """Where the accuracy of the recipe costs a lot, or what the scene chooses does not keep within it."""
     lines, allowed, errors, count = [], plan.recipe.accuracy, plan.errors, plan.choices.subarrays
-    if count > 1 and errors.whole > 0.0:
+    if count > 1 and errors.uncut > 0.0:
         lines.append(
             f"accuracy.signal {allowed.signal:g} needs {count} subarrays, each traced by itself: with one the error is "
-            f"{errors.whole:.2g}"
+            f"{errors.uncut:.2g}"
         )
     if plan.choices.occlusion == "sensors" and plan.scene.physics.occlusion == "auto":
-        why = f"the error is {errors.whole:.2g}"
+        why = f"the error is {errors.uncut:.2g}"
         if allowed.signal < OWN_VIEW:
             why = f"what is hidden from a few alone errs by up to {OWN_VIEW:g} at these"
-        elif errors.whole <= allowed.signal:
+        elif errors.uncut <= allowed.signal:
             why += ", and may be more in sequences that were not measured in"
         lines.append(
             f"accuracy.signal {allowed.signal:g} needs the targets' occlusion from each hydrophone: with that from "

@@ -117,7 +117,7 @@ def check_shrimp(scene: Scene) -> None:
     """Every source must be in the water, and its pulse one that can be made and heard."""
     bottom_depth = scene.world.environment.depth
     for i, source in enumerate(scene.world.sources):
-        position = source.place(bottom_depth)
+        position = source.position_at(bottom_depth)
         if not np.abs(position).max() <= FARTHEST:
             raise FieldError(
                 ("scene", "world", "sources", i, "position"), f"is more than {FARTHEST:g} m from the origin"

@@ -17,7 +17,7 @@ assumed is another than the water's."""
 def standing_off(scene: Scene) -> tuple[str, ...]:
     """Names of the sources that are not on the bottom, to what the sonar knows of its depth."""
     bottom, error = scene.world.environment.depth, scene.sonar.bed_depth_error
-    height = {source.name: float(source.place(bottom)[2]) + bottom for source in scene.world.sources}
+    height = {source.name: float(source.position_at(bottom)[2]) + bottom for source in scene.world.sources}
     return tuple(name for name, up in height.items() if up > OFF * error)
 
 

@@ -39,7 +39,7 @@ def law_notes(look: SampledScene) -> list[str]:
     return lines
 
 
-def held(look: SampledScene) -> list[str]:
+def where_laws_hold(look: SampledScene) -> list[str]:
     """Where the law of each body of a scene holds or does not, one line at least a body."""
     lines: list[str] = []
     for target, law, body in zip(look.scene.world.targets, look.scene.laws, bodies(look), strict=True):

@@ -50,15 +50,15 @@ def schema_text() -> str:
 
 
 def _packed(value: Any) -> str:
-    return json.dumps(_whole(value), separators=(",", ":"), ensure_ascii=False)
+    return json.dumps(_with_whole_numbers(value), separators=(",", ":"), ensure_ascii=False)
 
 
-def _whole(node: Any) -> Any:
+def _with_whole_numbers(node: Any) -> Any:
     """Whole numbers without a point: of equal bounds, 1000 and 1000.0, `Annotated` gives the one that came first."""
     if isinstance(node, dict):
-        return {key: _whole(value) for key, value in node.items()}
+        return {key: _with_whole_numbers(value) for key, value in node.items()}
     if isinstance(node, (list, tuple)):
-        return [_whole(value) for value in node]
+        return [_with_whole_numbers(value) for value in node]
     return int(node) if isinstance(node, float) and node.is_integer() else node
 
 

@@ -154,14 +154,16 @@ def chorus_arrivals(
     of its reflections is lost (2 pi f sigma > 1 in the middle of the band) keeps its energy, with a random sign. Paths
     that are `FAINT` are left out.
     """
-    ring = np.clip(np.searchsorted(reach.edges, np.hypot(*(snaps.place - receiver.pose.position[:2]).T)), 1, None) - 1
+    ring = (
+        np.clip(np.searchsorted(reach.edges, np.hypot(*(snaps.position - receiver.pose.position[:2]).T)), 1, None) - 1
+    )
     stands_for = reach.stands_for[np.minimum(ring, len(reach.stands_for) - 1)]
     chosen = np.flatnonzero(snaps.thinning * stands_for < 1.0)
     snaps, louder = snaps.select(chosen), np.sqrt(stands_for[chosen])
     levels = np.where(louder > 1.0, reach.mean_level, snaps.level)
     heights = image_heights(medium.profile, medium.depth, float(depth(receiver.pose.position)), reach.images)
     emitted, at = (snaps.time - time)[:, None], receiver.pose.position[:2]
-    level = np.broadcast_to((snaps.place - at)[:, None], (len(chosen), len(heights.climb), 2))
+    level = np.broadcast_to((snaps.position - at)[:, None], (len(chosen), len(heights.climb), 2))
     velocity = np.zeros(2) if receiver.track is None else receiver.track.velocity[:2]
     delay = emitted + np.hypot(np.hypot(level[..., 0], level[..., 1]), heights.climb) * heights.slowness
     if velocity.any():

@@ -42,7 +42,7 @@ class Draw(IntEnum):
 class ListeningWindow(NamedTuple):
     """Who hears what."""
 
-    place: Floats  # (xy) m of the array, world
+    array: Floats  # (xy) m of the array, world
     start: float  # s of the window, since the start of the motions
     stop: float
     reach: float  # m
@@ -55,7 +55,7 @@ class ListeningWindow(NamedTuple):
 class ChorusSnaps:
     """Snaps of a chorus that may be heard in a window.
 
-    place       (snap, xy)   m    on the bottom, world
+    position    (snap, xy)   m    on the bottom, world
     time        (snap,)      s    since the start of the motions
     level       (snap,)      dB   peak source level re 1 uPa at 1 m
     width       (snap,)      -    number of the width, of `Chorus.widths`
@@ -64,7 +64,7 @@ class ChorusSnaps:
     key         (snap, 5)    -    cell along x, y and time, number in the cell, number in the cluster
     """
 
-    place: Floats
+    position: Floats
     time: Floats
     level: Floats
     width: Ints
@@ -102,12 +102,12 @@ def draw_snaps(chorus: Chorus, seed: int, listening: ListeningWindow) -> ChorusS
         angle, away = 2.0 * np.pi * drawn(Draw.CLUSTER_ANGLE), clusters.radius * np.sqrt(drawn(Draw.CLUSTER_RADIUS))
         position = position + away[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
         time = time + clusters.duration * drawn(Draw.CLUSTER_TIME)
-    away = np.hypot(*(position - listening.place).T)
+    away = np.hypot(*(position - listening.array).T)
     early = listening.start - np.hypot(away, listening.longer) / listening.slowest
     audible = (away <= listening.reach) & (time >= early) & (time <= listening.stop - away / listening.fastest)
     key, position, time = key[audible], position[audible], time[audible]
     return ChorusSnaps(
-        place=position,
+        position=position,
         time=time,
         level=chorus.level + chorus.deviation * _normal(drawn(Draw.LEVEL)),
         width=np.floor(WIDTHS * drawn(Draw.WIDTH)).astype(np.int64),
@@ -121,10 +121,10 @@ def _cells(chorus: Chorus, listening: ListeningWindow) -> Ints:
     """Cells (cell, xyt) that may hold what is heard, in order."""
     spread, lasts = (0.0, 0.0) if chorus.clusters is None else (chorus.clusters.radius, chorus.clusters.duration)
     reach = listening.reach + spread
-    low, high = (np.floor((listening.place + sign * reach) / SIDE).astype(np.int64) for sign in (-1, 1))
+    low, high = (np.floor((listening.array + sign * reach) / SIDE).astype(np.int64) for sign in (-1, 1))
     x, y = np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij")
     middle = SIDE * (np.stack([x.ravel(), y.ravel()], axis=1) + 0.5)
-    away, corner = np.hypot(*(middle - listening.place).T), np.sqrt(0.5) * SIDE + spread
+    away, corner = np.hypot(*(middle - listening.array).T), np.sqrt(0.5) * SIDE + spread
     near = away <= reach + corner
     x, y, away = x.ravel()[near], y.ravel()[near], away[near]
     farthest = np.hypot(np.minimum(away + corner, reach), listening.longer)
