@@ -185,6 +185,20 @@ def test_pulls_of_estimates_have_unit_variance() -> None:
     assert np.mean(single < 16.0) >= 0.99
 
 
+def test_the_predicted_error_of_a_time_is_what_it_errs_by() -> None:
+    """At any distance and level of noise, none among them; also where the faces have a null in the band."""
+    sonar, random, off = Sonar(assumed_sound_speed=C), np.random.default_rng(2), []
+    heard, pose = elements(sonar.array), Pose(np.array([0.0, 0.0, -5.0]), quaternion(np.pi / 2))
+    for noise in (0.0, 3e-5, 3e-4):
+        for distance in random.uniform(5.5, 25.0, 8):
+            source = distance * direction(random.uniform(-0.45, 0.45), -np.arcsin(5.0 / distance))
+            signals = hear_direct(heard, source, noise=noise, random=random)
+            found = SensorDelays().locate(signals, Receiver(pose, heard, sonar), Survey(10.0, WATER), 1)
+            off.append((found.time[0] - distance / C - envelope_late()) / found.time_error[0])
+    assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.3
+    assert np.max(np.abs(off)) < 4.0
+
+
 @pytest.mark.parametrize(("alike", "most"), [(0.0, 1.1), (0.5, 1.15)])
 def test_the_more_alike_neighbours_err_the_larger_errors_are_predicted(alike: float, most: float) -> None:
     """Delays of a sphere with errors that correlate by `alike` from row to row and from column to column."""

@@ -26,13 +26,12 @@ LONGEST_HALF = 2e-3
 """The same at most (s): bands whose pulses last longer tell no direct pulse from its echoes."""
 PERIODS = 2.0
 """The same in units of the inverse of the bandwidth, where that is more."""
-HOLLOW = 3e-3
-"""Power of a bin, over the loudest, below which faces have a null in the middle of the band: there the waveform holds
-twenty times as much of what cutting the pulse's tail off adds. Its peak erred by 16 to 76 ns (5 cm, 31 to 40 deg),"""
-MIDDLE = 0.8
-"""Share of the bins that is the middle of a band: at its ends, tapered, a null does nothing."""
+HOLLOW = 0.02
+"""Power of a bin over the loudest, times the taper of the band, below which faces have a null in the band: there the
+waveform holds much more of what cutting the pulse's tail off adds. Its peak erred by up to 76 ns (5 cm, 30 to 46 deg)
+"""
 LONGER = 2.0
-"""and by 0.2 ns as measured over a window so many times as long."""
+"""and by under 1 ns as measured over a window so many times as long."""
 DEAF = 1e-4
 """Mean square response (of one sensor on its axis) below which a bin counts as not heard at all."""
 DEAFEST = 1e-8
@@ -64,8 +63,9 @@ class Pulse:
     @property
     def hollow(self) -> bool:
         """Whether the faces have a null in the band."""
-        aside = int(0.5 * (1.0 - MIDDLE) * len(self.power))
-        return bool(float(self.power[aside : len(self.power) - aside].min()) < HOLLOW * self.power.max())
+        count = len(self.power)
+        taper = np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2
+        return bool(np.min(self.power / taper) < HOLLOW * self.power.max())
 
     @property
     def noise_to_signal(self) -> float:

@@ -14,8 +14,6 @@ from sonarsynth.products import REASONS, SourceEstimates
 from sonarsynth.ranging.location.pulse_times import Pulse, lag_variance
 from sonarsynth.receiver import Elements, Sonar
 
-TIME_FLOOR = 0.002
-"""Standard error of the time without any noise, in units of 1/bandwidth: absorption, and what is cut, skew a pulse."""
 AGREES = 9.0
 """The bottom is used where innovation squared over variance is no more: three standard errors, since a source that
 stands off the bottom by less than the wavefront can tell is pulled there."""
@@ -133,9 +131,7 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
     reason = RANGE if not np.sqrt(fix.covariance[2, 2]) <= FARTHEST * fix.curvature else ACCEPTED
     if not _in_water(wave, full, slope, by_angle, fall, knowledge):
         reason = OUTSIDE
-    time, time_error = _arrival(
-        pulse.longer or pulse, full, timing[3, 3] / max(wave.covariance[3, 3], 1e-300), sonar, knowledge.rounding
-    )
+    time, time_error = _arrival(pulse.longer or pulse, float(full[3, 3]), sonar, knowledge.rounding)
     if not np.isfinite(time):
         reason = BAND
     position, covariance = _position(wave, fix)
@@ -238,21 +234,18 @@ def _in_water(
     return bool(beyond <= 3 * np.sqrt(float(row @ p @ row) + slack))
 
 
-def _arrival(pulse: Pulse, full: Floats, unit: float, sonar: Sonar, rounding: float) -> tuple[float, float]:
+def _arrival(pulse: Pulse, fitted: float, sonar: Sonar, rounding: float) -> tuple[float, float]:
     """When (s) the pulse's envelope peaks at the array centre, and the standard error of that time (s).
 
-    The error is that of the envelope of the mean pulse, and what direction and curvature add at the array centre: of
-    the fitted time's variance all but the least, that of the mean of the lags; `unit` is the variance of a lag of
-    weight one.
+    The error is that of the envelope of the mean pulse in noise, and that of the wavefront's time, of variance `fitted`
+    (s2): what sensors that hear late or stand elsewhere shift does not show in the mean pulse.
     """
     # `waveform` holds it down
     undamped = np.minimum(1 + pulse.deaf * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)
     noise = max(pulse.noise, rounding) / np.maximum(pulse.power, 1e-300)
     low, high = sonar.band.low, sonar.band.high
     time, error = envelope_peak(pulse.frequency, pulse.template * undamped, low, high, noise)
-    tilted = max(float(full[3, 3]) - unit / float(np.sum(pulse.weight)), 0.0)
-    floor = TIME_FLOOR / (high - low)
-    return pulse.time + time, float(np.sqrt(error**2 + tilted + floor**2))
+    return pulse.time + time, float(np.hypot(error, np.sqrt(fitted)))
 
 
 def refused(reason: int) -> SourceFix:
