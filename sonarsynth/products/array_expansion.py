@@ -85,7 +85,7 @@ class ArrayExpansion:
         terms = getattr(self, name)
         if not terms.shape[1]:
             return np.zeros((len(terms), len(points)))
-        return np.asarray(terms @ _terms_at(points, self.aperture, terms.shape[1]).T)
+        return np.asarray((_terms_at(points, self.aperture, terms.shape[1]) @ terms.T).T)  # points are read one by one
 
     def largest(self, name: str) -> Floats:
         """Bound (path,) on the modulus of a quantity over the aperture."""

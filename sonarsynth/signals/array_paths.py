@@ -4,7 +4,7 @@ inf)."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -35,8 +35,9 @@ FINITE = (
 
 
 @dataclass(frozen=True, eq=False)
-class ArrayPaths:
-    """Arrivals as synthesis takes them: curvature for radius, and the level of the snap inside the amplitude."""
+class Wavefronts:
+    """When, how loud and from where paths reach points of the array: curvature for radius, and the level of the snap
+    inside the amplitude."""
 
     delay: Floats  # (path,) s at the array centre, of the middle of a facet's corners
     direction: Floats  # (path, xyz)
@@ -44,26 +45,20 @@ class ArrayPaths:
     amplitude: Floats  # (path,)
     loss: Floats  # (path,) dB of absorption at the band centre, inside amplitude
     expansion: ArrayExpansion  # (path,)
-    sound_speed: float  # m/s
-    aperture: float  # m: no hydrophone is farther out
-    phase: Floats  # (path,) rad, -pi/2 to pi/2: whole half turns are signs of the amplitude
-    variance: Floats  # (path,) s2: of the Gaussian that the pulse is blurred with
-    doppler: Floats  # (path,) the pulse lasts 1 + doppler times as long
-    coherent: Bools  # (path,) the pulse is differentiated, i f/centre
-    corner_delays: Floats  # (path, 3) s: delays over which the pulse is a mean; their sum is 0
-    coherent_fraction: Floats  # (path,) and
-    height_delay_std: Floats  # (path,) s: of `facet_pulses.rough_factor`
     occluded: Bools  # (path, sensor) hydrophones that a path does not reach; (path, 0): it reaches all
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
-    centre: float  # Hz, where the amplitudes hold
-    attenuation: float = 0.0  # dB/m there: absorption of what the way to a hydrophone is longer than to the centre
+    sound_speed: float  # m/s
+    aperture: float  # m: no hydrophone is farther out
+    attenuation: (
+        float  # dB/m at the band centre: absorption of what the way to a hydrophone is longer than to the centre
+    )
 
     @property
     def count(self) -> int:
         """Number of paths."""
         return self.delay.size
 
-    def select(self, keep: Ints) -> ArrayPaths:
+    def select(self, keep: Ints) -> Self:
         """The paths of these indices; the same where these are all, in order."""
         if len(keep) == self.count and (keep == np.arange(self.count)).all():
             return self
@@ -71,7 +66,21 @@ class ArrayPaths:
             name: value[keep] if isinstance(value, np.ndarray | ArrayExpansion) else value
             for name, value in vars(self).items()
         }
-        return ArrayPaths(**rows)
+        return type(self)(**rows)
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayPaths(Wavefronts):
+    """Arrivals as synthesis takes them: wavefronts, and what becomes of the pulse on each path."""
+
+    phase: Floats  # (path,) rad, -pi/2 to pi/2: whole half turns are signs of the amplitude
+    variance: Floats  # (path,) s2: of the Gaussian that the pulse is blurred with
+    doppler: Floats  # (path,) the pulse lasts 1 + doppler times as long
+    coherent: Bools  # (path,) the pulse is differentiated, i f/centre
+    corner_delays: Floats  # (path, 3) s: delays over which the pulse is a mean; their sum is 0
+    coherent_fraction: Floats  # (path,) and
+    height_delay_std: Floats  # (path,) s: of `facet_pulses.rough_factor`
+    centre: float  # Hz, where the amplitudes hold
 
 
 def array_paths(
@@ -162,7 +171,7 @@ def folded(phase: Floats) -> tuple[Floats, Floats]:
     return sign, np.where(np.abs(remainder) > 2e-16 * (1.0 + np.abs(phase)), remainder, 0.0)
 
 
-def towards(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
+def towards(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:
     """Unit vectors u = (R d - q)/|R d - q| (path, point, xyz) and |R d - q|/R (path, point) at points q (point,
     xyz)."""
     v = front.direction[:, None, :] - front.curvature[:, None, None] * points
@@ -175,14 +184,14 @@ BENT = 4
 """The first of the terms that turn the wavefront: a linear one is the motion of the array, which turns no wave."""
 
 
-def tilt(front: ArrayPaths, gradient: Floats) -> Floats:
+def tilt(front: Wavefronts, gradient: Floats) -> Floats:
     """What delay terms turn the wavefront by, (point, xyz, path), beside the sphere: -c times their gradient (xyz,
     point, term)."""
     slope = gradient[:, :, BENT:] @ front.expansion.delay[:, BENT:].T
     return np.asarray(-front.sound_speed * slope.swapaxes(0, 1))
 
 
-def arrival_directions(front: ArrayPaths, points: Floats) -> Floats:
+def arrival_directions(front: Wavefronts, points: Floats) -> Floats:
     """Slownesses of the wavefronts at points (point, xyz), times the speed of sound at the centre, (path, point, xyz):
     what element faces hear, and unit vectors of `towards` where rays are straight."""
     u, _ = towards(front, points)
@@ -191,7 +200,7 @@ def arrival_directions(front: ArrayPaths, points: Floats) -> Floats:
     return np.asarray(u + np.moveaxis(tilt(front, front.expansion.gradient(points, "delay")), 2, 0))
 
 
-def delay_and_gain(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
+def delay_and_gain(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:
     """Delay (s) after the array centre, and gain over it at the band centre, (path, point) each."""
     _, n = towards(front, points)
     square = np.einsum("pi,pi->p", points, points)
@@ -212,35 +221,27 @@ def lost(level: Floats) -> Floats:
     return np.asarray(np.exp(-NEPER * level))
 
 
-def reach(front: ArrayPaths) -> Floats:
+def reach(front: Wavefronts) -> Floats:
     """Bound (path,) on how long (s) before or after the array centre a wavefront meets any hydrophone."""
     return np.asarray(front.aperture / front.sound_speed + front.expansion.largest("delay"))
 
 
-def reference_of(front: ArrayPaths, middle: Floats, phase: Floats, variance: Floats) -> ArrayPaths:
+def reference_of(front: Wavefronts, middle: Floats, phase: Floats, variance: Floats) -> Wavefronts:
     """The front that a tile of paths is steered to, from the middle (column,) of their directions, curvatures,
     absorption and delay terms, and the change over the aperture that it takes."""
     norm = np.linalg.norm(middle[:3])
-    direction = middle[:3] if norm < 0.1 else middle[:3] / norm
-    delay, none = middle[None, 5 : 5 + front.expansion.delay.shape[1]], np.zeros((1, 0))
-    return ArrayPaths(
-        delay=np.zeros(1),
-        direction=direction[None] if norm >= 0.1 else np.array([[1.0, 0.0, 0.0]]),
+    direction = middle[:3] / norm if norm >= 0.1 else np.array([1.0, 0.0, 0.0])
+    delay, none, zero = middle[None, 5 : 5 + front.expansion.delay.shape[1]], np.zeros((1, 0)), np.zeros(1)
+    return Wavefronts(
+        delay=zero,
+        direction=direction[None],
         curvature=middle[3:4],
         amplitude=np.ones(1),
         loss=middle[4:5],
-        expansion=ArrayExpansion(delay, none, phase[None], variance[None], np.zeros(1), front.expansion.aperture),
+        expansion=ArrayExpansion(delay, none, phase[None], variance[None], zero, front.expansion.aperture),
+        occluded=np.zeros((1, 0), bool),
+        modes=none,
         sound_speed=front.sound_speed,
         aperture=front.aperture,
-        phase=np.zeros(1),
-        variance=np.zeros(1),
-        doppler=np.zeros(1),
-        coherent=np.zeros(1, bool),
-        corner_delays=np.zeros((1, 3)),
-        coherent_fraction=np.zeros(1),
-        height_delay_std=np.zeros(1),
-        occluded=np.zeros((1, 0), bool),
-        modes=np.zeros((1, 0)),
-        centre=front.centre,
         attenuation=front.attenuation,
     )

@@ -19,7 +19,7 @@ from sonarsynth.signals.array_paths import array_paths
 from sonarsynth.signals.direct_sum import attenuation
 from sonarsynth.signals.gridded.bins import bins_of
 from sonarsynth.signals.gridded.deposit import add_segment
-from sonarsynth.signals.segments import Segment, layout
+from sonarsynth.signals.segments import layout
 from sonarsynth.state import Emission
 
 ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
@@ -135,20 +135,10 @@ class GriddedSynthesis(Method):
         plan = layout(arrivals, front, snaps, elements, sonar, start, samples)
         out = np.zeros((elements.count, samples), self.precision)
         method = (self.width, self.oversampling, self.precision, self.tolerance)
-        done: list[Segment] = []
         for span in plan.stretches:
             paths, bins = bins_of(span, front.select(span.paths), sonar, absorption, self.tolerance)
+            origin, highest = start + span.first / fs, stop_frequency(sonar.antialias)
             add_segment(
-                out,
-                span.first,
-                span.samples,
-                paths,
-                elements,
-                bins,
-                origin=start + span.first / fs,
-                highest=stop_frequency(sonar.antialias),
-                method=method,
-                fresh=not any(p.first < span.first + span.samples and span.first < p.first + p.samples for p in done),
+                out, span.first, span.samples, paths, elements, bins, origin=origin, highest=highest, method=method
             )
-            done.append(span)
         return out, plan.outside

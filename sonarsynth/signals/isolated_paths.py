@@ -22,8 +22,7 @@ from sonarsynth.signals.filtered_pulse import (
     stretch_sizes,
     stretched_spectra,
 )
-from sonarsynth.signals.gridded.nodes import rounded_up
-from sonarsynth.signals.pulse_shapes import stretched
+from sonarsynth.signals.gridded.nodes import polynomials, rounded_up
 from sonarsynth.signals.segments import fast_length, layout
 from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
@@ -106,4 +105,4 @@ def _sent(waveform: Waveform, sonar: Sonar, samples: int, doppler: float) -> np.
     sizes = np.array(stretch_sizes(at_longest(waveform), chosen, widest))
     enough = np.flatnonzero(np.append(np.cumsum(sizes[::-1])[::-1], 0.0) <= STRETCH_TOLERANCE)[0]
     series = stretched_spectra(waveform, chosen, fs, samples, widest, int(max(enough, 1)))
-    return np.asarray((stretched(series, np.array([doppler / widest])) @ series)[0])
+    return np.asarray((polynomials(np.array([doppler / widest]), len(series)) @ series)[0])

@@ -5,27 +5,29 @@ A pulse of spectrum S, after a phase, a blur of variance v and a Doppler s, has 
 times what its facet does (`equations.scattering.facet_pulses`), a point on a smooth surface of few dimensions. What all
 paths share is taken to the spectrum. What differs is expanded in modes, sum_k weight[path, k] spectrum[k, bin], and
 with it the absorption, which may then have no terms of its own: first in the cosine and sine of phase, in Chebyshev
-polynomials of Doppler, in mean powers of the delays over a facet, and in values of exp(-v g), of what is absorbed and
-of what a rough facet sends at some frequencies; then, by singular values, in the fewest that these paths need (Eckart
-and Young, 1936).
+polynomials of Doppler and of what is absorbed, in mean powers of the delays over a facet, and in values of exp(-v g)
+and of what a rough facet sends at some frequencies; then, by singular values, in the fewest that these paths need
+(Eckart and Young, 1936).
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble.snap_pressure import ComplexArray
 from sonarsynth.equations.scattering.facet_pulses import mean_powers, rough_factor
 from sonarsynth.signals.array_paths import ArrayPaths
-from sonarsynth.signals.gridded.nodes import Axis, chebyshev, interpolation, rounded_up
+from sonarsynth.signals.gridded.nodes import Axis, analysis, chebyshev, interpolation, polynomials, rounded_up
+
+FEW = 4
+"""So many functions are not worth a reduction before they are multiplied by others."""
 
 SAMPLES = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 20, 24, 32, 48, 64, 96, 128)
-"""How many frequencies a blur or an absorption may be sampled at."""
+"""How many frequencies a blur may be sampled at."""
 
 MOST_PHASE = 12.0
 """rad: facets with corners further than this from their middle, at the highest frequency, have no series in them."""
@@ -53,20 +55,15 @@ def blur_exponent(frequency: Floats) -> Floats:
     return np.asarray(0.5 * (2.0 * np.pi * frequency) ** 2)
 
 
-def stretched(series: ComplexArray, doppler: Floats) -> Floats:
-    """Chebyshev polynomials (path, degree) at doppler (path,), -1 to 1, as many as the series (degree, bin) has."""
-    return np.asarray(np.cos(np.outer(np.arccos(np.clip(doppler, -1.0, 1.0)), np.arange(len(series)))))
-
-
 def reduction(weight: Floats, spectrum: ComplexArray, loudness: Floats, tolerance: float) -> Reduction:
     """The fewest modes of weight (path, given) @ spectrum (given, bin) times loudness (path,), to `tolerance` of the
     loudest path and of their root mean square."""
     sampled = spectrum[:, :: max(1, spectrum.shape[1] // 128)]
-    u, s, _ = np.linalg.svd(np.concatenate([sampled.real, sampled.imag], axis=1), full_matrices=False)
+    rows = np.asarray(np.linalg.qr(np.concatenate([sampled.real, sampled.imag], axis=1).T, mode="r")).T
     loud = np.multiply(weight.T, loudness, order="C")
     weighted = np.linalg.qr(loud.T, mode="r")
-    left, size, v = np.linalg.svd(weighted @ (u * s), full_matrices=False)
-    onto = (u * s) @ v.T
+    left, size, v = np.linalg.svd(weighted @ rows, full_matrices=False)
+    onto = rows @ v.T
     keep = _sizes(np.abs(onto.T @ loud)) > tolerance
     onto, size = onto[:, keep], size[keep]
     back = left[:, keep].T @ weighted / size[:, None]
@@ -106,27 +103,44 @@ def shape_modes(
     loudness = np.abs(front.amplitude) / np.abs(front.amplitude).max()
     weight: Floats = np.ones((front.count, 1))
     factor: Floats | ComplexArray = np.ones((1, frequency.size))
-    if front.variance.any() or (front.loss.any() and decay.any()) or front.coherent_fraction.any():
-        weight, factor = _softened(front, frequency, decay, tolerance)
+    if front.variance.any() or front.coherent_fraction.any():
+        weight, factor = _softened(front, frequency, tolerance)
+    if front.loss.any() and decay.any():
+        weight, factor = _times(weight, factor, *_absorbed(front.loss, decay, tolerance))
+    if len(factor) > FEW:
         fewer = reduction(weight, factor * spectrum, loudness, tolerance)
         weight, factor = weight @ fewer.onto, fewer.back @ factor
     if front.corner_delays.any():
         powers, waves = _powers(front.corner_delays, frequency, spectrum, tolerance)
         fewer = reduction(powers, waves * spectrum, loudness, tolerance)
-        powers, waves = powers @ fewer.onto, fewer.back @ waves
-        weight = (weight[:, :, None] * powers[:, None, :]).reshape(front.count, -1)
-        factor = (factor[:, None, :] * waves).reshape(-1, frequency.size)
-    spectra = factor * spectrum
-    if len(series):
-        doppler = stretched(series, front.doppler / widest)
-        weight = (weight[:, :, None] * doppler[:, None, :]).reshape(front.count, -1)
-        spectra = (factor[:, None, :] * series).reshape(-1, frequency.size)
+        weight, factor = _times(weight, factor, powers @ fewer.onto, fewer.back @ waves)
+    doppler = polynomials(front.doppler / (widest or 1.0), len(series) or 1)
+    weight, spectra = _times(weight, factor, doppler, series if len(series) else spectrum[None])
     if front.phase.any():
         turn = front.phase[:, None]
         weight = np.concatenate([weight * np.cos(turn), weight * np.sin(turn)], axis=1)
         spectra = np.concatenate([spectra, 1j * spectra])
     fewer = reduction(weight, spectra, loudness, tolerance)
     return Modes(weight @ fewer.onto, fewer.back @ spectra)
+
+
+def _times(weight: Floats, factor: Any, more: Floats, waves: Any) -> tuple[Floats, Any]:
+    """The product of weight (path, given) @ factor (given, bin) and more (path, other) @ waves (other, bin)."""
+    both = weight[:, :, None] * more[:, None, :]
+    return both.reshape(len(both), -1), (factor[:, None] * waves).reshape(both.shape[1] * both.shape[2], -1)
+
+
+def _absorbed(loss: Floats, decay: Floats, tolerance: float) -> tuple[Floats, Floats]:
+    """exp(-loss decay) of paths with a loss (path,): Chebyshev polynomials in it (path, degree), and of frequency
+    (degree, bin). The coefficient of degree n is 2 I_n(x), about 2 (x/2)^n/n!, x the most that is lost (Np)."""
+    most = float(np.abs(loss).max())
+    half = 0.5 * most * float(np.abs(decay).max())
+    count, size = 1, 2.0 * half
+    while size > tolerance:
+        count += 1
+        size *= half / count
+    lost = np.exp(-np.multiply.outer(most * chebyshev(count), decay))
+    return polynomials(loss / most, count), analysis(count) @ lost
 
 
 def _powers(
@@ -144,45 +158,26 @@ def _powers(
     return mean_powers(corners, scale, count).T[:, powers], waves[powers]
 
 
-def _softened(front: ArrayPaths, frequency: Floats, decay: Floats, tolerance: float) -> tuple[Floats, Floats]:
-    """What blur, absorption and rough facets leave at some frequencies (path, given), and their interpolation in the
-    logarithm of frequency (given, bin). Degrees of a product add up."""
+def _softened(front: ArrayPaths, frequency: Floats, tolerance: float) -> tuple[Floats, Floats]:
+    """What blur and rough facets leave at some frequencies (path, given), and their interpolation in the logarithm of
+    frequency (given, bin). Degrees of a product add up."""
     low, high = float(frequency[0]), float(frequency[-1])
     low = low if low > 0.0 else 0.1 * float(frequency[min(1, frequency.size - 1)]) or 1.0  # 0 Hz has no logarithm
     high = max(high, low)
     span = max(float(np.log(high / low)), 1e-3)
     position = 2.0 * np.log(np.maximum(frequency, low) / high) / span + 1.0
     steepest = float(front.variance.max() * blur_exponent(frequency)[-1])
-    rate = _spline(frequency.tobytes(), decay.tobytes())
-
-    def at(count: int) -> Floats:
-        return np.asarray(high * np.exp(0.5 * span * (chebyshev(count) - 1.0)))
-
-    def lost(loss: Floats, frequency: Floats) -> Floats:
-        return np.asarray(np.exp(-np.multiply.outer(rate(frequency), loss)))
-
-    sampled = slice(None, None, max(1, frequency.size // 64))
-    ends = np.array([front.loss.min(), front.loss.max()])
-    exact = lost(ends, frequency[sampled])
-    onto = ((n, interpolation(position[sampled], Axis(n))) for n in SAMPLES)
-    count = next((n for n, i in onto if np.abs(i @ lost(ends, at(n)) - exact).max() <= tolerance), SAMPLES[-1])
+    count, wide = 1, float(np.ceil(10.0 * span)) / 10.0
     if front.coherent_fraction.any():
         roughest = 2.0 * np.pi * high * float(front.height_delay_std.max())
-        count += _rough_samples(rounded_up(roughest, 1.25), float(np.ceil(10.0 * span)) / 10.0, tolerance) - 1
+        count += _rough_samples(rounded_up(roughest, 1.25), wide, tolerance) - 1
     if steepest > 0.0:
-        count += _samples(rounded_up(steepest, 1.25), float(np.ceil(10.0 * span)) / 10.0, tolerance) - 1
-    exponent = np.multiply.outer(front.variance, blur_exponent(at(count))) + np.multiply.outer(
-        front.loss, rate(at(count))
-    )
-    factor = np.exp(-exponent)
+        count += _samples(rounded_up(steepest, 1.25), wide, tolerance) - 1
+    at = high * np.exp(0.5 * span * (chebyshev(count) - 1.0))
+    factor = np.exp(-np.multiply.outer(front.variance, blur_exponent(at)))
     if front.coherent_fraction.any():
-        factor *= rough_factor(at(count), front.coherent_fraction, front.height_delay_std)
+        factor *= rough_factor(at, front.coherent_fraction, front.height_delay_std)
     return factor, np.asarray(interpolation(position, Axis(count)).T)
-
-
-@lru_cache(maxsize=64)
-def _spline(frequency: bytes, decay: bytes) -> CubicSpline:
-    return CubicSpline(np.frombuffer(frequency), np.frombuffer(decay))
 
 
 @lru_cache(maxsize=256)

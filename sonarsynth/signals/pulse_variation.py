@@ -17,7 +17,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.bubble.snap_pressure import ComplexArray
-from sonarsynth.signals.array_paths import ArrayPaths
+from sonarsynth.signals.array_paths import ArrayPaths, Wavefronts
 
 MOST_POWERS = 8
 """Powers of spread that pulses may be expanded in."""
@@ -40,24 +40,24 @@ class PulseVariation(NamedTuple):
 UNCHANGING = PulseVariation((), np.zeros((0, 0, 0)), 0.0)
 
 
-def turn_and_spread(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
+def turn_and_spread(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:
     """Turn (rad) and spread (s2), (path, point) each, at points (point, xyz)."""
     return front.expansion.over("phase", points), front.expansion.over("delay_variance", points)
 
 
-def changed(front: ArrayPaths, points: Floats, frequency: Floats) -> ComplexArray:
+def changed(front: Wavefronts, points: Floats, frequency: Floats) -> ComplexArray:
     """Factor (point, bin) on the pulse of one path at points (point, xyz), over that at the centre."""
     turn, spread = turn_and_spread(front, points)
     soft = 0.5 * np.multiply.outer(spread[0], (2.0 * np.pi * frequency) ** 2)
     return np.asarray(np.exp(1j * turn[0][:, None] - soft))
 
 
-def aperture_gradient(front: ArrayPaths, points: Floats) -> Floats:
+def aperture_gradient(front: Wavefronts, points: Floats) -> Floats:
     """Gradient (xyz, point, term) of the aperture terms at points (point, xyz); empty where no front has such terms."""
     return front.expansion.gradient(points, "delay", "phase", "delay_variance")
 
 
-def slopes(front: ArrayPaths, gradient: Floats, lowest: float, highest: float) -> Floats:
+def slopes(front: Wavefronts, gradient: Floats, lowest: float, highest: float) -> Floats:
     """Bounds (xyz, path) in rad/m on how fast pulses change along each axis, as a phase at the highest frequency.
 
     gradient (xyz, point, term): of the aperture terms, where it is looked at. A phase is as steep at all frequencies:
@@ -76,6 +76,8 @@ def slopes(front: ArrayPaths, gradient: Floats, lowest: float, highest: float) -
 def with_changes(front: ArrayPaths) -> ArrayPaths:
     """Paths, and after them the loudest of those that change, as they are elsewhere on the aperture: more and less
     blurred, and as loud as what turns, a quarter of a period ahead."""
+    if not (front.expansion.phase.any() or front.expansion.delay_variance.any()):
+        return front
     turn, spread = front.expansion.largest("phase"), front.expansion.largest("delay_variance")
     loud = np.abs(front.amplitude)
     copies = [np.arange(front.count)]
@@ -99,7 +101,7 @@ def _loudest(loud: Floats) -> Ints:
     return np.asarray(order[loud[order] > 0.0])
 
 
-def changes(front: ArrayPaths, frequency: Floats, spectrum: ComplexArray) -> PulseVariation:
+def changes(front: Wavefronts, frequency: Floats, spectrum: ComplexArray) -> PulseVariation:
     """What the pulses of paths change by, from the spectra (mode, bin) of modes that hold it (`with_changes`)."""
     turns, spreads = bool(front.expansion.phase.any()), bool(front.expansion.delay_variance.any())
     if not (turns or spreads):
@@ -126,7 +128,7 @@ class ResidualVariation(NamedTuple):
     paths: Ints  # (path,) those
 
 
-def rest(front: ArrayPaths, paths: Ints, variation: PulseVariation, tolerance: float) -> ResidualVariation:
+def rest(front: Wavefronts, paths: Ints, variation: PulseVariation, tolerance: float) -> ResidualVariation:
     """Of the tile of these paths; changes that add less than `tolerance` are left out, to all together or to the
     loudest."""
     none = np.zeros(0)
@@ -143,7 +145,7 @@ def rest(front: ArrayPaths, paths: Ints, variation: PulseVariation, tolerance: f
     return ResidualVariation(turn, spread, which, share[which], sampled)
 
 
-def pulses(front: ArrayPaths, paths: Ints, over: ResidualVariation, variation: PulseVariation) -> tuple[Floats, Floats]:
+def pulses(front: Wavefronts, paths: Ints, over: ResidualVariation, variation: PulseVariation) -> tuple[Floats, Floats]:
     """Weights (pulse, mode) of the pulses of paths, with what some of them change by, and how loud (pulse,) each is."""
     weight, loud = [front.modes[paths]], [np.abs(front.amplitude[paths])]
     for change, size in zip(over.which, over.size, strict=True):
@@ -162,7 +164,7 @@ def _middle(terms: Floats, rows: Ints) -> tuple[Floats, Floats]:
 
 
 def shares(
-    front: ArrayPaths, reference: ArrayPaths, which: Ints, variation: PulseVariation, points: Floats, dtype: str
+    front: Wavefronts, reference: Wavefronts, which: Ints, variation: PulseVariation, points: Floats, dtype: str
 ) -> Floats:
     """How much there is of pulses and of each change that counts, (1 + some, point, path), beside the reference."""
     if not which.size:

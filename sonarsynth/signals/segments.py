@@ -98,12 +98,12 @@ def _supports(
     roughest = float(front.height_delay_std[rough].max(initial=0.0))
 
     def each(turned: Bools, rough: Bools) -> Floats:
-        out, kinds = np.empty((2, front.count)), front.coherent + 2 * turned + 4 * rough
-        for kind in np.unique(kinds).tolist():
-            rows = kinds == kind
+        kinds = front.coherent + 2 * turned + 4 * rough
+        table = np.zeros((8, len(snaps), 2))
+        for kind in np.flatnonzero(np.bincount(kinds)).tolist():
             shape = PulseChanges(turned=kind & 2 > 0, sloped=kind % 2 == 1, rough=roughest * (kind >= 4))
-            out[:, rows] = np.array([support_of(w, chosen, shape) for w in longest])[arrivals.snap[rows]].T
-        return out
+            table[kind] = [support_of(w, chosen, shape) for w in longest]
+        return np.asarray(table[kinds, arrivals.snap].T)
 
     none, silent = np.zeros(front.count, bool), np.zeros(front.count, bool)
     plain = each(none, none)

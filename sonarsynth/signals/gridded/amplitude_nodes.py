@@ -12,7 +12,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.products.array_expansion import aperture_terms
 from sonarsynth.receiver import Elements
-from sonarsynth.signals.array_paths import ArrayPaths
+from sonarsynth.signals.array_paths import Wavefronts
 from sonarsynth.signals.gridded.interpolation import box_nodes
 from sonarsynth.signals.gridded.nodes import DEGREES, analysis
 
@@ -29,7 +29,7 @@ def _basis(elements: Elements, aperture: float, terms: int) -> tuple[tuple[int, 
     return (x, y, z), value.reshape(x * y * z, -1), triangle
 
 
-def variation(front: ArrayPaths, elements: Elements) -> Floats:
+def variation(front: Wavefronts, elements: Elements) -> Floats:
     """Amplitudes of paths over the box round the hydrophones (1 + 3 axes * 4 degrees, path), over the loudest.
 
     First the root mean square over the hydrophones; then, of each axis, bounds on the Chebyshev coefficients of degree
@@ -38,11 +38,10 @@ def variation(front: ArrayPaths, elements: Elements) -> Floats:
     if not front.expansion.amplitude.shape[1]:
         return np.zeros((0, front.count))
     shape, basis, triangle = _basis(elements, front.expansion.aperture, front.expansion.amplitude.shape[1])
-    terms = front.expansion.amplitude.T.copy()
-    terms[0] += 1.0
+    root, size = (matrix @ front.expansion.amplitude.T + matrix[:, :1] for matrix in (triangle, basis))
     rows = np.zeros((1 + 3 * DEGREES, front.count))
-    rows[0] = np.sqrt(((triangle @ terms) ** 2).sum(axis=0))
-    size = np.abs(basis @ terms).reshape(*shape, -1)
+    rows[0] = np.sqrt(np.einsum("tp,tp->p", root, root))
+    size = np.abs(size).reshape(*shape, -1)
     for axis, n in enumerate(shape):
         others = tuple(a for a in range(3) if a != axis)
         rows[1 + axis * DEGREES :][:n] = size.sum(axis=others)

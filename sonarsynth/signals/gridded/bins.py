@@ -15,8 +15,8 @@ from sonarsynth.receiver import Sonar
 from sonarsynth.signals.array_paths import ArrayPaths
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import at_longest, pulse_spectrum, stretch_sizes, stretched_spectra
-from sonarsynth.signals.gridded.nodes import rounded_up
-from sonarsynth.signals.pulse_shapes import MOST_PHASE, blur_exponent, shape_modes, stretched
+from sonarsynth.signals.gridded.nodes import polynomials, rounded_up
+from sonarsynth.signals.pulse_shapes import MOST_PHASE, blur_exponent, shape_modes
 from sonarsynth.signals.pulse_variation import (
     UNCHANGING,
     PulseVariation,
@@ -158,10 +158,9 @@ def _shared(
     share that."""
     if len(series):
         low, high = float(front.doppler.min()), float(front.doppler.max())
-        spectrum = (stretched(series, np.array([0.5 * (low + high) / widest])) @ series)[0]
         # the ends of a smooth series differ most
-        bend = stretched(series, np.array([low, high]) / widest) @ series
-        if np.abs(bend[1] - bend[0]).sum() <= SHAPES * tolerance * np.abs(spectrum).sum():
+        first, spectrum, last = polynomials(np.array([low, 0.5 * (low + high), high]) / widest, len(series)) @ series
+        if np.abs(last - first).sum() <= SHAPES * tolerance * np.abs(spectrum).sum():
             series = series[:0]
     least = float(front.variance.min())
     spread = float(front.variance.max()) - least

@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import irfft, next_fast_len, rfft
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Bools, Floats
 from sonarsynth.equations.noise.filters import kaiser_bessel, kaiser_bessel_beta, kaiser_bessel_transform
 from sonarsynth.receiver import Elements
 from sonarsynth.signals.array_paths import (
     NEPER,
-    ArrayPaths,
+    Wavefronts,
     arrival_directions,
     delay_and_gain,
     lost,
@@ -38,10 +38,10 @@ class Kernel(NamedTuple):
     """A Kaiser-Bessel kernel on the grid that the paths are deposited on."""
 
     width: int  # samples, even
-    beta: float
     taps: npt.NDArray[Any]  # (row * 4 * lane,) a cubic in the fraction of a sample for each row and tap
     lanes: int  # taps, padded to a multiple of 8
     circle: int  # samples of the grid
+    spectrum: Floats  # (bin,) of the kernel
 
 
 @lru_cache(maxsize=64)
@@ -54,7 +54,27 @@ def kernel(width: int, oversampling: float, circle: int, dtype: str) -> Kernel:
     taps = np.zeros((rows, 4, lanes))
     value = kaiser_bessel(fraction[:, :, None] + np.arange(width) - width / 2, width, beta)
     taps[:, :, :width] = np.linalg.inv(np.vander(x, increasing=True)) @ value
-    return Kernel(width, beta, taps.astype(dtype).ravel(), lanes, circle)
+    spectrum = kaiser_bessel_transform(np.arange(circle // 2 + 1) / circle, width, beta)
+    return Kernel(width, taps.astype(dtype).ravel(), lanes, circle, spectrum)
+
+
+class Steering(NamedTuple):
+    """What the reference of a tile has at its nodes."""
+
+    points: Floats  # (node, xyz)
+    delay: Floats  # (node,) s after the array centre
+    nearness: Floats  # (node,) gain of the sphere alone
+    slowness: Floats  # (node, yz) of `arrival_directions`
+
+    @staticmethod
+    def at(points: Floats, reference: Wavefronts) -> Steering:
+        """That of a reference."""
+        delay, direction = delay_and_gain(reference, points)[0][0], arrival_directions(reference, points)[0]
+        return Steering(points, delay, 1.0 / towards(reference, points)[1][0], np.ascontiguousarray(direction[:, 1:]))
+
+    def rows(self, rows: slice) -> Steering:
+        """At some of the nodes."""
+        return Steering(*(column[rows] for column in self))
 
 
 class Stage(NamedTuple):
@@ -63,8 +83,10 @@ class Stage(NamedTuple):
     aim: TileSettings
     bins: Bins
     origin: float  # s
-    grid: Kernel
-    scale: float  # from spectra to samples
+    first: int  # sample of the window at the origin
+    samples: int  # of the stretch
+    grid: Kernel  # that paths are deposited on
+    wave: Kernel  # of time at twice the sampling rate, that hydrophones hear
     dtype: str
 
 
@@ -72,20 +94,19 @@ def add_segment(
     out: npt.NDArray[Any],
     first: int,
     samples: int,
-    front: ArrayPaths,
+    front: Wavefronts,
     elements: Elements,
     bins: Bins,
     *,
     origin: float,
     highest: float,
     method: tuple[int, float, str, float],
-    fresh: bool,
 ) -> None:
     """Add to out (sensor, sample) the pressure of paths in a stretch that holds the whole of their pulses.
 
     The stretch begins at `origin` (s) and at sample `first` of out, which may be negative, and has `samples`, even.
     highest (Hz) is the stop edge of the filter; method is width, oversampling, precision and tolerance of
-    `GriddedSynthesis`; fresh says that out is silent there.
+    `GriddedSynthesis`.
     """
     width, oversampling, dtype, tolerance = method
     circle = 2 * int(next_fast_len(int(np.ceil(highest * oversampling / bins.step)) + width, real=True))
@@ -103,97 +124,79 @@ def add_segment(
         bins=used,
         circle=circle,
     )
-    stage = Stage(aim, bins, origin, grid, samples * bins.step, dtype)
-    spectra = np.zeros((elements.count, samples // 2 + 1), np.result_type(dtype, np.complex64))
-    sensor_spectra = spectra.view(dtype)[:, 2 * bins.first : 2 * (bins.first + used)]
+    wave = kernel(-8 * (-width // 8), samples * bins.step / highest, 2 * samples, dtype)  # as wide as its lanes
+    stage = Stage(aim, bins, origin, first, samples, grid, wave, dtype)
     for tile in tiles(front, aim):
-        _add_tile(sensor_spectra, tile, front.select(tile.paths), stage)
-    begin, end = max(first, 0), min(first + samples, out.shape[1])
-    piece = irfft(spectra, samples, axis=1, overwrite_x=True)[:, begin - first : end - first]
-    if fresh:
-        out[:, begin:end] = piece
+        _add_tile(out, tile, front.select(tile.paths), stage)
+
+
+def _add_tile(out: npt.NDArray[Any], tile: Tile, paths: Wavefronts, stage: Stage) -> None:
+    """Add the pressure of a tile at the hydrophones to out (sensor, sample)."""
+    from sonarsynth.signals.gridded.deposit_kernels import hear
+
+    elements, bins, dtype = stage.aim.elements, stage.bins, stage.dtype
+    steering, alone = Steering.at(tile.nodes(elements), tile.reference), paths.count == 1
+    field = np.zeros((len(steering.points), stage.samples + 1), np.result_type(dtype, np.complex64))
+    some = field[:, bins.first : bins.first + bins.frequency.size]
+    if alone:  # everything is steered to it: the field is that of the snap, through its face
+        power, response = _power(tile, stage, stage.wave.spectrum), _responses(paths.modes, stage)
+        some[:] = (_faces(tile, steering, stage) * power * response)[:, 0]
     else:
-        out[:, begin:end] += piece
-
-
-def _add_tile(sensor_spectra: npt.NDArray[Any], tile: Tile, paths: ArrayPaths, stage: Stage) -> None:
-    """Add the spectra of a tile at the hydrophones to sensor_spectra (sensor, re and im of bins)."""
-    from sonarsynth.signals.gridded.deposit_kernels import steer_back
-
-    elements, bins, dtype = stage.aim.elements, stage.bins, sensor_spectra.dtype
-    points = tile.nodes(elements)
-    alone = paths.count == 1
-    field = _alone(tile, paths, points, stage) if alone else _deposited(tile, paths, points, stage)
+        _deposit(field, tile, paths, steering, stage)
     if tile.reference.expansion.phase.any() or tile.reference.expansion.delay_variance.any():
-        field = _changed(field, tile, points, stage)
+        some *= changed(tile.reference, steering.points, bins.frequency)
     delay, gain = delay_and_gain(tile.reference, elements.position)
     late = delay[0] + (paths.delay[0] - stage.origin if alone else 0.0)
     gain = gain[0] * elements.gain * (paths.amplitude[0] if alone else 1.0)
     if alone and paths.occluded.shape[1]:
         gain = gain * ~paths.occluded[0]
-    onto, column, weight = to_sensors(elements, tile.axes, dtype.name)
-    field = field.reshape(len(points) // weight.shape[1], -1)
+    onto, column, weight = to_sensors(elements, tile.axes, dtype)
+    wave = irfft(field, 2 * stage.samples, axis=1, overwrite_x=True)
+    wave = np.stack([wave[:, ::2], wave[:, 1::2]], axis=1).reshape(-1, weight.shape[1] * 2 * stage.samples)
     if onto is not None:
-        field = onto @ field
-    field = field.reshape(len(field), weight.shape[1], -1)
-    steer_back(field, column, weight, late * bins.step, gain, bins.first, sensor_spectra)
+        wave = onto @ wave
+    wave = wave.reshape(len(wave), weight.shape[1], 2, stage.samples)
+    place, kernel = -late * bins.step * 2 * stage.samples, stage.wave
+    hear(wave, column, weight, place, gain, kernel.taps, kernel.lanes, stage.first, out)
 
 
-def _alone(tile: Tile, path: ArrayPaths, points: Floats, stage: Stage) -> npt.NDArray[Any]:
-    """The field (node, 2, bin) of one path that everything is steered to: that of the snap, through its face."""
-    faces = _faces(tile, points, stage)
-    response = _responses(path.modes, stage)
-    return np.asarray(faces * _power(tile, stage, np.ones(1)) * response)
-
-
-def _changed(field: npt.NDArray[Any], tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
-    """The field (node, 2, bin) with what pulses change by at each node, as the reference of the tile does."""
-    value = (field[:, 0] + 1j * field[:, 1]) * changed(tile.reference, points, stage.bins.frequency)
-    return np.stack([value.real, value.imag], axis=1).astype(stage.dtype)
-
-
-def _deposited(tile: Tile, paths: ArrayPaths, points: Floats, stage: Stage) -> npt.NDArray[Any]:
-    """The field (node, 2, bin) of a tile at its nodes, steered to its reference: real and imaginary part."""
+def _deposit(field: npt.NDArray[Any], tile: Tile, paths: Wavefronts, steering: Steering, stage: Stage) -> None:
+    """Add a tile, steered to its reference, to the field (node, bin) at its nodes."""
     from sonarsynth.signals.gridded.deposit_kernels import combine
 
     bins, grid = stage.bins, stage.grid
-    last = bins.first + bins.frequency.size
-    delay_std = kaiser_bessel_transform(np.arange(bins.first, last) / grid.circle, grid.width, grid.beta)
-    power = _power(tile, stage, delay_std)
+    power = _power(tile, stage, stage.wave.spectrum[: grid.spectrum.size] * grid.spectrum[: stage.wave.spectrum.size])
     mode = np.array(tile.terms)[:, 3]
     response = _responses(tile.modes.T[: mode.max() + 1], stage)
     _, pair = face_pairs(tile.terms)
     table = _packed(paths, tile, bins.changes, (paths.delay - stage.origin) * (grid.circle * bins.step))
-    field = np.empty((len(points), 2, bins.frequency.size), stage.dtype)
     group = max(1, LARGEST // (len(tile.terms) * grid.circle))
-    for first in range(0, len(points), group):
+    for first in range(0, len(field), group):
         rows = slice(first, first + group)
-        deposits = _deposits(table, paths, tile, points, rows, stage)
-        spectra, faces = rfft(deposits[:, :, : grid.circle], axis=2), _faces(tile, points[rows], stage)
+        some = steering.rows(rows)
+        deposits = _deposits(table, paths, tile, some, paths.occluded.T[rows], stage)
+        spectra, faces = rfft(deposits[:, :, : grid.circle], axis=2), _faces(tile, some, stage)
         combine(spectra, bins.first, faces, pair, power, response, mode, field[rows])
-    return field
 
 
 def _deposits(
-    table: Floats, paths: ArrayPaths, tile: Tile, nodes: Floats, rows: slice, stage: Stage
+    table: Floats, paths: Wavefronts, tile: Tile, steering: Steering, occluded: Bools, stage: Stage
 ) -> npt.NDArray[Any]:
-    """The grid (node, term, sample) of a tile at some of its nodes (node, xyz)."""
+    """The grid (node, term, sample) of a tile at some of its nodes; occluded (node, path) from those, or (0, path)."""
     from sonarsynth.signals.gridded.deposit_kernels import deposit
 
-    points, grid, reference = nodes[rows], stage.grid, tile.reference
+    points, grid = steering.points, stage.grid
     rate = grid.circle * stage.bins.step
-    steer, _ = delay_and_gain(reference, points)
-    middle, level = arrival_directions(reference, points), towards(reference, points)[1]
     late, louder, lean = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0))
-    share = shares(paths, reference, tile.changes, stage.bins.changes, points, stage.dtype)
+    share = shares(paths, tile.reference, tile.changes, stage.bins.changes, points, stage.dtype)
     if paths.expansion.delay.shape[1]:
         late = paths.expansion.over("delay", points).T * rate
         if stage.aim.elements.face > 0.0:
             lean = np.ascontiguousarray(tilt(paths, paths.expansion.gradient(points, "delay")[1:]))
     if paths.expansion.amplitude.shape[1]:
         louder = np.ascontiguousarray(paths.expansion.over("amplitude", points).T)
-    if paths.occluded.any():
-        louder = np.where(paths.occluded.T[rows], -1.0, louder if louder.size else 0.0)
+    if occluded.any():
+        louder = np.where(occluded, -1.0, louder if louder.size else 0.0)
     farther = paths.attenuation * paths.sound_speed / rate  # dB a sample
     out = np.zeros((len(points), len(tile.terms), grid.circle + grid.lanes), stage.dtype)
     deposit(
@@ -201,9 +204,9 @@ def _deposits(
         table.shape[1],
         paths.count,
         points,
-        steer[0] * rate,
-        1.0 / level[0],
-        np.ascontiguousarray(middle[0, :, 1:]),
+        steering.delay * rate,
+        steering.nearness,
+        steering.slowness,
         np.array([1.0 / d if d > 0 else 0.0 for d in tile.deviation[:2]]),
         np.array([NEPER * farther, farther / (tile.deviation[2] or 1.0)]),
         late,
@@ -221,7 +224,7 @@ def _deposits(
     return out
 
 
-def _packed(paths: ArrayPaths, tile: Tile, variation: PulseVariation, position: Floats) -> Floats:
+def _packed(paths: Wavefronts, tile: Tile, variation: PulseVariation, position: Floats) -> Floats:
     """Paths in blocks of rows (block, row, path), padded with silent ones: what `deposit` reads."""
     from sonarsynth.signals.gridded.deposit_kernels import BLOCK
 
@@ -238,37 +241,38 @@ def _packed(paths: ArrayPaths, tile: Tile, variation: PulseVariation, position: 
 
 
 def _responses(weight: Floats, stage: Stage) -> npt.NDArray[Any]:
-    """Spectra (mode, 2, bin) of pulses, real and imaginary part: sums, by weight (mode, mode of all paths), or that of
-    all paths where they have no modes."""
+    """Spectra (mode, bin) of pulses: sums, by weight (mode, mode of all paths), or that of all paths where they have no
+    modes."""
     bins = stage.bins
-    value = (weight @ bins.modes if len(bins.modes) else bins.spectrum[None]) * stage.scale
-    return np.stack([value.real, value.imag], axis=1).astype(stage.dtype)
+    value = weight @ bins.modes if len(bins.modes) else bins.spectrum[None]
+    return np.asarray(value * (2.0 * stage.samples * bins.step)).astype(np.result_type(stage.dtype, np.complex64))
 
 
-def _power(tile: Tile, stage: Stage, delay_std: Floats) -> npt.NDArray[Any]:
-    """Real factor (term, bin) of each term's spectrum: the polynomials of absorption, without the blur (bin,)."""
-    relative = stage.bins.relative
-    loss = lost(tile.reference.loss * relative) / delay_std
+def _power(tile: Tile, stage: Stage, spectrum: Floats) -> npt.NDArray[Any]:
+    """Real factor (term, bin) of each term's spectrum: the polynomials of absorption, over the spectrum (bin,) of the
+    kernels, from 0 Hz on."""
+    relative, first = stage.bins.relative, stage.bins.first
+    loss = lost(tile.reference.loss * relative) / spectrum[first : first + relative.size]
     decay = -NEPER * tile.deviation[2] * relative
     degree = np.array(tile.terms)[:, 2]
     power = np.cumprod(np.concatenate([[loss], decay / np.arange(1, degree.max() + 1)[:, None]]), axis=0)
     return np.asarray(power.astype(stage.dtype)[degree])
 
 
-def _faces(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+def _faces(tile: Tile, steering: Steering, stage: Stage) -> npt.NDArray[Any]:
     """Real factor (node, pair, bin) of the spectra of terms, by `face_pairs`: the polynomials of the face's
     directivity, and what the longer way of the reference loses at a frequency beside that at the band centre."""
     f, dtype, face, reference = stage.bins.frequency, stage.dtype, stage.aim.elements.face, tile.reference
     degrees, _ = face_pairs(tile.terms)
     if face == 0.0 and not reference.attenuation:
-        return np.broadcast_to(np.ones(1, dtype), (len(points), len(degrees), f.size))
-    u = arrival_directions(reference, points)[0, :, 1:].T
+        return np.broadcast_to(np.ones(1, dtype), (len(steering.points), len(degrees), f.size))
+    u = steering.slowness.T
     middle, half = 0.5 * (f[-1] + f[0]), 0.5 * (f[-1] - f[0])
     scale = face / reference.sound_speed
     deviation = np.array(tile.deviation[:2])[:, None]
     # smooth in frequency: a few Chebyshev frequencies do
     widest = float((np.abs(u) + deviation).max(axis=1).sum())
-    farther = reference.attenuation * reference.sound_speed * delay_and_gain(reference, points)[0][0]  # dB
+    farther = reference.attenuation * reference.sound_speed * steering.delay  # dB
     decay = NEPER * float(np.abs(farther).max()) * stage.aim.steepest
     allowed = 0.1 * stage.aim.tolerance
     axis = nodes_for(np.pi * scale * half * widest, (1.0,), allowed)
@@ -283,7 +287,7 @@ def _faces(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     if decay:
         factors = factors * lost(np.multiply.outer(farther, np.interp(frequency, f, stage.bins.relative)))[:, None]
     factors = factors.reshape(-1, axis.nodes).astype(dtype)
-    return np.asarray(factors @ _to_bins(f.size, axis, dtype)).reshape(len(points), len(degrees), f.size)
+    return np.asarray(factors @ _to_bins(f.size, axis, dtype)).reshape(len(steering.points), len(degrees), f.size)
 
 
 @lru_cache(maxsize=64)

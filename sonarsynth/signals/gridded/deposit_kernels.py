@@ -17,9 +17,6 @@ from sonarsynth.equations.kernels.vectors import add_scaled, cubics
 BLOCK = 128
 """Paths in a block of the packed table."""
 
-RUN = 64
-"""Bins that are turned by one table: 4 * 2^4."""
-
 ROWS = 7
 """Rows of the packed table: direction x, y, z; curvature; position (samples); amplitude; absorption (scaled
 deviation). Weights of the modes may follow, then those of what they change by."""
@@ -199,11 +196,11 @@ def deposit(
 def combine(spectra: Any, first: int, factors: Any, pair: Any, power: Any, response: Any, mode: Any, out: Any) -> None:
     """Sum over terms of spectra (node, term, bin) times real factors (node, pair of term, bin) and power (term, bin).
 
-    Times response (mode, 2, bin) of the mode of each term (term,), real and imaginary part as in out (node, 2, bin).
-    Bins of spectra count from `first`.
+    Times response (mode, bin) of the mode of each term (term,), added to out (node, bin). Bins of spectra and out count
+    from `first`.
     """
-    bins = out.shape[2]
-    re, im = np.empty(bins, out.dtype), np.empty(bins, out.dtype)
+    bins = response.shape[1]
+    re, im = np.empty(bins, factors.dtype), np.empty(bins, factors.dtype)
     for m in range(out.shape[0]):
         for k in range(response.shape[0]):
             re[:], im[:] = 0.0, 0.0
@@ -213,66 +210,57 @@ def combine(spectra: Any, first: int, factors: Any, pair: Any, power: Any, respo
                         factor = factors[m, pair[t], b] * power[t, b]
                         re[b] += spectra[m, t, first + b].real * factor
                         im[b] += spectra[m, t, first + b].imag * factor
-            if k == 0:
-                for b in range(bins):
-                    out[m, 0, b] = re[b] * response[k, 0, b] - im[b] * response[k, 1, b]
-                    out[m, 1, b] = re[b] * response[k, 1, b] + im[b] * response[k, 0, b]
-            else:
-                for b in range(bins):
-                    out[m, 0, b] += re[b] * response[k, 0, b] - im[b] * response[k, 1, b]
-                    out[m, 1, b] += re[b] * response[k, 1, b] + im[b] * response[k, 0, b]
+            for b in range(bins):
+                out[m, first + b] += complex(re[b], im[b]) * response[k, b]
 
 
 @compiled(fastmath=True, forceinline=True)
-def _turn(real: Any, imaginary: Any, c: Any, s: Any, re: Any, im: Any, out: Any) -> None:
-    for i in range(real.size):
-        cr, ci = re * c[i] - im * s[i], re * s[i] + im * c[i]
-        out[2 * i] += cr * real[i] - ci * imaginary[i]
-        out[2 * i + 1] += cr * imaginary[i] + ci * real[i]
+def _add_two(v: float, first: Any, w: float, second: Any, out: Any) -> None:
+    for i in range(first.size):
+        out[i] += v * first[i] + w * second[i]
 
 
 @compiled(fastmath=True, forceinline=True)
-def _phasors(turn: complex, c: Any, s: Any) -> complex:
-    """Powers 0 to RUN - 1 of turn, real and imaginary part, in four chains that do not wait for each other; power
-    RUN."""
-    quarter = turn
-    for _ in range(4):
-        quarter *= quarter
-    p0, p1, p2, p3 = 1.0 + 0.0j, quarter, quarter * quarter, quarter * quarter * quarter
-    for j in range(RUN // 4):
-        c[j], c[RUN // 4 + j], c[RUN // 2 + j], c[3 * RUN // 4 + j] = p0.real, p1.real, p2.real, p3.real
-        s[j], s[RUN // 4 + j], s[RUN // 2 + j], s[3 * RUN // 4 + j] = p0.imag, p1.imag, p2.imag, p3.imag
-        p0, p1, p2, p3 = p0 * turn, p1 * turn, p2 * turn, p3 * turn
-    return p3
-
-
-@compiled(fastmath=True, forceinline=True)
-def _accumulate(field: Any, weight: float, out: Any) -> None:
+def _add_filtered(wave: Any, a: float, b: float, c: float, d: float, out: Any) -> None:
     for i in range(out.size):
-        out[i] += weight * field[i]
+        out[i] += a * wave[i] + b * wave[i + 1] + c * wave[i + 2] + d * wave[i + 3]
 
 
 @compiled(fastmath=True)
-def steer_back(field: Any, column: Any, weight: Any, delay: Any, gain: Any, first: int, out: Any) -> None:
-    """Add the field at each hydrophone, delayed and amplified, to out (sensor, 2 * bin): pairs of real and imaginary
-    part.
+def hear(
+    field: Any, column: Any, weight: Any, place: Any, gain: Any, taps: Any, lanes: int, begin: int, out: Any
+) -> None:
+    """Add the field at each hydrophone, delayed and amplified, to out (sensor, sample), from sample `begin` on, which
+    may be negative.
 
-    The field at sensor s is sum_n weight[s, n] field[column[s], n]; field (column, node, 2 * bin) has all real parts,
-    then all imaginary ones. Bins count from `first`; delay is in cycles a bin.
+    The field at sensor s is sum_n weight[s, n] field[column[s], n]; field (column, node, parity, sample) is a circle
+    of time at twice the sampling rate, even samples and odd ones. Sample n of out is the field at 2 n + place[s],
+    interpolated with the kernel of `deposit`, taps (row * 4 * lane,), as wide as it has lanes.
     """
-    c, s = np.empty(RUN, field.dtype), np.empty(RUN, field.dtype)
-    bins = field.shape[2] // 2
-    summed = np.empty(2 * bins, field.dtype)
+    samples, cubes, number = field.shape[3], taps.size // (4 * lanes), taps.dtype.type
+    low, high = max(-begin, 0), min(samples, out.shape[1] - begin)
+    wave = np.empty((2, samples + 3), field.dtype)
     for q in range(out.shape[0]):
         if gain[q] == 0.0:
             continue
-        summed[:] = 0.0
-        for n in range(weight.shape[1]):
-            _accumulate(field[column[q], n], weight[q, n], summed)
-        w = _phasors(np.exp(-2j * np.pi * delay[q]), c, s)
-        start = gain[q] * np.exp(-2j * np.pi * (delay[q] * first))
-        for low in range(0, bins, RUN):
-            re, im = field.dtype.type(start.real), field.dtype.type(start.imag)
-            high = min(low + RUN, bins)
-            _turn(summed[low:high], summed[bins + low : bins + high], c, s, re, im, out[q, 2 * low : 2 * high])
-            start *= w
+        nodes, last = field[column[q]], weight.shape[1] - 1
+        for p in range(2):
+            wave[p] = 0.0
+            for n in range(0, last, 2):
+                _add_two(weight[q, n], nodes[n, p], weight[q, n + 1], nodes[n + 1, p], wave[p])
+            if last % 2 == 0:
+                _add_two(weight[q, last], nodes[last, p], number(0.0), nodes[last, p], wave[p])
+            wave[p, samples:] = wave[p, :3]
+        first = np.floor(place[q] - 0.5 * lanes) + 1.0
+        x = (first - (place[q] - 0.5 * lanes)) * cubes
+        cube, factor = min(np.floor(x), cubes - 1.0), number(gain[q])
+        row = out[q, begin + low : begin + high]
+        for lane in range(0, lanes, 8):
+            t: Any = cubics(taps, int(cube) * 4 * lanes + lane, lanes, number(x - cube - 0.5))  # type: ignore[call-arg]
+            for p in range(2):
+                sample = int(first) + lane + p
+                ahead, nearest = (sample >> 1) % samples, wave[sample & 1]
+                turn = min(max(samples - ahead, low), high)  # from where on the circle begins anew
+                a, b, c, d = factor * t[p], factor * t[p + 2], factor * t[p + 4], factor * t[p + 6]
+                _add_filtered(nearest[low + ahead :], a, b, c, d, row[: turn - low])
+                _add_filtered(nearest[turn + ahead - samples :], a, b, c, d, row[turn - low :])

@@ -66,11 +66,12 @@ def analysis(count: int) -> Floats:
 def interpolation(x: Floats, axis: Axis) -> Floats:
     """Matrix (point, node) from values at the nodes to points x (point,) in [-1, 1]."""
     if axis.phase == inf:
-        return np.asarray(_polynomials(x, axis.nodes) @ analysis(axis.nodes))
+        return np.asarray(polynomials(x, axis.nodes) @ analysis(axis.nodes))
     return np.asarray(_waves(x, axis) @ _fit(axis))
 
 
-def _polynomials(x: Floats, count: int) -> Floats:
+def polynomials(x: Floats, count: int) -> Floats:
+    """Chebyshev polynomials (point, degree) at x (point,), -1 to 1, of degrees below `count`."""
     return np.asarray(np.cos(np.outer(np.arccos(np.clip(x, -1.0, 1.0)), np.arange(count))))
 
 
@@ -157,8 +158,12 @@ def nodes_for(phase: float, weights: SpectralQuantiles, tolerance: float, degree
     The waves may bear an amplitude that is a polynomial: `degrees` bounds its Chebyshev coefficients of degree 0 to 3.
     Phase is rounded up by at most 4 %, degrees by a tenth, so that choices are kept from frame to frame.
     """
-    wide, sizes = rounded_up(phase, 1.04), tuple(map(rounded_up, degrees))
-    most = polynomials_for(phase, weights, tolerance, degrees).nodes
+    return _nodes(rounded_up(phase, 1.04), weights, tolerance, tuple(map(rounded_up, degrees)))
+
+
+@lru_cache(maxsize=4096)
+def _nodes(wide: float, weights: SpectralQuantiles, tolerance: float, sizes: tuple[float, ...]) -> Axis:
+    most = _by_polynomials(wide, weights, tolerance, sizes)
     if most == 1 or wide > MOST_FITTED or max(sizes) == inf:
         return Axis(most)
 

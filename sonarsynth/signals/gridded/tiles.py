@@ -10,7 +10,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.receiver import Elements
-from sonarsynth.signals.array_paths import NEPER, ArrayPaths, reference_of
+from sonarsynth.signals.array_paths import NEPER, Wavefronts, reference_of
 from sonarsynth.signals.gridded.amplitude_nodes import degrees, variation
 from sonarsynth.signals.gridded.interpolation import Axes, box_nodes, columns
 from sonarsynth.signals.gridded.low_rank import PLAIN, Term, terms_for
@@ -42,7 +42,7 @@ class Tile:
     """Paths, the front that they are steered to, and the nodes and terms that represent them."""
 
     paths: Ints  # (path,)
-    reference: ArrayPaths  # one front: the middle of the tile
+    reference: Wavefronts  # one front: the middle of the tile
     axes: Axes | None  # nodes along x, y, z; None where the hydrophones themselves are the nodes
     terms: tuple[Term, ...]
     deviation: tuple[float, float, float]  # half range of direction y and z, and of absorption (dB)
@@ -80,7 +80,7 @@ def _probes(elements: Elements, near: bool) -> _Probes:
 class _Views:
     """What every tile that is tried looks at, computed once: a tile is the smallest and the largest of each column."""
 
-    front: ArrayPaths
+    front: Wavefronts
     columns: Floats  # (column, path): direction, curvature, absorption, delay terms; slownesses at probes
     amplitude: Floats  # (row, path) of `variation`
     probes: _Probes
@@ -89,7 +89,7 @@ class _Views:
     own: bool  # no nodes can stand for the hydrophones: a source is within or about that box, or paths miss some
 
 
-def _views(front: ArrayPaths, aim: TileSettings, missed: bool) -> _Views:
+def _views(front: Wavefronts, aim: TileSettings, missed: bool) -> _Views:
     elements = aim.elements
     near = bool(front.curvature.max() * np.linalg.norm(np.abs(elements.position).max(axis=0)) > 0.8)
     probes = _probes(elements, near)
@@ -99,7 +99,7 @@ def _views(front: ArrayPaths, aim: TileSettings, missed: bool) -> _Views:
     return _Views(front, columns, variation(front, elements), probes, gradient, bend, near or missed)
 
 
-def _columns(front: ArrayPaths, probes: Floats, gradient: Floats) -> Floats:
+def _columns(front: Wavefronts, probes: Floats, gradient: Floats) -> Floats:
     """Columns of `_Views` of fronts; slownesses are -c times the gradient of delay: directions where rays are
     straight."""
     v = front.direction.T - front.curvature * probes[:, :, None]  # (point, xyz, path)
@@ -172,7 +172,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     return _Trial(Tile(paths, reference, axes, terms, (dy, dz, loss + farther), over.which, modes, cost), extent)
 
 
-def _drift(front: ArrayPaths, aim: TileSettings) -> tuple[float, ...]:
+def _drift(front: Wavefronts, aim: TileSettings) -> tuple[float, ...]:
     """Half range (xyz, rad) of the phase that is left over a face, along each axis of the box: du_j/dq_i is
     -(e_i - u_i u)_j k/n; and of what absorption varies by (Np). inf about the source."""
     _, _, size = _probes(aim.elements, False)
@@ -191,7 +191,7 @@ def _drift(front: ArrayPaths, aim: TileSettings) -> tuple[float, ...]:
 
 def _cheapest(extent: _Extent, aim: TileSettings) -> tuple[Axes | None, tuple[Term, ...], float]:
     """Nodes or the hydrophones themselves, terms, and the predicted time (ns) on one core at 3 GHz."""
-    sensors, bins = aim.elements.count, aim.bins
+    sensors, circle = aim.elements.count, aim.circle
     terms = terms_for(extent.turn, extent.decay, aim.weights, aim.tolerance, extent.modes)
     x, y, z = (
         nodes_for(p + d, aim.weights, aim.tolerance, a)
@@ -199,13 +199,13 @@ def _cheapest(extent: _Extent, aim: TileSettings) -> tuple[Axes | None, tuple[Te
     )
 
     def work(nodes: int) -> float:
-        per_node = extent.paths * (8.0 + 0.6 * len(terms)) + len(terms) * (1.4 * aim.circle + 2.5 * bins)
-        return nodes * per_node + 2.0 * sensors * bins + 4e5
+        per_node = extent.paths * (8.0 + 0.6 * len(terms)) + len(terms) * (1.4 * circle + 2.5 * aim.bins)
+        return nodes * (per_node + 2.0 * circle) + 0.5 * sensors * circle + 4e5
 
     own, nodes = work(sensors), x.nodes * y.nodes * z.nodes
     few = max(x.nodes, y.nodes, z.nodes) <= MOST_NODES
-    onto = 0.03 * nodes * columns(aim.elements)[0].size + 0.3 * z.nodes * sensors
-    by_nodes = work(nodes) + onto * bins if few else np.inf
+    onto = 0.07 * nodes * columns(aim.elements)[0].size + 0.08 * z.nodes * sensors
+    by_nodes = work(nodes) + onto * circle if few else np.inf
     crowded = np.inf if sum(not term[3] for term in terms) > MOST_TERMS else 1.0
     return ((x, y, z), terms, by_nodes * crowded) if by_nodes < own else (None, terms, own * crowded)
 
@@ -224,7 +224,7 @@ def _halves(paths: Ints, views: _Views, aim: TileSettings) -> tuple[Ints, Ints] 
     return paths[~right], paths[right]
 
 
-def tiles(front: ArrayPaths, aim: TileSettings) -> list[Tile]:
+def tiles(front: Wavefronts, aim: TileSettings) -> list[Tile]:
     """The tiles of predicted least cost: each is halved while that pays; the first halving may pay only with the
     second.
 
@@ -237,7 +237,7 @@ def tiles(front: ArrayPaths, aim: TileSettings) -> list[Tile]:
     return [replace(tile, paths=group[tile.paths]) for group, of_group in groups for tile in of_group]
 
 
-def _tiles(front: ArrayPaths, aim: TileSettings, missed: bool) -> list[Tile]:
+def _tiles(front: Wavefronts, aim: TileSettings, missed: bool) -> list[Tile]:
     """The tiles of paths of one kind."""
     if front.count == 1:
         return [_alone(np.arange(1), front, aim)]
@@ -256,13 +256,13 @@ def _tiles(front: ArrayPaths, aim: TileSettings, missed: bool) -> list[Tile]:
     return chosen
 
 
-def _alone_pays(tile: Tile, front: ArrayPaths, aim: TileSettings) -> bool:
+def _alone_pays(tile: Tile, front: Wavefronts, aim: TileSettings) -> bool:
     """Whether the paths of a tile cost less one by one, each steered to the hydrophones that it does not miss."""
-    steered = 4.0 * aim.bins * float(np.count_nonzero(~front.occluded[tile.paths]))
+    steered = 0.7 * aim.circle * float(np.count_nonzero(~front.occluded[tile.paths]))
     return tile.paths.size > 1 and 2e5 * tile.paths.size + steered < tile.cost
 
 
-def _alone(paths: Ints, front: ArrayPaths, aim: TileSettings, gradient: Floats | None = None) -> Tile:
+def _alone(paths: Ints, front: Wavefronts, aim: TileSettings, gradient: Floats | None = None) -> Tile:
     """One path is its own reference: nothing is deposited, and its directivity is all that varies; gradient: of the
     aperture terms at all hydrophones."""
     reference, size = front.select(paths), _probes(aim.elements, False).size
@@ -273,7 +273,7 @@ def _alone(paths: Ints, front: ArrayPaths, aim: TileSettings, gradient: Floats |
         nodes_for(d + b, aim.weights, aim.tolerance) for d, b in zip(_drift(reference, aim), bend.tolist(), strict=True)
     )
     axes = (x, y, z) if 2 * x.nodes * y.nodes * z.nodes < aim.elements.count else None
-    cost, modes = 2e5 + 4.0 * aim.elements.count * aim.bins, np.eye(reference.modes.shape[1])
+    cost, modes = 2e5 + 0.7 * aim.elements.count * aim.circle, np.eye(reference.modes.shape[1])
     return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.zeros(0, int), modes, cost)
 
 
