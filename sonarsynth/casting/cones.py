@@ -12,14 +12,13 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from sonarsynth.casting.facet_tree import LEVELS
 from sonarsynth.casting.ray_casting import casting_mesh
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.geometry.placed_target import PlacedTarget
 
 Int32s = npt.NDArray[np.int32]
-LEVELS = 64
-"""More than a tree has."""
 EMPTY, CLOSED, UNKNOWN = range(3)
 """No facet is in a cone; one piece of surface closes it from side to side; neither is certain."""
 TRIED = 3

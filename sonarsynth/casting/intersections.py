@@ -114,6 +114,27 @@ def round_vertices(faces: Int32s, vertices: int) -> tuple[Int32s, Int32s]:
 
 
 @compiled
+def to_sphere(o: Floats, d: Floats) -> float:
+    """Move the start o of a segment to o + d to where it enters a sphere a little over the unit sphere, make d a unit
+    vector, and return how much of its length is left; 0 where it misses the sphere."""
+    length = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    if not length > 0.0:
+        return 0.0
+    dx, dy, dz = d[0] / length, d[1] / length, d[2] / length
+    nearest = -(o[0] * dx + o[1] * dy + o[2] * dz)
+    fx, fy, fz = o[0] + nearest * dx, o[1] + nearest * dy, o[2] + nearest * dz
+    half = SPHERE - (fx * fx + fy * fy + fz * fz)
+    if half <= 0.0:
+        return 0.0
+    half = math.sqrt(half)
+    enter, leave = max(nearest - half, 0.0), min(nearest + half, length)
+    if not enter < leave:
+        return 0.0
+    o[0], o[1], o[2], d[0], d[1], d[2] = o[0] + enter * dx, o[1] + enter * dy, o[2] + enter * dz, dx, dy, dz
+    return float(length - enter)
+
+
+@compiled
 def into_mesh(
     start: Floats, end: Floats, skip: Bools, rotation: Floats, position: Floats, centre: Floats, size: float,
     origin: Floats, heading: Floats, far: Floats, segment: Ints,
@@ -134,24 +155,8 @@ def into_mesh(
                 o += rotation[y, x] * (start[i, y] - position[y])
                 d += rotation[y, x] * (end[i, y] - start[i, y])
             origin[count, x], heading[count, x] = (o - centre[x]) / size, d / size
-        (ox, oy, oz), (dx, dy, dz) = origin[count], heading[count]
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        if not length > 0.0:
-            continue
-        dx, dy, dz = dx / length, dy / length, dz / length
-        nearest = -(ox * dx + oy * dy + oz * dz)
-        fx, fy, fz = ox + nearest * dx, oy + nearest * dy, oz + nearest * dz
-        half = SPHERE - (fx * fx + fy * fy + fz * fz)
-        if half <= 0.0:
-            continue
-        half = math.sqrt(half)
-        enter, leave = max(nearest - half, 0.0), min(nearest + half, length)
-        if not enter < leave:
-            continue
-        origin[count, 0], origin[count, 1], origin[count, 2] = ox + enter * dx, oy + enter * dy, oz + enter * dz
-        heading[count, 0], heading[count, 1], heading[count, 2] = dx, dy, dz
-        far[count], segment[count] = length - enter, i
-        count += 1
+        far[count], segment[count] = to_sphere(origin[count], heading[count]), i
+        count += far[count] > 0.0
     return count
 
 

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from sonarsynth.casting import ray_casting
-from sonarsynth.casting.ray_casting import OFFSET, Backend, first_hit, occluded
+from sonarsynth.casting.ray_casting import OFFSET, Backend, first_hit, hide, occluded
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.geometry.mesh import Mesh
@@ -110,6 +110,22 @@ def test_a_sphere_hides_what_is_in_its_shadow_and_no_more() -> None:
     before = occluded((body,), start, start + 0.9 * (4.5 - 0.0) * d)
     assert not before.any()
     assert np.array_equal(occluded((place(SPHERE, (50.0, 0.0, 0.0)), body), end, start), hidden)
+
+
+def test_many_points_are_hidden_from_each_place_as_each_is_alone() -> None:
+    bodies = place(RING, (0.0, 0.0, -10.0)), place(SPHERE, (0.9, 0.4, -9.8))
+    rng = np.random.default_rng(5)
+    near = np.concatenate([b.pose.to_world(b.mesh.centroid + 1e-6 * b.mesh.normal)[::9] for b in bodies])
+    start = np.concatenate([near, rng.normal(0.0, 3.0, (40, 3)) + [0, 0, -10.0]])
+    points = [6.0, 0.0, -10.0] + np.stack([np.zeros(400), *np.mgrid[-1.5:1.5:20j, -1.5:1.5:20j].reshape(2, -1)], 1)
+    looked_at = rng.random((len(start), len(points))) < 0.7
+    seen = looked_at.copy()
+    hide(bodies, start, points, seen)
+    row, point = np.nonzero(looked_at)
+    alone = occluded(bodies, start[row], points[point])
+    assert 0.2 < alone.mean() < 0.8
+    assert np.array_equal(~seen[row, point], alone)
+    assert not seen[~looked_at].any()
 
 
 def test_what_cannot_be_cast_at_is_refused() -> None:

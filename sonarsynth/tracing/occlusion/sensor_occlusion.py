@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sonarsynth.casting.cones import CLOSED, UNKNOWN, classify_cones
+from sonarsynth.casting.ray_casting import hide
 from sonarsynth.conventions import Bools, Floats, Ints, picked
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -69,13 +70,12 @@ class Occlusion:
         first = np.append(0, 1 + rim(self.elements))
         for kind in (UNKNOWN, NO_CONE):
             for rows in _parts(np.flatnonzero(certain == kind), len(first)):
-                leg, point = np.repeat(rows, len(first)), np.tile(first, len(rows))
                 swerve = self._swerve(legs.select(rows), first) if kind == NO_CONE else None  # others stay open
-                unseen = self._unseen(legs, start, normal, leg, point, swerve).reshape(len(rows), len(first))
+                unseen = self._unseen(legs, start, normal, rows, first, swerve)
                 in_sight[rows] = ~unseen.all(axis=1)
                 mixed[rows] |= unseen.any(axis=1)
         for rows in _parts(np.flatnonzero(mixed & ~in_sight & (certain == UNKNOWN)), len(self._points)):
-            in_sight[rows] = ~self._dark(legs, start, normal, rows).all(axis=1)
+            in_sight[rows] = ~self._dark(legs, start, normal, rows, not self._straight(legs)).all(axis=1)
         none = np.zeros((np.count_nonzero(in_sight), 1 + self.elements.count // 8), np.uint8)
         return legs.select(np.flatnonzero(in_sight)).seen(none, mixed[in_sight])
 
@@ -109,10 +109,11 @@ class Occlusion:
         rows = np.flatnonzero((least <= 0.0) & (most >= 0.0))
         flip = np.where(legs.bounces[rows] % 2 == 1, -1.0, 1.0)  # of the mirrored array
         across = self.receiver.pose.turn_to_body(normal[rows] * np.column_stack([np.ones((len(rows), 2)), flip]))
-        beside, ahead = across @ points.T, 0.5 * (least + most)[rows]
+        low, high = points.min(axis=0), points.max(axis=0)
+        ahead = 0.5 * (least + most)[rows] + 0.5 * (across @ (low + high))
         margin = 1e-9 * legs.length[rows] + (swerve * (legs.length + spread))[rows]
-        least[rows] = ahead + beside.min(axis=1, initial=np.inf) - margin
-        most[rows] = ahead + beside.max(axis=1, initial=-np.inf) + margin
+        margin += 0.5 * (np.abs(across) @ (high - low))
+        least[rows], most[rows] = ahead - margin, ahead + margin
         return self._cones(legs, start, middle, spread, (least, most), swerve)
 
     def _cones(
@@ -143,9 +144,15 @@ class Occlusion:
         verdict[rows] = classify_cones(self.bodies, start[rows], away[rows], slope[sure], reach[sure], far[sure])
         return verdict
 
-    def _dark(self, legs: ReceivePaths, start: Floats, normal: Floats | None, rows: Ints) -> Bools:
+    def _dark(
+        self, legs: ReceivePaths, start: Floats, normal: Floats | None, rows: Ints, by_parts: bool = True
+    ) -> Bools:
         """(row, 1 + sensor) from where some legs are hidden: the array centre, each hydrophone. Parts of the array that
-        see alike are looked at together."""
+        see alike are looked at together, unless few are likely to see anything."""
+        every = np.arange(len(self._points))
+        swerve = self._swerve(legs.select(rows), every)
+        if not by_parts:
+            return self._unseen(legs, start, normal, rows, every, swerve)
         array_cells = cells(self.elements)
         row, cell = np.repeat(rows, len(array_cells.radius)), np.tile(np.arange(len(array_cells.radius)), len(rows))
         repeated, offset, spread = (
@@ -153,7 +160,6 @@ class Occlusion:
             self.receiver.pose.turn_to_world(array_cells.centre)[cell],
             array_cells.radius[cell],
         )
-        swerve = self._swerve(legs.select(rows), np.arange(len(self._points)))
         beside = np.zeros(len(row))
         if swerve is not None:
             order = np.argsort(array_cells.cell, kind="stable")
@@ -162,11 +168,8 @@ class Occlusion:
         ahead = None if normal is None else _within(repeated, normal[row], spread, beside, offset)
         verdict = self._cones(repeated, start[row], offset, spread, ahead, beside)
         verdict = verdict.reshape(len(rows), len(array_cells.radius))[:, array_cells.cell]
-        dark = np.asarray(verdict == CLOSED)
-        index, point = np.nonzero(verdict >= UNKNOWN)
-        deviation = None if swerve is None else swerve[index, point]
-        dark[index, point] = self._unseen(legs, start, normal, rows[index], point, deviation)
-        return dark
+        unseen = self._unseen(legs, start, normal, rows, every, swerve, verdict >= UNKNOWN)
+        return np.asarray((verdict == CLOSED) | unseen)
 
     def _swerve(self, legs: ReceivePaths, point: Ints) -> Floats | None:
         """(leg, point, xyz) as `launch_deviation`, of the centre, or the hydrophones from 1; None where rays are
@@ -175,30 +178,41 @@ class Occlusion:
             return None
         return launch_deviation(legs, self._points[point], self.bending, self.receiver, self.propagation)
 
+    def _straight(self, legs: ReceivePaths) -> bool:
+        """Whether legs are straight lines from end to end."""
+        return self.bending.profile.uniform and not legs.bounces.any()
+
     def _unseen(
-        self, legs: ReceivePaths, start: Floats, normal: Floats | None, leg: Ints, point: Ints, swerve: Floats | None
-    ) -> Bools:
-        """(ray,) which legs (ray,) leave the back of their facets, or meet a body, on the way to points (ray,): the
-        centre, or the hydrophones from 1.
+        self, legs: ReceivePaths, start: Floats, normal: Floats | None, rows: Ints, point: Ints, swerve: Floats | None,
+        look: Bools | None = None,
+    ) -> Bools:  # fmt: skip
+        """(row, point) which of some legs leave the back of their facets, or meet a body, on the way to some points:
+        the centre, or the hydrophones from 1. Of those to look at, if not all.
 
         To each point a ray leaves for where it is beside the image of the array centre, which is exact for straight
-        rays; bent ones off that by `swerve`, some for each ray.
+        rays; bent ones off that by `swerve` (row, point, xyz).
         """
-        legs, offset = legs.select(leg), self.receiver.pose.turn_to_world(self._points)[point]
-        ahead, length = _towards(legs, offset)
+        look = np.ones((len(rows), len(point)), bool) if look is None else look
+        if self._straight(legs):
+            points, seen = self.receiver.pose.to_world(self._points[point]), look.copy()
+            if normal is not None:
+                seen &= normal[rows] @ points.T > dot(normal[rows], legs.point[rows])[:, None]
+            hide(self.bodies, start[rows], points, seen)
+            return look & ~seen
+        row, column = np.nonzero(look)
+        leg, offset = rows[row], self.receiver.pose.turn_to_world(self._points[point])[column]
+        beside, unseen = legs.select(leg), np.zeros(len(leg), bool)
+        ahead, length = _towards(beside, offset)
         if swerve is not None:
-            ahead += swerve.reshape(ahead.shape)
+            ahead += swerve[row, column]
             ahead /= np.linalg.norm(ahead, axis=1)[:, None]
-        unseen = np.zeros(len(leg), bool)
         if normal is not None:
             unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
         ray = np.flatnonzero(~unseen)
-        end, turns = (
-            self.receiver.pose.position + offset[ray],
-            {"bounces": legs.bounces[ray], "turning": legs.turning[ray]},
-        )
-        unseen[ray] = self._hides(start[leg[ray]], end, ahead[ray], length[ray], **turns)
-        return unseen
+        end, turns = self.receiver.pose.position + offset[ray], (beside.bounces[ray], beside.turning[ray])
+        unseen[ray] = self._hides(start[leg[ray]], end, ahead[ray], length[ray], bounces=turns[0], turning=turns[1])
+        look[row, column] = unseen
+        return look
 
     def _hides(self, *ray: Floats, bounces: Ints, turning: Ints) -> Bools:
         return hidden(self.bodies, self.bending, *ray, bounces=bounces, turning=turning)
