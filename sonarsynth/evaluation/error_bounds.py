@@ -47,9 +47,23 @@ def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
     return Check(name, expected, result, None, numbers, numbered(np.unique(frame[over[0] | over[1]])), warning)
 
 
+def signals_whole(tree: xr.DataTree, frames: np.ndarray) -> Check:
+    """Arrivals that fell outside the sample window; samples at full scale, as the recipe has it, are a warning."""
+    counts = {name: every(tree, f"signals/{name}")[frames] for name in ("outside", "clipped")}
+    outside, clipped = (int(count.sum()) for count in counts.values())
+    spoiled = numbered(frames[counts["outside"] + counts["clipped"] > 0])
+    expected, result = "none outside, none clipped", f"{outside} arrivals outside, {clipped} samples clipped"
+    loud = int(np.count_nonzero(counts["clipped"]))
+    warning = f"{clipped} samples are clipped, in {loud} of {len(frames)} frames (scene.sonar.converter.full_scale)"
+    return Check(
+        "signals whole", expected, result, not outside, {"outside": outside, "clipped": clipped}, spoiled,
+        warning if clipped else "",
+    )  # fmt: skip
+
+
 def bounds(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
     """What of a store is of use, whatever it claims."""
-    checks = []
+    checks = [signals_whole(tree, frames)] if "signals" in tree.children else []
     if "source_estimates" in tree.children:
         checks.append(snap_located(tree, frames))
     if has_labels(tree):

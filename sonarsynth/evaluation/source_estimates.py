@@ -8,11 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray as xr
 
+from sonarsynth.conventions import azimuth_elevation
+from sonarsynth.conventions import direction as towards
 from sonarsynth.detection import beam_width
-from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, numbered, other_sounds
+from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, every, numbered, other_sounds
 from sonarsynth.evaluation.level_checks import snaps_heard
 from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS
+from sonarsynth.receiver.mirror_images import mirror_image, plane_normal
 
 NAME, EXPECTED = "snap located", "within 3 predicted errors in 95 %"
 NEAR = 14.16
@@ -36,7 +39,7 @@ class _Tally:
     misses: list[float] = field(default_factory=list)  # m
     useless: int = 0
     strays: int = 0  # accepted, and come from no snap
-    mirrored: int = 0  # accepted, and come from behind the array
+    mirrored: int = 0  # accepted, and come from the other side of the array's plane
     strangers: int = 0  # of the chorus, or of other sources of noise
     rows: int = 0
     unheard: int = 0  # snaps that reach the array, and were not found
@@ -60,16 +63,16 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """Each estimate is within three predicted errors of the snap that it came from, in 95 %; each quantity by its own.
 
     Positions by their Mahalanobis distance. An estimate that is accepted and comes from no snap counts as a miss, but
-    for the mirror image of one behind the array: a planar array cannot tell its sides apart, and that is a warning. A
+    for the mirror image of one: a planar array cannot tell its sides apart, and that is a warning. A
     snap that reaches the array and is not found, and errors as large as what is sought, are honest but of no use: a
     warning.
     """
     if "emission" not in tree["source_estimates"].dataset:
         return Check(NAME, EXPECTED, "not in this store", None, {})
-    tally = _Tally()
+    tally, normal = _Tally(), _normal(tree)
     for block in blocks(tree, frames):
         for i in block.frames:
-            _frame(block, int(i), tally)
+            _frame(block, int(i), tally, normal)
     if not tally.rows:
         result = f"none of {tally.unheard} found" if tally.unheard else "no snap reaches the array"
         return Check(NAME, EXPECTED, result, None, {"found": 0}, numbered(sorted(tally.frames)), _warning(tally))
@@ -94,9 +97,18 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     return Check(NAME, EXPECTED, result, good, numbers, numbered(sorted(tally.frames)), _warning(tally))
 
 
-def _frame(block: SmallVariables, i: int, tally: _Tally) -> None:
+def _normal(tree: xr.DataTree) -> np.ndarray:
+    """Unit normal (xyz) of the plane of the array: its axis, where no sensors are stored; 0 where they are in none."""
+    if "signals" not in tree.children:
+        return np.array([1.0, 0.0, 0.0])
+    live = every(tree, "signals/position")[every(tree, "signals/gain") > 0.0]
+    normal = plane_normal(live, tree.attrs["assumed_sound_speed"] / tree.attrs["band_high"])
+    return np.zeros(3) if normal is None else normal
+
+
+def _frame(block: SmallVariables, i: int, tally: _Tally, normal: np.ndarray) -> None:
     rows = block.tree["source_estimates"].dataset.data_vars.items()
-    names = [str(name) for name, variable in rows if "estimate" in variable.dims]
+    names = (str(name) for name, variable in rows if "estimate" in variable.dims)
     column = {name: block.of(f"source_estimates/{name}", i) for name in names}
     estimates = np.flatnonzero(np.isfinite(column["time"]))
     reached = int(snaps_heard(block, i).sum())
@@ -111,9 +123,9 @@ def _frame(block: SmallVariables, i: int, tally: _Tally) -> None:
     pose = Pose(block.of("truth/sonar_position", i), block.of("truth/sonar_orientation", i))
     true = pose.to_body(truth["position"])
     for row in estimates:
-        emission = int(column["emission"][row])
-        estimate = {name: values[row] for name, values in column.items()}
-        if emission < 0 and any(all(_within(estimate, truth, n, True).values()) for n in range(len(truth["arrival"]))):
+        emission, estimate = int(column["emission"][row]), {name: values[row] for name, values in column.items()}
+        snaps = range(len(truth["arrival"]))
+        if emission < 0 and any(all(_within(estimate, truth, n, normal).values()) for n in snaps):
             tally.mirrored += 1
             continue
         if emission < 0:
@@ -129,12 +141,15 @@ def _frame(block: SmallVariables, i: int, tally: _Tally) -> None:
 
 
 def _within(
-    estimate: dict[str, np.ndarray], truth: dict[str, np.ndarray], emission: int, mirrored: bool = False
+    estimate: dict[str, np.ndarray], truth: dict[str, np.ndarray], emission: int, normal: np.ndarray | None = None
 ) -> dict[str, bool]:
-    """Whether direction and time are within three predicted errors of a snap's; `mirrored`: of its image in front."""
-    azimuth = 180.0 - truth["azimuth"][emission] if mirrored else truth["azimuth"][emission]
-    turned = (estimate["azimuth"] - azimuth + 180.0) % 360.0 - 180.0
-    raised = estimate["elevation"] - truth["elevation"][emission]
+    """Whether direction and time are within three predicted errors of a snap's, or of its mirror image's in the plane
+    with a normal (xyz)."""
+    azimuth, elevation = np.deg2rad(truth["azimuth"][emission]), np.deg2rad(truth["elevation"][emission])
+    if normal is not None:
+        azimuth, elevation = azimuth_elevation(mirror_image(towards(azimuth, elevation), normal))
+    turned = (estimate["azimuth"] - np.rad2deg(azimuth) + 180.0) % 360.0 - 180.0
+    raised = estimate["elevation"] - np.rad2deg(elevation)
     late = estimate["time"] - truth["arrival"][emission]
     errors = {"azimuth": turned, "elevation": raised, "time": late}
     return {name: bool(abs(error) <= 3 * estimate[f"{name}_error"]) for name, error in errors.items()}
@@ -156,7 +171,7 @@ def _warning(tally: _Tally) -> str:
         why = ", ".join(f"{name} {count}" for name, count in tally.reasons.most_common(3))
         warnings.append(f"{tally.unheard} snaps that reach the array were not located" + (f" ({why})" if why else ""))
     if tally.mirrored:
-        warnings.append(f"{tally.mirrored} snaps behind the array were located at their mirror images in front of it")
+        warnings.append(f"{tally.mirrored} snaps were located at their mirror images on the other side of the array")
     if tally.useless:
         warnings.append(f"{tally.useless} of {tally.rows} estimates are useless: their predicted errors are too large")
     return "; ".join(warnings)

@@ -20,7 +20,11 @@ def mirror_normal(elements: Elements, wavelength: float) -> Floats | None:
     (`apertures.element_directivity`). Of a line of hydrophones, which has many such planes, the one that faces
     x most. None for a single hydrophone, which has no directions, and for one line of them along x.
     """
-    live = elements.position[elements.gain > 0.0]
+    return plane_normal(elements.position[elements.gain > 0.0], wavelength)
+
+
+def plane_normal(live: Floats, wavelength: float) -> Floats | None:
+    """The same of the positions (sensor, xyz) m of the live hydrophones."""
     if len(live) < 2:
         return None
     about = live - live.mean(axis=0)

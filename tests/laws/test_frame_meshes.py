@@ -10,7 +10,7 @@ from sonarsynth.targets import mesh_resolution
 from sonarsynth.targets.generated.generation import sphere
 from sonarsynth.targets.mesh_resolution import ROWS, expected_error, fine_mesh, frame_mesh, mesh_report
 from sonarsynth.targets.meshes import mesh_of
-from sonarsynth.targets.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Sphere
+from sonarsynth.targets.shapes import Box, Cylinder, Knots, LShape, MeshFile, Myring, Remus100, School, Sphere
 
 WAVELENGTH = 0.05
 BLUNT = Myring(nose=0.2, middle=0.0, tail=0.5, diameter=0.2, exponent=10.0, tail_angle=0.5)
@@ -26,6 +26,8 @@ FLAT = [
     Box(size=(1.0, 0.02, 0.3)),
     Box(size=(0.3, 0.3, 0.3), edge=0.2),
     LShape(height=1.0, length=0.7, width=0.5, thickness=0.1),
+    Knots(rows=3, radius=0.05),
+    School(members=5),
 ]
 
 

@@ -13,6 +13,7 @@ from sonarsynth.environment.sound_speed import mean_gradient
 from sonarsynth.equations.arrays.spherical_wave import tangent_plane
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.refraction import first_rays
@@ -67,6 +68,20 @@ def test_moving_and_turning_everything_changes_nothing():
     here, there = locate(signals, ROMANIS, source), locate(signals, ROMANIS, source, turned)
     for name, value in vars(here).items():
         assert np.allclose(value, getattr(there, name), rtol=1e-9, atol=1e-12), name
+
+
+def test_an_array_that_moves_locates_as_one_at_rest():
+    """Sensors come towards the wave while it passes them: for rest, directions would be off by v/c times a tangent."""
+    source, velocity, late = np.array([9.0, -5.0, -6.0]), np.array([8.0, -5.0, 1.0]), np.zeros(SMALL.count)
+    for _ in range(4):
+        moved = SMALL.position + np.outer(late, velocity)
+        late = (np.linalg.norm(source - moved, axis=1) - np.linalg.norm(source)) / C
+    signals = hear_direct(replace(SMALL, position=moved), source)
+    track, survey = Track(AHEAD, AHEAD.turn_to_world(velocity)), Survey(-float(AHEAD.to_world(source)[2]), WATER)
+    receivers = (Receiver(AHEAD, SMALL, Sonar(assumed_sound_speed=C), known) for known in (track, None))
+    known, taken_for_still = (SensorDelays().locate(signals, receiver, survey, 1) for receiver in receivers)
+    assert np.linalg.norm(known.position[0] - source) < 1e-3
+    assert np.linalg.norm(taken_for_still.position[0] - source) > 2e-2
 
 
 def test_a_later_clock_moves_only_the_time():

@@ -291,11 +291,19 @@ def test_each_quantity_is_verified_by_its_own_errors() -> None:
     assert snap_located(store(spread=0.01), frames).ok is False
 
 
-def test_the_mirror_image_of_a_snap_behind_the_array_is_a_warning() -> None:
-    """A planar array cannot tell its sides apart; from anywhere else, an estimate of no snap is a miss."""
-    check = snap_located(store(emission=-1, azimuth=160.01), np.arange(2))
-    assert check.ok is None and "2 snaps behind the array" in check.warning
-    assert snap_located(store(emission=-1, azimuth=160.05), np.arange(2)).ok is False
+def test_the_mirror_image_of_a_snap_is_a_warning() -> None:
+    """A planar array cannot tell its sides apart, upright or lying; elsewhere, an estimate of no snap is a miss."""
+    corners = np.array([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [-0.5, 0.0, 0.0], [0.0, -0.5, 0.0]])
+    sensors = {"position": (("sensor", "xyz"), corners), "gain": ("sensor", np.ones(4))}
+    images = {"azimuth": (160.01, 160.05), "elevation": (10.01, 10.05)}
+    for axis, (image, beside) in images.items():
+        for place, heard in ((image, True), (beside, False)):
+            tree = store(emission=-1, **{axis: place})
+            if axis == "elevation":
+                tree["signals"] = xr.DataTree(xr.Dataset(sensors))
+            check = snap_located(tree, np.arange(2))
+            assert check.ok is (None if heard else False)
+            assert ("2 snaps were located at their mirror images" in check.warning) == heard
 
 
 @pytest.mark.parametrize("useless", [{"spread": 9.0}, {"azimuth_error": 20.0}, {"time_error": 1.0}])

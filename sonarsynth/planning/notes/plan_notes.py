@@ -134,7 +134,7 @@ def _accuracy(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
             f"{errors.uncut:.2g}"
         )
     if plan.choices.occlusion == "sensors" and plan.scene.physics.occlusion == "auto":
-        why = f"the error is {errors.uncut:.2g}"
+        why = f"the error is {errors.uncut:.2g}" if np.isfinite(errors.uncut) else "the error is larger"
         if allowed.signal < OWN_VIEW:
             why = f"what is hidden from a few alone errs by up to {OWN_VIEW:g} at these"
         elif errors.uncut <= allowed.signal:

@@ -102,8 +102,9 @@ def locate(
     loud = pulse_times.loudness(signals, live, width)
     rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
     quiet = pulse_times.quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
+    velocity = np.zeros(3) if receiver.track is None else receiver.pose.turn_to_body(receiver.track.velocity)
     knowledge = SonarKnowledge(
-        elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, bottom_reflects
+        elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, bottom_reflects, velocity
     )
     track, candidates = loud.track.copy(), Candidates(knowledge)
     for _ in range(4 * snaps):
@@ -134,15 +135,20 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
     wave, pulse = fitted
     if pulse.share > SHARED and pulse.noise > AUDIBLE * knowledge.quiet:
         return refused(UNRESOLVED)
+    c = sonar.assumed_sound_speed
+    if knowledge.velocity.any():  # each sensor hears the wave where it is by then
+        late = wavefront_delays(elements.position, wave.direction, wave.curvature, c) + wave.residual
+        elements = replace(elements, position=elements.position + np.outer(late, knowledge.velocity))
+        wave = fit_wave(wave.time + late, elements.position, c, pulse.weight, wave) or wave
     if bend is None:
         return place(wave, pulse, knowledge)
-    bent = _refit(pulse, wave, elements, bend.sound_speed, 0.0, sonar.assumed_sound_speed)
+    bent = _refit(pulse, wave, elements, bend.sound_speed, 0.0, c)
     row = place(wave, pulse, replace(knowledge, gradient=bend.gradient), bent)
     for _ in range(3):  # delays beyond straight ones change little with the place: this settles at once
         extra = bend.delays(row.position)
         if not np.all(np.isfinite(extra)):
             break
-        row = place(_refit(pulse, wave, elements, sonar.assumed_sound_speed, extra), pulse, knowledge, bent)
+        row = place(_refit(pulse, wave, elements, c, extra), pulse, knowledge, bent)
     return row
 
 

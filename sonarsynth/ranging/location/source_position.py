@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -70,6 +70,7 @@ class SonarKnowledge:
     on_bottom: bool = True  # whether sources may be taken to be on the bottom, where the wavefront agrees
     kink: float = 0.0  # 1/s: change of the gradient of the sound speed over the array
     bottom_reflects: bool = False  # whether a source on the bottom is heard with its reflection there
+    velocity: Floats = field(default_factory=lambda: np.zeros(3))  # (xyz) m/s of the array, sonar frame
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.description import FieldError
 from sonarsynth.equations.bubble.snap_pressure import ComplexArray
 from sonarsynth.equations.scattering.facet_pulses import facet_mean, rough_factor
-from sonarsynth.receiver import Sonar
+from sonarsynth.receiver import Sonar, stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import at_longest, pulse_spectrum, stretch_sizes, stretched_spectra
@@ -63,8 +64,8 @@ def bins_of(
 ) -> tuple[ArrayPaths, Bins]:
     """The paths of a stretch, with the modes of their pulses, and its bins.
 
-    Errors are relative to the least blurred path; paths that are silent beside it are left out. Raises ValueError for
-    facets with corners more than `MOST_PHASE` from their middle.
+    Errors are relative to the least blurred path; paths that are silent beside it are left out. Raises FieldError
+    for facets with corners more than `MOST_PHASE` from their middle at what the filter passes.
     """
     fs = sonar.sampling_frequency
     frequency, spectrum = pulse_spectrum(segment.waveform, sonar.antialias, fs, segment.samples)
@@ -81,12 +82,13 @@ def bins_of(
         front, spectrum, series = _shared(front, frequency, spectrum, series, widest, tolerance)
     loud = audible(spectrum, tolerance)
     frequency, spectrum, series = frequency[loud], spectrum[loud], series[:, loud]
-    modes, variation = np.zeros((0, spectrum.size), complex), UNCHANGING
     if front.variance.any():
         front = _loud(front, frequency, spectrum, tolerance)
-    relative = relative_absorption(absorption, frequency, sonar.band.centre)
     if front.corner_delays.any():
-        _check_corners(front, float(frequency[-1]))
+        taken = slice(_bins_of_corners(front, frequency, sonar))
+        frequency, spectrum, series = frequency[taken], spectrum[taken], series[:, taken]
+    modes, variation = np.zeros((0, spectrum.size), complex), UNCHANGING
+    relative = relative_absorption(absorption, frequency, sonar.band.centre)
     if front.count > 1:
         front = _changing(front, frequency[-1:], tolerance)
     if len(series) or _shaped(front):
@@ -114,15 +116,21 @@ def _changing(front: ArrayPaths, highest: Floats, tolerance: float) -> ArrayPath
     return replace(front, expansion=front.expansion.without(*quiet))
 
 
-def _check_corners(front: ArrayPaths, highest: float) -> None:
-    """Raise ValueError where a facet is too large for the series in its corners."""
-    longest = MOST_PHASE / (2.0 * np.pi * highest)
-    far = np.abs(front.corner_delays).max()
-    if far > longest:
-        raise ValueError(
-            f"facets up to {1e6 * far:.3g} us from middle to corner are too large for synthesis in modes up to "
-            f"{highest:.6g} Hz, which takes {1e6 * longest:.3g} us: split them, or use direct_sum"
+def _bins_of_corners(front: ArrayPaths, frequency: Floats, sonar: Sonar) -> int:
+    """Bins, the first ones, at which the series in the corners of facets holds: all that the filter passes.
+
+    Raises FieldError where it passes more, for facets are as short as the band asks.
+    """
+    far = float(np.abs(front.corner_delays).max())
+    highest = MOST_PHASE / (2.0 * np.pi * far)
+    if frequency[-1] > highest and stop_frequency(sonar.antialias) > highest:
+        message = (
+            f"sound passes up to {stop_frequency(sonar.antialias) / 1e3:.4g} kHz, and facets up to {1e6 * far:.3g} us "
+            f"from middle to corner are too long over {highest / 1e3:.4g} kHz: lower it, refine the shapes "
+            "(shape.edge), or use scene.physics.synthesis direct_sum"
         )
+        raise FieldError(("scene", "sonar", "filter"), message)
+    return int(np.searchsorted(frequency, highest, side="right"))
 
 
 def _with_modes(

@@ -54,9 +54,9 @@ def generate(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) -> tup
         case LShape():
             return (_refined(l_shape(shape), shape.edge) if _finer(shape.edge, edge) else _l_shape(shape, edge)), ()
         case Knots():
-            return octahedra(knots(shape), shape.radius), ()
+            return _refined(octahedra(knots(shape), shape.radius), edge), ()
         case School():
-            return octahedra(members(shape), shape.radius), ()
+            return _refined(octahedra(members(shape), shape.radius), edge), ()
         case MeshFile():
             raise TypeError("a mesh file is read, not generated")
 
