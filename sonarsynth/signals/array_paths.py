@@ -226,6 +226,18 @@ def reach(front: Wavefronts) -> Floats:
     return np.asarray(front.aperture / front.sound_speed + front.expansion.largest("delay"))
 
 
+def steered_spread(front: Wavefronts, rows: Ints) -> float:
+    """Bound (s) on how much sooner or later some paths meet any hydrophone than one front from among them, which meets
+    the array centre when they do."""
+    aperture, far = front.aperture, np.ptp(front.direction[rows], axis=0)
+    spread = 2.0 * float(reach(front)[rows].max())
+    if float(front.curvature[rows].max()) * aperture > 0.5:
+        return spread
+    # |R d - q| - R varies with d by at most 2 |q|, with 1/R by at most |q|^2
+    apart = 2.0 * aperture * float(np.linalg.norm(far)) + aperture**2 * float(np.ptp(front.curvature[rows]))
+    return min(spread, apart / front.sound_speed + float(np.ptp(front.expansion.delay[rows], axis=0).sum()))
+
+
 def reference_of(front: Wavefronts, middle: Floats, phase: Floats, variance: Floats) -> Wavefronts:
     """The front that a tile of paths is steered to, from the middle (column,) of their directions, curvatures,
     absorption and delay terms, and the change over the aperture that it takes."""

@@ -23,15 +23,12 @@ from sonarsynth.signals.filtered_pulse import (
     stretched_spectra,
 )
 from sonarsynth.signals.gridded.nodes import polynomials, rounded_up
-from sonarsynth.signals.segments import fast_length, layout
+from sonarsynth.signals.segments import GUARD, fast_length, layout
 from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
 
 if TYPE_CHECKING:
     from sonarsynth.signals import SignalSynthesis
-
-GUARD = 4
-"""Samples of silence at either end of a slot of time."""
 
 STRETCH_TOLERANCE = 1e-6
 """Error of the spectra of pulses that Doppler stretches, relative to their size."""

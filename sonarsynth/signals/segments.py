@@ -12,7 +12,7 @@ from sonarsynth.equations.noise.filters import SUPPORT_TOLERANCE
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
-from sonarsynth.signals.array_paths import ArrayPaths, delay_and_gain, reach
+from sonarsynth.signals.array_paths import ArrayPaths, delay_and_gain, reach, steered_spread
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, PulseChanges, at_longest, silencing_blur, support_of
 from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
@@ -22,9 +22,13 @@ FAST = (16, 18, 20, 24, 27, 30)
 kept."""
 
 
+GUARD = 4
+"""Samples of silence at either end of a stretch: half of the widest kernel that hydrophones hear it by."""
+
+
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """Paths of one waveform whose pulses overlap in time, and the samples that hold them."""
+    """Paths of one waveform whose pulses overlap in time, and the samples that hold them at the array centre."""
 
     paths: Ints  # (path,) which
     waveform: Waveform
@@ -77,8 +81,9 @@ def layout(
         for coherent, direct in ((False, True), (False, False), (True, True), (True, False)):
             rows = np.flatnonzero(same & (front.coherent == coherent) & (arrivals.direct == direct))
             for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
-                first = int(np.floor((early[chosen].min() - start) * fs)) - 1
-                last = int(np.ceil((late[chosen].max() - start) * fs)) + 1
+                spread, delay = steered_spread(front, chosen), front.delay[chosen] - start
+                first = int(np.floor(((delay - before[chosen]).min() - spread) * fs)) - GUARD
+                last = int(np.ceil(((delay + after[chosen]).max() + spread) * fs)) + GUARD
                 stretches.append(Segment(chosen, waveform, coherent, first, fast_length(last - first + 1)))
     return Layout(tuple(stretches), audible, int((cut & (arrivals.kind != Kind.REVERBERATION)).sum()), support)
 

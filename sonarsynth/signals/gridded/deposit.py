@@ -102,7 +102,8 @@ def add_segment(
     highest: float,
     method: tuple[int, float, str, float],
 ) -> None:
-    """Add to out (sensor, sample) the pressure of paths in a stretch that holds the whole of their pulses.
+    """Add to out (sensor, sample) the pressure of paths in a stretch that holds the whole of their pulses, as the array
+    centre hears them.
 
     The stretch begins at `origin` (s) and at sample `first` of out, which may be negative, and has `samples`, even.
     highest (Hz) is the stop edge of the filter; method is width, oversampling, precision and tolerance of
@@ -140,13 +141,13 @@ def _add_tile(out: npt.NDArray[Any], tile: Tile, paths: Wavefronts, stage: Stage
     some = field[:, bins.first : bins.first + bins.frequency.size]
     if alone:  # everything is steered to it: the field is that of the snap, through its face
         power, response = _power(tile, stage, stage.wave.spectrum), _responses(paths.modes, stage)
+        response = response * np.exp(-2j * np.pi * (paths.delay[0] - stage.origin) * bins.frequency)
         some[:] = (_faces(tile, steering, stage) * power * response)[:, 0]
     else:
         _deposit(field, tile, paths, steering, stage)
     if tile.reference.expansion.phase.any() or tile.reference.expansion.delay_variance.any():
         some *= changed(tile.reference, steering.points, bins.frequency)
     delay, gain = delay_and_gain(tile.reference, elements.position)
-    late = delay[0] + (paths.delay[0] - stage.origin if alone else 0.0)
     gain = gain[0] * elements.gain * (paths.amplitude[0] if alone else 1.0)
     if alone and paths.occluded.shape[1]:
         gain = gain * ~paths.occluded[0]
@@ -156,8 +157,8 @@ def _add_tile(out: npt.NDArray[Any], tile: Tile, paths: Wavefronts, stage: Stage
     if onto is not None:
         wave = onto @ wave
     wave = wave.reshape(len(wave), weight.shape[1], 2, stage.samples)
-    place, kernel = -late * bins.step * 2 * stage.samples, stage.wave
-    hear(wave, column, weight, place, gain, kernel.taps, kernel.lanes, stage.first, out)
+    late, kernel = delay[0] * bins.step * 2 * stage.samples, stage.wave
+    hear(wave, column, weight, late, gain, kernel.taps, kernel.lanes, stage.first, out)
 
 
 def _deposit(field: npt.NDArray[Any], tile: Tile, paths: Wavefronts, steering: Steering, stage: Stage) -> None:

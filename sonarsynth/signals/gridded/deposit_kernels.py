@@ -228,39 +228,38 @@ def _add_filtered(wave: Any, a: float, b: float, c: float, d: float, out: Any) -
 
 @compiled(fastmath=True)
 def hear(
-    field: Any, column: Any, weight: Any, place: Any, gain: Any, taps: Any, lanes: int, begin: int, out: Any
+    field: Any, column: Any, weight: Any, late: Any, gain: Any, taps: Any, lanes: int, begin: int, out: Any
 ) -> None:
-    """Add the field at each hydrophone, delayed and amplified, to out (sensor, sample), from sample `begin` on, which
-    may be negative.
+    """Add the field at each hydrophone, delayed and amplified, to out (sensor, sample); it begins at sample `begin`,
+    which may be negative, and is silent at its ends.
 
-    The field at sensor s is sum_n weight[s, n] field[column[s], n]; field (column, node, parity, sample) is a circle
-    of time at twice the sampling rate, even samples and odd ones. Sample n of out is the field at 2 n + place[s],
-    interpolated with the kernel of `deposit`, taps (row * 4 * lane,), as wide as it has lanes.
+    The field at sensor s is sum_n weight[s, n] field[column[s], n]; field (column, node, parity, sample) has twice the
+    sampling rate, even samples and odd ones. late (sensor,) is in samples of it, which are interpolated with the kernel
+    of `deposit`, taps (row * 4 * lane,), as wide as it has lanes.
     """
     samples, cubes, number = field.shape[3], taps.size // (4 * lanes), taps.dtype.type
-    low, high = max(-begin, 0), min(samples, out.shape[1] - begin)
-    wave = np.empty((2, samples + 3), field.dtype)
+    wave = np.zeros((2, samples + 2 * lanes), field.dtype)  # between zeros
     for q in range(out.shape[0]):
         if gain[q] == 0.0:
             continue
         nodes, last = field[column[q]], weight.shape[1] - 1
         for p in range(2):
-            wave[p] = 0.0
+            summed = wave[p, lanes : lanes + samples]
+            summed[:] = 0.0
             for n in range(0, last, 2):
-                _add_two(weight[q, n], nodes[n, p], weight[q, n + 1], nodes[n + 1, p], wave[p])
+                _add_two(weight[q, n], nodes[n, p], weight[q, n + 1], nodes[n + 1, p], summed)
             if last % 2 == 0:
-                _add_two(weight[q, last], nodes[last, p], number(0.0), nodes[last, p], wave[p])
-            wave[p, samples:] = wave[p, :3]
-        first = np.floor(place[q] - 0.5 * lanes) + 1.0
-        x = (first - (place[q] - 0.5 * lanes)) * cubes
-        cube, factor = min(np.floor(x), cubes - 1.0), number(gain[q])
-        row = out[q, begin + low : begin + high]
+                _add_two(weight[q, last], nodes[last, p], number(0.0), nodes[last, p], summed)
+        whole = np.floor(0.5 * late[q])
+        low = 2.0 * whole - late[q] - 0.5 * lanes
+        first = np.floor(low) + 1.0
+        cube, factor = min(np.floor((first - low) * cubes), cubes - 1.0), number(gain[q])
+        x = (first - low) * cubes - cube - 0.5
+        start = begin + int(whole)
+        row = out[q, max(start, 0) : max(start + samples, 0)]
         for lane in range(0, lanes, 8):
-            t: Any = cubics(taps, int(cube) * 4 * lanes + lane, lanes, number(x - cube - 0.5))  # type: ignore[call-arg]
+            t: Any = cubics(taps, int(cube) * 4 * lanes + lane, lanes, number(x))  # type: ignore[call-arg]
             for p in range(2):
                 sample = int(first) + lane + p
-                ahead, nearest = (sample >> 1) % samples, wave[sample & 1]
-                turn = min(max(samples - ahead, low), high)  # from where on the circle begins anew
                 a, b, c, d = factor * t[p], factor * t[p + 2], factor * t[p + 4], factor * t[p + 6]
-                _add_filtered(nearest[low + ahead :], a, b, c, d, row[: turn - low])
-                _add_filtered(nearest[turn + ahead - samples :], a, b, c, d, row[turn - low :])
+                _add_filtered(wave[sample & 1, lanes + (sample >> 1) + max(-start, 0) :], a, b, c, d, row)
