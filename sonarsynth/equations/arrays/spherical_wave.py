@@ -17,9 +17,6 @@ from sonarsynth.conventions import Floats
 RANK_TOLERANCE = 1e-6
 """Singular values of the sensor positions below this share of the largest count as zero."""
 
-SETTLED = 1e-8
-"""A step (rad) after which Gauss-Newton stops: what is left is its square."""
-
 
 @dataclass(frozen=True, eq=False)
 class Wavefront:
@@ -36,18 +33,17 @@ class Wavefront:
 
 def wavefront_delays(position: npt.ArrayLike, direction: npt.ArrayLike, curvature: float, sound_speed: float) -> Floats:
     """Delays (sensor,) in s after the array centre of a wave from `direction` at sensors `position` (sensor, xyz)."""
+    from sonarsynth.equations.arrays.spherical_wave_kernel import delays_after_centre
+
     q, u = np.asarray(position, float), np.asarray(direction, float)
-    along, square = q @ u, np.sum(q * q, axis=-1)
-    rho = np.sqrt(1 - 2 * curvature * along + curvature**2 * square)
-    return np.asarray((curvature * square - 2 * along) / (sound_speed * (1 + rho)))
+    return np.asarray(delays_after_centre(q, u, float(curvature), float(sound_speed)))
 
 
 def tangent_plane(direction: npt.ArrayLike) -> Floats:
     """Unit vectors (2, xyz) square to a direction: of increasing azimuth and elevation (y first at a pole)."""
-    u = np.asarray(direction, float)
-    flat = np.hypot(u[0], u[1])
-    y, x = (u[1] / flat, u[0] / flat) if flat > 0 else (0.0, 1.0)
-    return np.array([[-y, x, 0.0], [-u[2] * x, -u[2] * y, flat]])
+    from sonarsynth.equations.arrays.spherical_wave_kernel import tangents_at
+
+    return np.asarray(tangents_at(np.asarray(direction, float)))
 
 
 def plane_wavefront(direction: Floats, time: float) -> Wavefront:
@@ -114,44 +110,14 @@ def spherical_wave(
     size = float(np.sqrt(np.einsum("qi,qi->q", q, q).max(initial=0.0)))
     if not (np.all(np.isfinite(u)) and size > 0):
         return None
-    from sonarsynth.equations.arrays.spherical_wave_kernel import normal_equations
+    from sonarsynth.equations.arrays.spherical_wave_kernel import gauss_newton
 
-    for _ in range(iterations):
-        tangents = tangent_plane(u)
-        normal, right, own, late, jacobian = normal_equations(q, t, w, u, k, sound_speed, tangents)
-        inverse = _inverse(normal, curved)
-        if inverse is None:
-            return None
-        covariance = inverse
-        step = covariance @ right
-        turned = u + step[:2] @ tangents
-        bent = min(max(k + float(step[2]), -0.5 / size), 2.0 / size)  # no source among the sensors
-        moved = np.hypot(step[0], step[1]) + abs(bent - k) * size
-        u, k = turned / np.sqrt(turned @ turned), bent
-        if moved < SETTLED:
-            break
-    residual = late - jacobian @ step
-    by_speed = covariance @ own / sound_speed
+    found, *wave = gauss_newton(q, t, w, (u, k), float(sound_speed), size, curved, iterations)
+    if not found:
+        return None
     if not curved:
-        covariance[2, 2] = np.inf
-    return Wavefront(u, k, float(step[3]), tangents, covariance, by_speed, residual)
-
-
-def _inverse(normal: Floats, curved: bool) -> Floats | None:
-    """Inverse of J^T W J (4, 4), with columns scaled; None where it is singular.
-
-    Not `curved`: of all but the curvature, whose row and column are zero.
-    """
-    used = normal if curved else np.delete(np.delete(normal, 2, axis=0), 2, axis=1)
-    scale = np.sqrt(used.diagonal())
-    if not scale.min() > 0:
-        return None
-    values, vectors = np.linalg.eigh(used / scale / scale[:, None])
-    if not values[0] > 1e-13 * values[-1]:
-        return None
-    vectors = vectors / scale[:, None]
-    inverse = np.asarray((vectors / values) @ vectors.T)
-    return inverse if curved else np.insert(np.insert(inverse, 2, 0.0, axis=0), 2, 0.0, axis=1)
+        wave[4][2, 2] = np.inf
+    return Wavefront(*wave)
 
 
 def envelope_peak(

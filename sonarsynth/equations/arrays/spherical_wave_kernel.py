@@ -1,4 +1,4 @@
-"""The sums of a fit of a spherical wave over the sensors of an array: the compiled kernel of source estimates."""
+"""Delays of a spherical wave over an array, and the fit of one to delays: the compiled kernel of source estimates."""
 
 from __future__ import annotations
 
@@ -7,6 +7,29 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.compiling import compiled
+
+SETTLED = 1e-8
+"""A step (rad) after which Gauss-Newton stops: what is left is its square."""
+
+
+@compiled
+def delays_after_centre(position: Any, direction: Any, curvature: float, sound_speed: float) -> Any:
+    """As `spherical_wave.wavefront_delays`."""
+    delay = np.empty(len(position))
+    for q in range(len(position)):
+        x, y, z = position[q]
+        along, square = x * direction[0] + y * direction[1] + z * direction[2], x * x + y * y + z * z
+        rho = np.sqrt(1 - 2 * curvature * along + curvature**2 * square)
+        delay[q] = (curvature * square - 2 * along) / (sound_speed * (1 + rho))
+    return delay
+
+
+@compiled
+def tangents_at(u: Any) -> Any:
+    """As `spherical_wave.tangent_plane`."""
+    flat = np.hypot(u[0], u[1])
+    y, x = (u[1] / flat, u[0] / flat) if flat > 0 else (0.0, 1.0)
+    return np.array([[-y, x, 0.0], [-u[2] * x, -u[2] * y, flat]])
 
 
 @compiled
@@ -42,3 +65,45 @@ def normal_equations(
         for k in range(i):
             normal[k, i] = normal[i, k]
     return normal, right, own, late, jacobian
+
+
+@compiled
+def inverse_of(normal: Any, curved: bool) -> Any:
+    """Whether J^T W J (4, 4) has an inverse, its columns scaled, and that; not `curved`: of all but the curvature, of
+    which row and column are zero."""
+    inverse, used = np.zeros((4, 4)), np.array([0, 1, 2, 3] if curved else [0, 1, 3])
+    scale = np.sqrt(np.diag(normal)[used])
+    if not (np.isfinite(normal).all() and scale.min() > 0):
+        return False, inverse
+    scaled = np.empty((len(used), len(used)))
+    for i, row in enumerate(used):
+        for j, column in enumerate(used):
+            scaled[i, j] = normal[row, column] / (scale[i] * scale[j])
+    values, vectors = np.linalg.eigh(scaled)
+    if not values[0] > 1e-13 * values[-1]:
+        return False, inverse
+    for i, row in enumerate(used):
+        for j, column in enumerate(used):
+            inverse[row, column] = np.sum(vectors[i] * vectors[j] / values) / (scale[i] * scale[j])
+    return True, inverse
+
+
+@compiled
+def gauss_newton(
+    position: Any, delay: Any, weight: Any, start: Any, speed: float, size: float, curved: bool, iterations: int
+) -> Any:
+    """The fit of `spherical_wave.spherical_wave` from `start` (direction, curvature) in arrays of `size` (m): whether
+    there is one, direction, curvature, time, tangents, covariance, change by the sound speed, residual."""
+    u, k = start
+    for _ in range(iterations):
+        tangents = tangents_at(u)
+        normal, right, own, late, jacobian = normal_equations(position, delay, weight, u, k, speed, tangents)
+        found, covariance = inverse_of(normal, curved)
+        step = covariance @ right
+        turned = u + step[0] * tangents[0] + step[1] * tangents[1]
+        bent = min(max(k + step[2], -0.5 / size), 2.0 / size)  # no source among the sensors
+        moved = np.hypot(step[0], step[1]) + abs(bent - k) * size
+        u, k = turned / np.sqrt(np.sum(turned * turned)), bent
+        if not (found and moved >= SETTLED):
+            break
+    return found, u, k, step[3], tangents, covariance, covariance @ own / speed, late - jacobian @ step
