@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any, get_args
 
@@ -15,6 +15,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.frontiers.exact_frame import exact_plan
 from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.imaging import Beamformer, DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.imaging.delay_and_sum.zones import cuts
 from sonarsynth.pipeline import BeamformedFrame, cloud_of
 from sonarsynth.planning import Plan
 from sonarsynth.products import EnergyImage, PointCloud
@@ -24,7 +25,9 @@ from sonarsynth.recipe.scene import Frame
 
 BRIGHT = 20.0
 """dB under the brightest beam: beams that count."""
-PARTS = (0, 1, 2, 3, 4)
+TRIED = 5
+"""Ways to cut the array into subarrays that are walked."""
+
 BESIDE = 0.02
 """rad of direction, and m of path: points of two clouds that are further apart are not one."""
 
@@ -39,15 +42,13 @@ def image_points(plan: Plan, beamformed: BeamformedFrame, peers: bool = True) ->
     settings: list[tuple[str, str, Any]] = []
     if plan.elements.on_lattice and isinstance(slow, DenseDelayAndSum):
         fast: Any = FocusedDelayAndSum(focus=slow.focus, shading=slow.shading)
-        if any(f.name == "parts" for f in fields(fast)):
-            settings += [("parts", f"{n} x {n} parts", replace(fast, parts=n)) for n in PARTS]
-        else:
-            settings += [("focus", "focused", fast)]
+        methods = [replace(fast, subarrays=cut) for cut in cuts(plan.elements, slow.focus)[:TRIED]]
+        settings += [("subarrays", method.row(), method) for method in methods]
         if slow.focus is not None:
             settings += [("focus", "plane waves", replace(fast, focus=None))]
     if getattr(chosen, "bins", "") == "few":
         settings.append(("bins", "all bins", replace(chosen, bins="all")))
-    for knob, setting, method in [("chosen", named(chosen), chosen), *settings]:
+    for knob, setting, method in [("chosen", chosen.row(), chosen), *settings]:
         if knob != "chosen" and method == chosen:
             continue
         if method == slow:
@@ -68,12 +69,6 @@ def other_images(slow: Any, elements: Elements) -> list[Any]:
     kinds = [kind for kind in get_args(get_args(Beamformer)[0]) if kind().exact().kind != slow.kind]
     methods = [kind(focus=slow.focus) if "focus" in kind.__dataclass_fields__ else kind() for kind in kinds]
     return [method for method in methods if not method.refusal(elements)]
-
-
-def named(method: Any) -> str:
-    """A beamformer in a few words."""
-    parts = getattr(method, "parts", None)
-    return f"{method.kind}, {parts} x {parts} parts" if parts is not None else str(method.kind)
 
 
 def imaged(beamformed: BeamformedFrame) -> bool:

@@ -14,7 +14,7 @@ from sonarsynth.description import description
 from sonarsynth.description.method import FrameSize
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
-from sonarsynth.imaging.delay_and_sum.focused import AUTO_ERROR, FocusedDelayAndSum
+from sonarsynth.imaging.delay_and_sum.focused import FocusedDelayAndSum
 from sonarsynth.imaging.image_window import Shading, weights
 from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import Snapshots
@@ -60,7 +60,7 @@ class Clean(Steering):
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`: an image for each direction that something is taken from."""
-        return DIRECTIONS * FocusedDelayAndSum(parts=2).cost(size)
+        return DIRECTIONS * FocusedDelayAndSum(subarrays=(2, 2)).cost(size)
 
     def row(self) -> str:
         """Its kind, and how far down it goes."""
@@ -68,7 +68,7 @@ class Clean(Steering):
 
     def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
         """As `Steering.energies`."""
-        plain = AutoBeamforming(focus=self.focus, shading=self.shading).estimated(elements, sonar, AUTO_ERROR)
+        plain = AutoBeamforming(focus=self.focus, shading=self.shading).chosen(elements, sonar)
         power = snapshots.power(weights(elements, self.shading))
         amplitude = np.sqrt(power / power.sum()) if power.any() else power
 

@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats, direction
 from sonarsynth.description.method import FrameSize, Method
-from sonarsynth.equations.arrays.beams import beam_spectra, lattice_beam_spectra
+from sonarsynth.equations.arrays.beams import beam_spectra
+from sonarsynth.imaging.delay_and_sum.lattice_beams import lattice_beam_spectra
 from sonarsynth.imaging.image_window import Shading, energy_image, snapshots_of, weights
 from sonarsynth.products import BeamSpectra, EnergyImage, Signals, Snapshots
 from sonarsynth.receiver import Elements, Sonar
@@ -55,18 +56,7 @@ class Steering(Method):
         gain = weights(elements, self.shading)
         if not (elements.on_lattice and self.separable):
             return beam_spectra(spectra, frequency, elements.position, gain, direction, c, focus)
-        return lattice_beam_spectra(
-            spectra,
-            frequency,
-            elements.column,
-            elements.row,
-            (elements.columns, elements.rows),
-            pitch=elements.pitch,
-            gain=gain,
-            directions=direction,
-            sound_speed=c,
-            focus=focus,
-        )
+        return lattice_beam_spectra(spectra, frequency, elements, gain, direction, c, focus)
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`, of one image: every beam steered by itself."""

@@ -11,7 +11,7 @@ from sonarsynth.conventions import Floats, PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.description.method import FrameSize
 from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
-from sonarsynth.imaging.delay_and_sum.focused import AUTO_ERROR, FocusedDelayAndSum
+from sonarsynth.imaging.delay_and_sum.focused import FocusedDelayAndSum
 from sonarsynth.imaging.image_window import Shading, weights
 from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import Snapshots
@@ -44,7 +44,7 @@ class SubBand(Steering):
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`: a little more than delay and sum."""
-        return FocusedDelayAndSum(parts=2).cost(size)
+        return FocusedDelayAndSum(subarrays=(2, 2)).cost(size)
 
     def row(self) -> str:
         """Its kind, and the number of sub-bands."""
@@ -52,7 +52,7 @@ class SubBand(Steering):
 
     def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
         """As `Steering.energies`."""
-        plain = AutoBeamforming(focus=self.focus, shading=self.shading).estimated(elements, sonar, AUTO_ERROR)
+        plain = AutoBeamforming(focus=self.focus, shading=self.shading).chosen(elements, sonar)
         gain = weights(elements, self.shading)
         bins = len(snapshots.frequency)
         bands = [snapshots.select(block) for block in np.array_split(np.arange(bins), min(self.bands, bins))]

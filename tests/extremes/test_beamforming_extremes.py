@@ -9,9 +9,9 @@ from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.imaging.delay_and_sum.dense import dense_energies
-from sonarsynth.imaging.delay_and_sum.lattice_image import focused_energies
 from sonarsynth.products import Signals
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, Sonar, elements
+from tests.axial import axial_energies
 
 SPEED = 1540.0
 RATE = 196e3
@@ -31,7 +31,7 @@ def energies(array, grid, bins=20, low=25e3, spacing=250.0):
         np.complex64
     )
     frequencies = low + spacing * np.arange(bins)
-    fast = focused_energies(spectra, parts, parts.gain, frequencies, grid.azimuth, grid.elevation, SPEED, None)
+    fast = axial_energies(spectra, parts, parts.gain, frequencies, grid, SPEED, None)
     beams = direction(grid.azimuth, grid.elevation[:, None]).reshape(-1, 3)
     delay = focus_delay(parts.position, beams, None, SPEED)
     return fast, dense_energies(spectra, delay, parts.gain, frequencies).reshape(fast.shape)
@@ -98,7 +98,7 @@ def test_a_band_far_above_its_bins():
 def test_whole_turns_between_neighbours():
     """One bin whose wavelength is the pitch, at the grating lobe: the recurrence has nothing to turn."""
     parts = elements(PlanarLattice(columns=40, rows=40, pitch=0.1))
-    azimuth = np.array([-0.5, 0.0, 0.5]) * np.pi
+    grid = BeamGrid(azimuths=3, azimuth_span=np.pi - 1e-12, elevations=1)
     ones = np.ones((1600, 1), np.complex64)
-    energy = focused_energies(ones, parts, parts.gain / 1600, np.array([15400.0]), azimuth, np.zeros(1), SPEED, None)
+    energy = axial_energies(ones, parts, parts.gain / 1600, np.array([15400.0]), grid, SPEED, None)
     np.testing.assert_allclose(energy, 1.0, rtol=1e-6)

@@ -9,9 +9,9 @@ import pytest
 
 from sonarsynth.conventions import direction
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.imaging.delay_and_sum.lattice_image import focused_energies
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
+from tests.axial import axial_energies
 
 SPEED = 1540.0
 RATE = 196e3
@@ -159,12 +159,11 @@ def test_the_sonar_steers_at_the_sound_speed_that_it_assumes(method):
 def test_beam_of_the_508_elements_is_as_wide_as_published():
     """Half-power width at 25, 50, 85 kHz, c = 1540: 2.88, 1.44, 0.85 deg (equal-area disc 1.260 m: 1.03 lambda/D)."""
     array = elements(Romanis())
-    azimuth = (2.0 * np.arange(801) - 800) * np.deg2rad(4.0) / 1600
+    grid = BeamGrid(azimuths=801, azimuth_span=np.deg2rad(4.0), elevations=1)
+    azimuth = grid.azimuth
     for frequency, width in [(25e3, 2.88), (50e3, 1.44), (85e3, 0.85)]:
         still = np.ones((508, 1), np.complex64)
-        beams = focused_energies(
-            still, array, array.gain / 508, np.array([frequency]), azimuth, np.zeros(1), SPEED, None
-        )[0]
+        beams = axial_energies(still, array, array.gain / 508, np.array([frequency]), grid, SPEED, None)[0]
         half = azimuth[beams >= 0.5 * beams.max()]
         assert np.rad2deg(half[-1] - half[0]) == pytest.approx(width, abs=0.02)
 
@@ -172,9 +171,10 @@ def test_beam_of_the_508_elements_is_as_wide_as_published():
 def test_first_grating_lobe_lies_a_wavelength_per_pitch_off_the_axis():
     """Boresight, 85 kHz, 49.53 mm: sin a = lambda/pitch, 21.5 deg, as bright as the main lobe; none inside that."""
     array = elements(Romanis())
-    azimuth = (2.0 * np.arange(2001) - 2000) * np.deg2rad(25.0) / 2000
+    grid = BeamGrid(azimuths=2001, azimuth_span=np.deg2rad(50.0), elevations=1)
+    azimuth = grid.azimuth
     still = np.ones((508, 1), np.complex64)
-    beams = focused_energies(still, array, array.gain / 508, np.array([85e3]), azimuth, np.zeros(1), SPEED, None)[0]
+    beams = axial_energies(still, array, array.gain / 508, np.array([85e3]), grid, SPEED, None)[0]
     side = azimuth > np.deg2rad(5.0)
     lobe = azimuth[side][np.argmax(beams[side])]
     assert lobe == pytest.approx(np.arcsin(SPEED / 85e3 / 0.04953), abs=np.deg2rad(0.03))

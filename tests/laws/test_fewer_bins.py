@@ -17,7 +17,7 @@ from tests.heard import RATE, pulse_spectrum
 
 ARRAY, SONAR = elements(Romanis()), Sonar(array=Romanis())
 WINDOW = (0.5e-3, 6.0e-3)
-FEW, ALL = (FocusedDelayAndSum(focus=None, parts=0, bins=bins) for bins in ("few", "all"))
+FEW, ALL = (FocusedDelayAndSum(focus=None, subarrays="axis", bins=bins) for bins in ("few", "all"))
 
 
 def echoes(seed, noise=0.0):
@@ -66,10 +66,12 @@ def test_sums_of_cosines_are_those_over_all_bins(bins, step):
 
 
 def test_a_plan_takes_few_bins_only_where_they_are_as_good():
-    """Left to a plan, bins are few; where these err by more than is allowed with any parts, so does the method."""
+    """Left to a plan, bins are few; where these err by more than is allowed with any subarrays, so does the method."""
     from sonarsynth.description.method import Demand
 
-    method, error = FocusedDelayAndSum().resolve(Demand(0.1, False, lambda m: 0.05 if m.parts == 2 else 0.2, ARRAY))
-    assert (method, error) == (FocusedDelayAndSum(parts=2, bins="few"), 0.05)
+    method, error = FocusedDelayAndSum().resolve(
+        Demand(0.1, False, lambda m: 0.05 if m.subarrays == (2, 2) else 0.2, ARRAY)
+    )
+    assert (method, error) == (FocusedDelayAndSum(subarrays=(2, 2), bins="few"), 0.05)
     chosen = replace(method, bins="all")
     assert chosen.resolve(Demand(0.1, False, lambda m: 0.2, ARRAY)) == (chosen, 0.2)

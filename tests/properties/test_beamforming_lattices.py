@@ -10,8 +10,8 @@ from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.gates import gate_samples, gate_taper
 from sonarsynth.imaging.delay_and_sum.dense import dense_energies
-from sonarsynth.imaging.delay_and_sum.lattice_image import focused_energies
 from sonarsynth.receiver import BeamGrid, PlanarLattice, elements
+from tests.axial import axial_energies
 
 
 @st.composite
@@ -40,7 +40,7 @@ def test_kernel_is_the_direct_sum(array, azimuths, elevations, bins, focus, spee
         np.complex64
     )
     frequencies = 20e3 + 300.0 * np.arange(bins)
-    fast = focused_energies(spectra, parts, parts.gain, frequencies, grid.azimuth, grid.elevation, speed, focus)
+    fast = axial_energies(spectra, parts, parts.gain, frequencies, grid, speed, focus)
     beams = direction(grid.azimuth, grid.elevation[:, None]).reshape(-1, 3)
     on_axis = focus_delay(parts.position, np.array([1.0, 0.0, 0.0]), focus, speed)
     delay = on_axis + focus_delay(parts.position, beams, None, speed)

@@ -11,8 +11,8 @@ from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.beams import beam_spectra
 from sonarsynth.equations.arrays.gates import fast_length, frequency_spacing, gate_taper, gated_spectra
 from sonarsynth.imaging.delay_and_sum.dense import dense_energies
-from sonarsynth.imaging.delay_and_sum.lattice_image import focused_energies
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, elements
+from tests.axial import axial_energies
 
 SPEED = 1540.0
 
@@ -28,7 +28,7 @@ def both(array, grid, bins, focus, low=25e3, spacing=250.0, weight=None):
     weight = parts.gain if weight is None else weight
     spectra = random_spectra(parts.count, bins)
     frequencies = low + spacing * np.arange(bins)
-    fast = focused_energies(spectra, parts, weight, frequencies, grid.azimuth, grid.elevation, SPEED, focus)
+    fast = axial_energies(spectra, parts, weight, frequencies, grid, SPEED, focus)
     beams = direction(grid.azimuth, grid.elevation[:, None]).reshape(-1, 3)
     on_axis = focus_delay(parts.position, np.array([1.0, 0.0, 0.0]), focus, SPEED)
     delay = on_axis + focus_delay(parts.position, beams, None, SPEED)
@@ -60,17 +60,10 @@ def test_same_bits_whoever_asks():
     array, grid = elements(Romanis()), BeamGrid(azimuths=6, elevations=5)
     spectra = random_spectra(508, 100)
     frequencies = 25e3 + 250.0 * np.arange(100)
-    first, again = (
-        focused_energies(spectra, array, array.gain, frequencies, grid.azimuth, grid.elevation, SPEED, 20.0)
-        for _ in range(2)
-    )
+    first, again = (axial_energies(spectra, array, array.gain, frequencies, grid, SPEED, 20.0) for _ in range(2))
     np.testing.assert_array_equal(first, again)
-    part = focused_energies(
-        spectra[:, :64], array, array.gain, frequencies[:64], grid.azimuth, grid.elevation, SPEED, 20.0
-    )
-    rest = focused_energies(
-        spectra[:, 64:], array, array.gain, frequencies[64:], grid.azimuth, grid.elevation, SPEED, 20.0
-    )
+    part = axial_energies(spectra[:, :64], array, array.gain, frequencies[:64], grid, SPEED, 20.0)
+    rest = axial_energies(spectra[:, 64:], array, array.gain, frequencies[64:], grid, SPEED, 20.0)
     np.testing.assert_array_equal(part + rest, first)
 
 
@@ -78,11 +71,12 @@ def test_same_bits_whoever_asks():
 def test_loss_of_the_separable_focus_in_the_corner(radius, loss):
     """Flat spectrum from 25 to 85 kHz, source at (25, 25) deg at the focus: dB lost in its own beam."""
     array = elements(Romanis())
-    corner = np.deg2rad([-25.0, 25.0])
+    grid = BeamGrid(azimuths=2, azimuth_span=np.deg2rad(50), elevations=2, elevation_span=np.deg2rad(50))
+    corner = grid.azimuth
     frequencies = 25e3 + 1e3 * np.arange(61)
     arrival = focus_delay(array.position, direction(corner[1], corner[1]), radius, SPEED)
     spectra = np.exp(-2j * np.pi * frequencies * arrival[:, None]).astype(np.complex64)
-    energy = focused_energies(spectra, array, array.gain / 508, frequencies, corner, corner, SPEED, radius)[1, 1] / 61
+    energy = axial_energies(spectra, array, array.gain / 508, frequencies, grid, SPEED, radius)[1, 1] / 61
     assert -10 * np.log10(energy) == pytest.approx(loss, abs=0.02)
 
 
@@ -114,7 +108,7 @@ def test_beams_and_image_have_the_same_energy():
     array, grid = elements(Romanis()), BeamGrid(azimuths=3, elevations=3)
     spectra = random_spectra(508, 70)
     frequencies = 30e3 + 500.0 * np.arange(70)
-    image = focused_energies(spectra, array, array.gain / 508, frequencies, grid.azimuth, grid.elevation, SPEED, None)
+    image = axial_energies(spectra, array, array.gain / 508, frequencies, grid, SPEED, None)
     u = direction(grid.azimuth, grid.elevation[:, None]).reshape(-1, 3)
     beams = beam_spectra(spectra, frequencies, array.position, array.gain, u, SPEED, None)
     np.testing.assert_allclose(np.sum(np.abs(beams.astype(complex)) ** 2, axis=-1), image.ravel(), rtol=5e-6)

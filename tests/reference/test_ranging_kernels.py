@@ -7,11 +7,12 @@ import pytest
 
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import element_directivity, focus_delay
-from sonarsynth.equations.arrays.beams import beam_spectra, lattice_beam_spectra
-from sonarsynth.imaging.delay_and_sum.lattice_image import focused_energies
+from sonarsynth.equations.arrays.beams import beam_spectra
+from sonarsynth.imaging.delay_and_sum.lattice_beams import lattice_beam_spectra
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location.pulse_times import in_band, template_spectrum
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, Romanis, elements
+from tests.axial import axial_energies
 
 SPEED = 1540.0
 AXIS = np.array([1.0, 0.0, 0.0])
@@ -31,19 +32,7 @@ def random_spectra(sensors, bins):
 
 
 def lattice_beams(spectra, frequencies, array, u, focus):
-    shape = array.columns, array.rows
-    return lattice_beam_spectra(
-        spectra,
-        frequencies,
-        array.column,
-        array.row,
-        shape,
-        pitch=array.pitch,
-        gain=array.gain,
-        directions=u,
-        sound_speed=SPEED,
-        focus=focus,
-    )
+    return lattice_beam_spectra(spectra, frequencies, array, array.gain / array.gain.sum(), u, SPEED, focus)
 
 
 @pytest.mark.parametrize("array", LATTICES)
@@ -72,7 +61,7 @@ def test_beams_of_a_lattice_are_those_of_its_image():
     array, grid = elements(Romanis()), BeamGrid(azimuths=5, elevations=4)
     spectra = random_spectra(508, 70)
     frequencies = 30e3 + 500.0 * np.arange(70)
-    image = focused_energies(spectra, array, array.gain / 508, frequencies, grid.azimuth, grid.elevation, SPEED, 8.0)
+    image = axial_energies(spectra, array, array.gain / 508, frequencies, grid, SPEED, 8.0)
     u = direction(grid.azimuth, grid.elevation[:, None]).reshape(-1, 3)
     beams = lattice_beams(spectra, frequencies, array, u, 8.0).astype(complex)
     np.testing.assert_allclose(np.sum(np.abs(beams) ** 2, axis=-1), image.ravel(), rtol=5e-6)

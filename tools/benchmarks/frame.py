@@ -65,7 +65,9 @@ def bench(index: int = 32) -> dict[str, Any]:
         "error_of_peak_focus": relative(image.energy, dense.energy),  # separable against spherical focusing
     }
     if isinstance(beamformer, FocusedDelayAndSum):
-        axial, seconds = cpu(lambda: replace(beamformer, parts=0).image(signals, plan.elements, sonar, start, stop))
+        axial, seconds = cpu(
+            lambda: replace(beamformer, subarrays="axis").image(signals, plan.elements, sonar, start, stop)
+        )
         stages["beamform"] |= {
             **likeness(image.energy, dense.energy),
             "focus_of_the_axis": {"ms": 1e3 * seconds, **likeness(axial.energy, dense.energy)},

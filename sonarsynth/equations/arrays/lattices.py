@@ -1,4 +1,4 @@
-"""Planar lattices folded along both axes: which sensors mirror each other, and the delays that all of them share.
+"""Planar lattices folded along both axes: which sensors mirror each other.
 
 The middle column and row of an odd number stand on the positive side alone. Places count from the middle outwards.
 """
@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints
-from sonarsynth.equations.arrays.apertures import focus_delay
+from sonarsynth.conventions import Bools, Floats, Ints
 
 
 def mirrored_sensors(column: Ints, row: Ints, columns: int, rows: int, live: Ints, nobody: int) -> Ints:
@@ -24,17 +23,11 @@ def mirrored_sensors(column: Ints, row: Ints, columns: int, rows: int, live: Int
     return places
 
 
+def rows_in_use(used: Bools) -> Ints:
+    """Half rows (..., half column) up to the last that is used (..., half column, half row)."""
+    return np.where(np.any(used, axis=-1), used.shape[-1] - np.argmax(used[..., ::-1], axis=-1), 0)
+
+
 def half_coordinates(count: int, pitch: float) -> Floats:
     """Coordinates >= 0 (half count,) in m of `count` sensors `pitch` apart, from the middle outwards."""
     return 0.5 * pitch * np.arange((count + 1) % 2, count, 2, dtype=float)
-
-
-def axial_focus_delay(columns: int, rows: int, pitch: float, focus: float | None, sound_speed: float) -> Floats:
-    """Delay (half column, half row) in s after the array centre of a source at `focus` (m) on the axis x.
-
-    (sqrt(R^2 + q^2) - R)/c, the same for the four sensors of a place; pitch in m; focus None: 0, a plane wave.
-    """
-    y, z = half_coordinates(columns, pitch), half_coordinates(rows, pitch)
-    sensors = np.stack(np.broadcast_arrays(0.0, y[:, None], z), axis=-1)
-    delay = focus_delay(sensors.reshape(-1, 3), np.array([1.0, 0.0, 0.0]), focus, sound_speed)
-    return delay.reshape(len(y), len(z))

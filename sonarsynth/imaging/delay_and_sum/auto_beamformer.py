@@ -8,8 +8,8 @@ from sonarsynth.conventions import Floats, PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand
 from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
-from sonarsynth.imaging.delay_and_sum.focus_error import parts_needed
-from sonarsynth.imaging.delay_and_sum.focused import AUTO_ERROR, FocusedDelayAndSum
+from sonarsynth.imaging.delay_and_sum.focus_error import subarrays_for
+from sonarsynth.imaging.delay_and_sum.focused import FocusedDelayAndSum
 from sonarsynth.imaging.image_window import Shading
 from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import Snapshots
@@ -18,8 +18,8 @@ from sonarsynth.receiver import Elements, Sonar
 
 @description
 class AutoBeamforming(Steering):
-    """Delay and sum: `focused` with the fewest parts that `focus_error` allows, `dense` where the array is no lattice
-    or 16 by 16 do not suffice."""
+    """Delay and sum: `focused` with the fewest subarrays that will do, `dense` where the array is no lattice or 16 by
+    16 will not."""
 
     kind: Literal["auto"] = "auto"
     focus: PositiveMetres | None = 20.0
@@ -39,14 +39,13 @@ class AutoBeamforming(Steering):
         """Every sensor in every beam, with the same focus and weights."""
         return DenseDelayAndSum(focus=self.focus, shading=self.shading)
 
-    def estimated(self, elements: Elements, sonar: Sonar, error_db: float) -> FocusedDelayAndSum | DenseDelayAndSum:
-        """The method whose `focus_error`, an estimate and no bound, is not above `error_db` (dB)."""
-        if elements.on_lattice:
-            parts = parts_needed(elements, self.shading, sonar, self.focus, error_db)
-            if parts is not None:
-                return FocusedDelayAndSum(focus=self.focus, shading=self.shading, parts=parts)
-        return DenseDelayAndSum(focus=self.focus, shading=self.shading)
+    def chosen(self, elements: Elements, sonar: Sonar) -> FocusedDelayAndSum | DenseDelayAndSum:
+        """`focused` with the fewest subarrays whose `focus_error` is under 0.1 dB, else `dense`."""
+        cut = subarrays_for(elements, self.shading, sonar, self.focus) if elements.on_lattice else None
+        if cut is None:
+            return self.exact()
+        return FocusedDelayAndSum(focus=self.focus, shading=self.shading, subarrays=cut)
 
     def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
-        """As `Steering.energies`, resolved for 0.1 dB."""
-        return self.estimated(elements, sonar, AUTO_ERROR).energies(snapshots, elements, sonar)
+        """As `Steering.energies`, of the method that is chosen."""
+        return self.chosen(elements, sonar).energies(snapshots, elements, sonar)

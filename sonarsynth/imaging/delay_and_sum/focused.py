@@ -12,29 +12,27 @@ from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize
 from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
 from sonarsynth.imaging.delay_and_sum.fewer_bins import fewer_bins
-from sonarsynth.imaging.delay_and_sum.focus_error import PARTS, parts_needed
+from sonarsynth.imaging.delay_and_sum.focus_error import subarrays_for
 from sonarsynth.imaging.delay_and_sum.lattice_image import (
     check_lattice,
-    focused_energies,
+    lattice_image,
     steered_zones,
-    zoned_energies,
 )
+from sonarsynth.imaging.delay_and_sum.zones import Subarrays, cuts
 from sonarsynth.imaging.image_window import Shading, weights
 from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
-AUTO_ERROR = 0.1
-"""dB, by `focus_error`, that parts are chosen for when nobody says how many."""
+Count = Annotated[int, Ge(1), Le(16)]
 
 
 @description
 class FocusedDelayAndSum(Steering):
     """Delay and sum on a lattice; masks, dead elements and weights are free.
 
-    Without parts the delay of focusing is that on the acoustic axis, in every direction. Off the axis it is not quite
-    the delay of a sphere: energy lost by a source at the focus, 1.3 m array (508 elements), flat spectrum from 25 to
-    85 kHz,
+    With the delays of the acoustic axis in every direction (`subarrays: axis`), which off the axis are not quite those
+    of a sphere, a source at the focus loses (1.3 m array of 508 elements, flat spectrum from 25 to 85 kHz)
 
         azimuth, elevation     50 m     20 m     10 m      5 m
         12.5, 12.5 deg         0.00     0.01     0.05     0.25 dB
@@ -44,21 +42,20 @@ class FocusedDelayAndSum(Steering):
     against 0.3, 1.5 to 1.8, 5 to 6 and 14 dB for plane waves. Rounding: 2e-7 of the brightest beam (241 bins; 1e-6
     for 20 bins, 6e-6 for 300 elements in a row).
 
-    Cut into parts, each with the delays of a sphere about its own middle (`zones.Lens`), it loses less and takes
-    longer. Same array and band, 50 by 50 degrees, 101 by 101 beams, 241 bins; without parts it takes 1/435 of the time
-    of `dense` (timed on a tenth of the beams). dB for a source at the focus, by `focus_error`: lost at the peak, and
-    wrong within 20 dB of it, an estimate that is no bound (see there),
+    Cut into subarrays, each with the delays of a sphere about its own middle (`zones.Lens`), it errs by less and takes
+    longer. Same array and band, 50 by 50 degrees, 101 by 101 beams, 241 bins: time, and the largest error (dB) within
+    20 dB of the peak of a source at the focus (`focus_error`),
 
-        parts   time      50 m           20 m           10 m           5 m            2 m
-            0    1.0   0.03   0.23    0.16   1.29    0.62   3.90    2.23   8.48    6.31  12.25
-            1    2.5   0.01   0.11    0.06   0.64    0.25   2.15    0.95   5.58    4.50  11.35
-            2    7.2   0.00   0.02    0.02   0.12    0.07   0.51    0.28   1.35    1.57   8.66
-            3     12   0.00   0.02    0.01   0.08    0.03   0.23    0.12   0.57    0.69   3.54
-            4     19   0.00   0.01    0.00   0.04    0.02   0.15    0.08   0.37    0.43   2.12
-            6     38   0.00   0.01    0.00   0.02    0.01   0.06    0.04   0.20    0.20   0.74
+        subarrays    time     50 m     20 m     10 m      5 m      2 m
+             axis     1.0     0.10     0.87     3.23     8.03    14.05
+           [1, 1]     1.9     0.04     0.25     1.35     3.95     8.48
+           [2, 2]     5.2     0.03     0.16     0.58     2.39     5.80
+           [3, 3]     8.0     0.01     0.03     0.07     0.32     3.65
+           [4, 4]      12     0.02     0.05     0.08     0.21     2.34
+           [6, 6]      22     0.00     0.01     0.04     0.12     0.56
 
-    What is left out falls as the square of a part: 64 by 64 hydrophones 5 cm apart need 4 parts for what 26 by 26 need
-    one for, and ten times the time of no parts. Several echoes that interfere can be further wrong where they cancel.
+    What is left out falls as the square of a subarray: 64 by 64 hydrophones 5 cm apart err by 1.0 dB at 20 m in [4, 4].
+    Several echoes that interfere can be further wrong where they cancel.
     """
 
     kind: Literal["focused"] = "focused"
@@ -66,23 +63,24 @@ class FocusedDelayAndSum(Steering):
     """Range at which the array is focused; left out (none), plane waves."""
     shading: Shading = "uniform"
     """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
-    parts: Annotated[int, Ge(0), Le(16)] | Literal["auto"] = "auto"
-    """Parts along each axis that the array is cut into, each focused for every beam; 0: the delay of the acoustic axis
-    in all directions. Auto: as many as `focus_error` puts at 0.1 dB, or 16 where none do."""
+    subarrays: tuple[Count, Count] | Literal["axis", "auto"] = "auto"
+    """Subarrays across and up that the array is cut into, each focused for every beam; `axis`: none, the delay of the
+    acoustic axis in all directions. Auto: in a plan, the fewest whose measured error is allowed; elsewhere, the fewest
+    whose `focus_error` is under 0.1 dB, or 16 each way."""
     bins: Literal["few", "all", "auto"] = "auto"
     """Frequencies of the window that energies are summed over: as few as its sound needs, which is shorter (0.01 dB),
     or all. Auto: few in a plan, by the error that it measures; else all."""
 
     def resolve(self, demand: Demand) -> tuple[FocusedDelayAndSum | DenseDelayAndSum, float]:
-        """As many parts as the recipe says; left to the plan, the fewest that err by no more than is allowed (dB)."""
+        """With the recipe's subarrays; left to the plan, the fewest that err by no more than is allowed (dB)."""
         if demand.exact:
             return self.exact(), 0.0
         few = replace(self, bins="few") if self.bins == "auto" else self
-        if self.parts != "auto":
+        if self.subarrays != "auto":
             return few, demand.error(few)
         method, error = few, float("inf")
-        for parts in PARTS if self.focus is not None else (0,):
-            method = replace(few, parts=parts)
+        for cut in cuts(demand.elements, self.focus):
+            method = replace(few, subarrays=cut)
             error = demand.error(method)
             if error <= demand.allowed:
                 break
@@ -94,13 +92,14 @@ class FocusedDelayAndSum(Steering):
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`, of all bins: in units of an image with the delays of the axis."""
-        parts = 0 if self.parts == "auto" else self.parts
-        images = 1.0 + parts if parts < 2 else 2.0 + 2.0 * parts
+        across, up = self.subarrays if isinstance(self.subarrays, tuple) else (0, 0)
+        images = 1.0 + across if across * up < 2 else 2.0 + across + up
         return 1.8e-9 * images * size.beams * size.bins
 
     def row(self) -> str:
-        """Its kind, and the parts where there are some."""
-        return f"{self.kind}, {self.parts} x {self.parts} parts" if self.parts not in ("auto", 0) else self.kind
+        """Its kind, and the subarrays where there are some."""
+        cut = self.subarrays
+        return f"{self.kind}, {cut[0]} x {cut[1]} subarrays" if isinstance(cut, tuple) else self.kind
 
     def refusal(self, elements: Elements) -> str:
         """Only lattices are separable."""
@@ -112,13 +111,12 @@ class FocusedDelayAndSum(Steering):
         weight, grid, speed = weights(elements, self.shading), sonar.beams, sonar.assumed_sound_speed
         snapshots = fewer_bins(snapshots, elements.aperture / speed) if self.bins == "few" else snapshots
         spectra, frequency = snapshots.spectra, snapshots.frequency
-        parts = self.parts if self.parts != "auto" else self._parts(elements, sonar)
-        if parts == 0 or self.focus is None:
-            axes = grid.azimuth, grid.elevation
-            return snapshots.unit * focused_energies(spectra, elements, weight, frequency, *axes, speed, self.focus)
-        cut = steered_zones(elements, self.shading, grid, self.focus, speed, sonar.band, parts)
-        return snapshots.unit * zoned_energies(spectra, elements, weight, frequency, grid, speed, cut)
+        cut = steered_zones(elements, self.shading, grid, self.focus, speed, sonar.band, self._cut(elements, sonar))
+        return snapshots.unit * lattice_image(spectra, elements, weight, frequency, grid, cut)
 
-    def _parts(self, elements: Elements, sonar: Sonar) -> int:
-        needed = parts_needed(elements, self.shading, sonar, self.focus, AUTO_ERROR)
-        return PARTS[-1] if needed is None else needed
+    def _cut(self, elements: Elements, sonar: Sonar) -> Subarrays:
+        if self.focus is None:
+            return "axis"
+        if self.subarrays != "auto":
+            return self.subarrays
+        return subarrays_for(elements, self.shading, sonar, self.focus) or cuts(elements, self.focus)[-1]

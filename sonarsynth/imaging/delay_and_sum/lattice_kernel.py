@@ -1,18 +1,4 @@
-"""Energies of focused beams of a lattice on a grid of azimuth and elevation: the compiled kernel.
-
-For one frequency, with sensors at y = +-(n + o) d, z = +-(m + o) d (o = 1/2 for an even number of them, 0 for an odd),
-
-    B(el, az) = sum_nm X[m, n] exp(-i k (z_m sin el + y_n cos el sin az)),
-
-sin el fixes the phase along z: one pass sums over rows for each elevation, a second over columns for each azimuth. Each
-works on sums and differences of mirrored sensors (S, D along z; s, d along y), so that its phases are real numbers,
-
-    B(+el, +az) = a - i b - i c - d,    a = sum cos cos Ss, b = sum cos sin Sd, c = sum sin cos Ds, d = sum sin sin Dd,
-
-and each sum serves four mirrored beams: b and d change sign with the azimuth, c and d with the elevation. Cosines and
-sines come from Chebyshev's c_(j+1) = 2 cos(2t) c_j - c_(j-1). Sixteen frequencies are summed at once, energies in
-chunks of 64, whatever asks for them: always the same bits.
-"""
+"""Images and single beams of a lattice: the compiled kernels, of the sums in `lattice_sums`."""
 
 from __future__ import annotations
 
@@ -21,228 +7,219 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.compiling import compiled
-from sonarsynth.equations.kernels.lanes import LANES, least, load, splat, store, total, with_sign
-from sonarsynth.equations.kernels.phasors import (
-    C0,
-    CHUNK,
-    GROUPS,
-    TWO,
-    ZERO,
-    group_steps,
-    half_phasors,
-    phasors,
-    turned,
-    weighted,
+from sonarsynth.equations.kernels.lanes import LANES, load, splat, store, store_complex, total
+from sonarsynth.equations.kernels.phasors import CHUNK, GROUPS, ZERO, phasors, turned
+from sonarsynth.imaging.delay_and_sum.lattice_sums import (
+    TERM,
+    focus,
+    group_turns,
+    groups_on,
+    lower,
+    sums_over_rows,
+    term_sums,
+    upper,
 )
 
-TERM = 8 * LANES
-"""float32 numbers of one term of a sum: four complex numbers (Ss Sd Ds Dd, or Ss Ds Sd Dd) of sixteen frequencies."""
-
-FOUR = np.float32(4.0)
+BEAM = 4 * GROUPS * LANES
+"""float32 numbers of a beam of both sets: two complex numbers for each frequency of a chunk."""
 
 
 @compiled(forceinline=True)
-def seeds(c: Any, s: Any, odd: bool) -> Any:
-    """The recurrence from the phasor (c, s) of half a step t: cosines and sines at o and o - 1 steps, and 2 cos(2t)."""
-    cc, ss = c * c, s * s
-    # 2 cc - 2 ss, from the smaller square: an error here is an error of frequency, largest where 2t is near 0 or pi.
-    twice = with_sign(splat(TWO) - splat(FOUR) * least(cc, ss), cc - ss)
-    zero, one = splat(ZERO), splat(C0)
-    if odd:
-        return one, cc - ss, zero, zero - splat(TWO) * s * c, twice
-    return c, c, s, zero - s, twice
-
-
-@compiled(forceinline=True)
-def _sums(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, t: Any) -> Any:
-    """Sums of cosine times four numbers, of sine times four more, for two directions with half steps (c, s), (d, t).
-
-    The terms lie at terms[start : stop : TERM]. Twenty multiply-adds a term and nothing else, in 26 registers.
-    """
-    c, c_, s, s_, p = seeds(c, s, odd)
-    d, d_, t, t_, q = seeds(d, t, odd)
-    a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = splat(ZERO)
-    b0 = b1 = b2 = b3 = b4 = b5 = b6 = b7 = splat(ZERO)
-    for i in range(start, stop, TERM):
-        x = load(terms, i)
-        a0, b0 = a0 + c * x, b0 + d * x
-        x = load(terms, i + LANES)
-        a1, b1 = a1 + c * x, b1 + d * x
-        x = load(terms, i + 2 * LANES)
-        a2, b2 = a2 + c * x, b2 + d * x
-        x = load(terms, i + 3 * LANES)
-        a3, b3 = a3 + c * x, b3 + d * x
-        x = load(terms, i + 4 * LANES)
-        a4, b4 = a4 + s * x, b4 + t * x
-        x = load(terms, i + 5 * LANES)
-        a5, b5 = a5 + s * x, b5 + t * x
-        x = load(terms, i + 6 * LANES)
-        a6, b6 = a6 + s * x, b6 + t * x
-        x = load(terms, i + 7 * LANES)
-        a7, b7 = a7 + s * x, b7 + t * x
-        c, c_, s, s_ = p * c - c_, c, p * s - s_, s
-        d, d_, t, t_ = q * d - d_, d, q * t - t_, t
-    return (a0, a1, a2, a3, a4, a5, a6, a7), (b0, b1, b2, b3, b4, b5, b6, b7)
-
-
-@compiled(forceinline=True)
-def _add_energies(sums: Any, energies: Any) -> Any:
-    """Add |B|^2 of the beams (+el, +az), (+el, -az), (-el, +az), (-el, -az), from real and imaginary a, c, b, d."""
-    a, a_, c, c_, b, b_, d, d_ = sums
-    upper_port, upper_starboard, lower_port, lower_starboard = energies
-    p, p_, q, q_ = a - d, a_ - d_, b + c, b_ + c_
-    u, u_, v, v_ = a + d, a_ + d_, b - c, b_ - c_
-    x, y = p + q_, p_ - q
-    upper_port = upper_port + x * x + y * y
-    x, y = u - v_, u_ + v
-    upper_starboard = upper_starboard + x * x + y * y
-    x, y = u + v_, u_ - v
-    lower_port = lower_port + x * x + y * y
-    x, y = p - q_, p_ + q
-    lower_starboard = lower_starboard + x * x + y * y
-    return upper_port, upper_starboard, lower_port, lower_starboard
+def _add_turned(beams: Any, at: int, sums: Any, c: Any, s: Any, sign: Any) -> None:
+    x, y, p, q = upper(sums)
+    x, y = turned(x, y, c, s)
+    p, q = turned(p, q, c, splat(sign) * s)
+    store(beams, at, load(beams, at) + x)
+    store(beams, at + LANES, load(beams, at + LANES) + y)
+    store(beams, at + 2 * LANES, load(beams, at + 2 * LANES) + p)
+    store(beams, at + 3 * LANES, load(beams, at + 3 * LANES) + q)
 
 
 @compiled
-def _focus_and_fold(
-    pairs: Any, bins: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float, low: int, folded: Any
-) -> None:
-    """Fill `folded` [column][row][Ss Sd Ds Dd] for the sixteen frequencies from bin `low` on, focused by `delay`."""
-    columns, rows, _ = places.shape
-    for n in range(columns):
-        for m in range(rows):
-            j, k, g, h = places[n, m, 0], places[n, m, 1], places[n, m, 2], places[n, m, 3]
-            x0, y0 = weighted(pairs, 2 * (j * bins + low), weight[j])
-            x1, y1 = weighted(pairs, 2 * (k * bins + low), weight[k])
-            x2, y2 = weighted(pairs, 2 * (g * bins + low), weight[g])
-            x3, y3 = weighted(pairs, 2 * (h * bins + low), weight[h])
-            c, s = phasors(delay[n, m], frequency + low * spacing, spacing)
-            at = (n * rows + m) * TERM
-            _store_turned(folded, at, (x0 + x1) + (x2 + x3), (y0 + y1) + (y2 + y3), c, s)
-            _store_turned(folded, at + 2 * LANES, (x0 - x1) + (x2 - x3), (y0 - y1) + (y2 - y3), c, s)
-            _store_turned(folded, at + 4 * LANES, (x0 + x1) - (x2 + x3), (y0 + y1) - (y2 + y3), c, s)
-            _store_turned(folded, at + 6 * LANES, (x0 - x1) - (x2 - x3), (y0 - y1) - (y2 - y3), c, s)
-
-
-@compiled(forceinline=True)
-def _store_turned(folded: Any, at: int, real: Any, imaginary: Any, c: Any, s: Any) -> None:
-    x, y = turned(real, imaginary, c, s)
-    store(folded, at, x)
-    store(folded, at + LANES, y)
-
-
-@compiled(forceinline=True)
-def _store_line(line: Any, at: int, sums: Any) -> None:
-    """Store the sums over rows in the order of the second pass: Ss Ds take its cosines, Sd Dd its sines."""
-    a, a_, b, b_, c, c_, d, d_ = sums
-    store(line, at, a)
-    store(line, at + LANES, a_)
-    store(line, at + 2 * LANES, c)
-    store(line, at + 3 * LANES, c_)
-    store(line, at + 4 * LANES, b)
-    store(line, at + 5 * LANES, b_)
-    store(line, at + 6 * LANES, d)
-    store(line, at + 7 * LANES, d_)
-
-
-@compiled
-def _first_pass(
-    folded: Any, size: int, rows: int, heights: Any, odd: bool, inner: float, outer: float, frequency: float,
-    spacing: float, groups: int, lines: Any,
+def _add_beams(
+    lines: Any, start: int, columns: int, odd: bool, across: Any, turns: Any, middle: Any, steps: Any, at: int,
+    stop: int, sign: Any, frequency: float, spacing: float, groups: int, beams: Any, first_beam: int,
 ) -> None:  # fmt: skip
-    """Sums over rows for two elevations (half steps `inner`, `outer`, s): lines [two][group][column][Ss Ds Sd Dd]."""
-    columns = len(heights)
-    for group in range(groups):
-        at = frequency + group * LANES * spacing
-        c, s = half_phasors(inner, at, spacing)
-        d, t = half_phasors(outer, at, spacing)
-        for n in range(columns):
-            start = group * size + n * rows * TERM
-            upper, lower = _sums(folded, start, start + heights[n] * TERM, odd, c, s, d, t)
-            _store_line(lines, (group * columns + n) * TERM, upper)
-            _store_line(lines, ((GROUPS + group) * columns + n) * TERM, lower)
+    """Add a subarray to the beams of one elevation: half steps `across` and delays `middle` (s) are at[at:stop]; those
+    of the second set are `sign` times so late."""
+    for i in range(at, stop, 2):
+        j = min(i + 1, stop - 1)
+        c, s = phasors(across[i], frequency, spacing)
+        d, t = phasors(across[j], frequency, spacing)
+        e, u = phasors(middle[i], frequency, spacing)
+        f, v = phasors(middle[j], frequency, spacing)
+        for group in range(groups):
+            first = start + group * columns * TERM
+            near, far = term_sums(lines, first, first + columns * TERM, odd, c, s, d, t)
+            beam = (first_beam + i - at) * BEAM + group * 4 * LANES
+            _add_turned(beams, beam, near, e, u, sign)
+            if j > i:
+                _add_turned(beams, beam + BEAM, far, f, v, sign)
+            c, s = groups_on(c, s, turns, i)
+            d, t = groups_on(d, t, turns, j)
+            e, u = groups_on(e, u, steps, i)
+            f, v = groups_on(f, v, steps, j)
+
+
+@compiled(forceinline=True)
+def _with_powers(powers: Any, sums: Any, shared: bool) -> Any:
+    """|B|^2 added, of both sets, and of the beam at -az where sums are shared."""
+    a, b, c, d = powers
+    x, y, p, q = upper(sums)
+    a, b = a + x * x + y * y, b + p * p + q * q
+    if shared:
+        x, y, p, q = lower(sums)
+        c, d = c + x * x + y * y, d + p * p + q * q
+    return a, b, c, d
+
+
+@compiled(forceinline=True)
+def _put_powers(energy: Any, mirror: int, row: int, column: int, powers: Any, shared: bool) -> None:
+    energy[mirror, row, column] += total(powers[0])
+    energy[mirror + 2, row, column] += total(powers[1])
+    if shared:
+        energy[1, row, column] += total(powers[2])
+        energy[3, row, column] += total(powers[3])
 
 
 @compiled
-def _second_pass(
-    lines: Any, start: int, columns: int, odd: bool, steps: Any, turns_c: Any, turns_s: Any, frequency: float,
-    spacing: float, groups: int, sums: Any,
+def _add_powers(
+    lines: Any, start: int, columns: int, odd: bool, across: Any, turns: Any, at: int, frequency: float, spacing: float,
+    groups: int, energy: Any, mirror: int, row: int, shared: bool,
 ) -> None:  # fmt: skip
-    """Energies over `groups` of the four mirrored beams for each azimuth (half steps `steps`, s): sums (azimuth, 4)."""
-    for i in range(0, len(sums), 2):
-        c, s = half_phasors(steps[i], frequency, spacing)
-        d, t = half_phasors(steps[i + 1], frequency, spacing)
+    """Add |B|^2 of the beams of one elevation, of an array that is its only subarray: half steps from `at` on."""
+    azimuths = energy.shape[2]
+    for i in range(0, azimuths, 2):
+        j = min(i + 1, azimuths - 1)
+        c, s = phasors(across[at + i], frequency, spacing)
+        d, t = phasors(across[at + j], frequency, spacing)
         zero = splat(ZERO)
         near, far = (zero, zero, zero, zero), (zero, zero, zero, zero)
         for group in range(groups):
             first = start + group * columns * TERM
-            inner, outer = _sums(lines, first, first + columns * TERM, odd, c, s, d, t)
-            near, far = _add_energies(inner, near), _add_energies(outer, far)
-            c, s = turned(c, s, splat(turns_c[i]), splat(turns_s[i]))
-            d, t = turned(d, t, splat(turns_c[i + 1]), splat(turns_s[i + 1]))
-        sums[i, 0], sums[i, 1], sums[i, 2], sums[i, 3] = total(near[0]), total(near[1]), total(near[2]), total(near[3])
-        sums[i + 1, 0], sums[i + 1, 1], sums[i + 1, 2], sums[i + 1, 3] = (
-            total(far[0]),
-            total(far[1]),
-            total(far[2]),
-            total(far[3]),
-        )
+            inner, outer = term_sums(lines, first, first + columns * TERM, odd, c, s, d, t)
+            near, far = _with_powers(near, inner, shared), _with_powers(far, outer, shared)
+            c, s = groups_on(c, s, turns, at + i)
+            d, t = groups_on(d, t, turns, at + j)
+        _put_powers(energy, mirror, row, i, near, shared)
+        if j > i:
+            _put_powers(energy, mirror, row, j, far, shared)
 
 
 @compiled
-def _add_mirrored(energy: Any, elevation: int, sums: Any) -> None:
-    """Add the sums (azimuth, 4) of one elevation >= 0 to the four quadrants of the image; beams on an axis once."""
-    elevations, azimuths = energy.shape
-    below = elevations - 1 - elevation
-    for i in range((azimuths + 1) // 2):
-        port = azimuths // 2 + i
-        starboard = azimuths - 1 - port
-        energy[elevation, port] += sums[i, 0]
-        if starboard != port:
-            energy[elevation, starboard] += sums[i, 1]
-        if below != elevation:
-            energy[below, port] += sums[i, 2]
-        if below != elevation and starboard != port:
-            energy[below, starboard] += sums[i, 3]
+def _add_powers_of_beams(beams: Any, groups: int, energy: Any, mirror: int) -> None:
+    """Add |B|^2 (elevation, azimuth) of a chunk."""
+    _, elevations, azimuths = energy.shape
+    for i in range(elevations):
+        for j in range(azimuths):
+            zero = splat(ZERO)
+            powers = zero, zero, zero, zero
+            for group in range(groups):
+                at = (i * azimuths + j) * BEAM + group * 4 * LANES
+                x, y = load(beams, at), load(beams, at + LANES)
+                p, q = load(beams, at + 2 * LANES), load(beams, at + 3 * LANES)
+                powers = powers[0] + x * x + y * y, powers[1] + p * p + q * q, zero, zero
+            _put_powers(energy, mirror, i, j, powers, False)
 
 
 @compiled
 def lattice_energies(
     pairs: Any, bins: int, places: Any, weight: Any, delay: Any, heights: Any, odd_rows: bool, odd_columns: bool,
-    half_pitch: float, frequency: float, spacing: float, azimuth: Any, elevation: Any,
+    rise: Any, across: Any, middle: Any, frequency: float, spacing: float,
 ) -> Any:  # fmt: skip
-    """Sum over bins of |B|^2: (elevation, azimuth) float64.
+    """Sum over bins of |B|^2 in a quadrant, or a part of it, and its mirror images: (mirror, elevation, azimuth).
 
-    pairs: spectra (sensor + 1, bins) as float32 pairs, bins a multiple of 16, the last sensor silent; places (column,
-    row, 4) from the middle outwards: sensors at (+z, +y), (+z, -y), (-z, +y), (-z, -y), the silent one where there is
-    none; weight (sensor + 1,) float32; delay (column, row) s, of focusing; heights (column,): rows in use; half_pitch:
-    d/(2 c) in s; frequency, spacing: of bin 0 and between bins (Hz); azimuth, elevation: ascending, exactly
-    antisymmetric (rad).
+    mirror: 0 the quadrant above and to port, 1 at -az, 2 at -el, 3 both. pairs: spectra (sensor + 1, bins) as float32
+    pairs, bins a multiple of 16, the last sensor silent; places (set, subarray, column, row, 4), a set for each mirror,
+    from the middle of a subarray outwards: sensors at (+z, +y), (+z, -y), (-z, +y), (-z, -y), the silent one for none;
+    weight (sensor + 1,) float32; delay (subarray, column, row, 4) s, of focusing; heights (subarray, column) rows in
+    use; rise (elevation, subarray, side of y, column) and across (subarray, elevation, azimuth): half of what a wave is
+    sooner (s) at the next row up and at the next column to port; middle (subarray, elevation, azimuth): what it is
+    later (s) in the middle of the subarray; frequency, spacing: of bin 0 and between bins (Hz). One side of y only:
+    delays and rise are even, there is one subarray, and its columns at +y and at -y are the sets.
     """
-    columns, rows, _ = places.shape
-    size = columns * rows * TERM
-    folded = np.empty(GROUPS * size, np.float32)
-    lines = np.empty(2 * GROUPS * columns * TERM, np.float32)
-    upper, port = elevation[len(elevation) // 2 :], azimuth[len(azimuth) // 2 :]
-    along = half_pitch * np.sin(port)
-    wide = len(port) + -len(port) % LANES
-    steps, turns_c, turns_s = np.zeros(wide), np.empty(wide, np.float32), np.empty(wide, np.float32)
-    sums = np.empty((len(port) + len(port) % 2, 4), np.float32)
-    energy = np.zeros((len(elevation), len(azimuth)))
-    for low in range(0, bins, CHUNK):
-        groups = min(GROUPS, (bins - low) // LANES)
-        first = frequency + low * spacing
-        for group in range(groups):
-            at = folded[group * size : (group + 1) * size]
-            _focus_and_fold(pairs, bins, places, weight, delay, frequency, spacing, low + group * LANES, at)
-        for pair in range(0, len(upper), 2):
-            both = upper[pair], upper[min(pair + 1, len(upper) - 1)]
-            inner, outer = half_pitch * np.sin(both[0]), half_pitch * np.sin(both[1])
-            _first_pass(folded, size, rows, heights, odd_rows, inner, outer, first, spacing, groups, lines)
-            for which in range(min(2, len(upper) - pair)):
-                steps[: len(port)] = np.cos(both[which]) * along
-                group_steps(steps, spacing, turns_c, turns_s)
-                start = which * GROUPS * columns * TERM
-                _second_pass(lines, start, columns, odd_columns, steps, turns_c, turns_s, first, spacing, groups, sums)
-                _add_mirrored(energy, len(elevation) // 2 + pair + which, sums)
+    _, count, columns, rows, _ = places.shape
+    sides, elevations, azimuths = rise.shape[2], across.shape[1], across.shape[2]
+    size = sides * columns * rows * TERM
+    folded, lines = np.empty(GROUPS * size, np.float32), np.empty(2 * GROUPS * columns * TERM, np.float32)
+    beams = np.empty(elevations * azimuths * BEAM if count > 1 else 0, np.float32)
+    up, port, later = group_turns(rise, spacing), group_turns(across, spacing), group_turns(middle, spacing)
+    rise, across, middle = rise.ravel(), across.ravel(), middle.ravel()
+    delays, energy = np.stack((delay, delay)), np.zeros((4, elevations, azimuths))
+    for mirror in range(sides):
+        other = mirror + 2 if sides == 2 else 1
+        sets = np.stack((places[mirror], places[other]))
+        for low in range(0, bins, CHUNK):
+            groups, first = min(GROUPS, (bins - low) // LANES), frequency + low * spacing
+            beams[:] = ZERO
+            for part in range(count):
+                for group in range(groups):
+                    at = low + group * LANES
+                    focus(
+                        pairs, bins, at, sets[:, part], weight, delays[:, part],
+                        frequency + at * spacing, spacing, sides, folded[group * size :],
+                    )  # fmt: skip
+                for row in range(0, elevations, 2):
+                    inner = (row * count + part) * sides * columns
+                    outer = (min(row + 1, elevations - 1) * count + part) * sides * columns
+                    sums_over_rows(
+                        folded, rows, heights[part], sides, odd_rows, rise, up, inner, outer, first, spacing, groups,
+                        lines,
+                    )  # fmt: skip
+                    for which in range(min(2, elevations - row)):
+                        start, at = which * GROUPS * columns * TERM, (part * elevations + row + which) * azimuths
+                        if count > 1:
+                            _add_beams(
+                                lines, start, columns, odd_columns, across, port, middle, later, at, at + azimuths,
+                                np.float32(1.0), first, spacing, groups, beams, (row + which) * azimuths,
+                            )  # fmt: skip
+                        else:
+                            _add_powers(
+                                lines, start, columns, odd_columns, across, port, at, first, spacing, groups, energy,
+                                mirror, row + which, sides == 1,
+                            )  # fmt: skip
+            if count > 1:
+                _add_powers_of_beams(beams, groups, energy, mirror)
     return energy
+
+
+@compiled
+def lattice_beams(
+    pairs: Any, bins: int, places: Any, weight: Any, delay: Any, heights: Any, odd_rows: bool, odd_columns: bool,
+    rise: Any, bounds: Any, across: Any, middle: Any, frequency: float, spacing: float, spectra: Any,
+) -> None:  # fmt: skip
+    """Spectra of beams of an array whose halves, to port and to starboard, are the two sets: (beam, bin) float32 pairs.
+
+    As `lattice_energies`, with places and delay (half, column, row, 4) and heights (column,); rise (level, side of y,
+    column) of beams across[bounds[level] : bounds[level + 1]]; middle (beam,): what a wave is later in the middle of
+    the half to port, and sooner in the other.
+    """
+    _, columns, rows, _ = places.shape
+    size, levels = 2 * columns * rows * TERM, len(rise)
+    folded, lines = np.empty(GROUPS * size, np.float32), np.empty(2 * GROUPS * columns * TERM, np.float32)
+    beams = np.empty(np.max(np.diff(bounds)) * BEAM, np.float32)
+    up, port, later = group_turns(rise, spacing), group_turns(across, spacing), group_turns(middle, spacing)
+    rise = rise.ravel()
+    for low in range(0, bins, CHUNK):
+        groups, first = min(GROUPS, (bins - low) // LANES), frequency + low * spacing
+        for group in range(groups):
+            at = low + group * LANES
+            focus(pairs, bins, at, places, weight, delay, frequency + at * spacing, spacing, 2, folded[group * size :])
+        for level in range(0, levels, 2):
+            inner, outer = level * 2 * columns, min(level + 1, levels - 1) * 2 * columns
+            sums_over_rows(folded, rows, heights, 2, odd_rows, rise, up, inner, outer, first, spacing, groups, lines)
+            for which in range(min(2, levels - level)):
+                start, at, stop = which * GROUPS * columns * TERM, bounds[level + which], bounds[level + which + 1]
+                beams[:] = ZERO
+                _add_beams(
+                    lines, start, columns, odd_columns, across, port, middle, later, at, stop, np.float32(-1.0), first,
+                    spacing, groups, beams, 0,
+                )  # fmt: skip
+                for beam in range(at, stop):
+                    for group in range(groups):
+                        i = (beam - at) * BEAM + group * 4 * LANES
+                        x, y = (
+                            load(beams, i) + load(beams, i + 2 * LANES),
+                            load(beams, i + LANES) + load(beams, i + 3 * LANES),
+                        )
+                        store_complex(spectra, 2 * (beam * bins + low + group * LANES), x, y)

@@ -3,8 +3,8 @@
 A lattice is fast where the delay of focusing is a property of the sensor, not of the beam. W(u), the delay of a sphere
 less that of the plane wave from the same direction u, changes with u. A zone of the picture takes it from its own
 centre, and from there to each beam keeps what separates: the slope of W along z in each column, and its slope along y.
-What is left falls as the square of the array, so a large one is cut into parts, each with slopes of its own about its
-own middle.
+What is left falls as the square of the array, so a large one is cut into subarrays, each with slopes of its own about
+its own middle.
 
 A zone and its three mirror images share all sums if the delay is the same for the four mirrored sensors; it is that
 part of W which is even in y and in z. What it leaves out, odd in both, grows with u_y u_z: near the axes of the picture
@@ -14,14 +14,21 @@ nothing else is needed. There a zone is `shared`, as wide as it is no worse than
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.receiver import Band, BeamGrid, Elements
 
+COUNTS = (1, 2, 3, 4, 6, 8, 12, 16)
+"""Numbers of subarrays along each axis that are tried."""
+
 REACH = 0.6
-"""Slopes are taken between this part of the half width of a part of the array and its mirror image."""
+"""Slopes are taken between this part of the half width of a subarray and its mirror image."""
+
+Subarrays = tuple[int, int] | Literal["axis"]
+"""How many across and up; `axis`: one, with the delay of the acoustic axis in all directions."""
 
 EVEN, ODD = 20.0, 10.0
 """dB by which a phase of 1 rad2, and of 1 rad, changes beams 20 dB under the peak, about."""
@@ -35,42 +42,45 @@ CELLS = 14
 
 @dataclass(frozen=True, eq=False)
 class Lens:
-    """What focuses a lattice: where, at what sound speed, and in which parts."""
+    """What focuses a lattice: where, at what sound speed, and in which subarrays."""
 
-    focus: float  # m
+    focus: float  # m, infinite for plane waves
     sound_speed: float  # m/s
     pitch: float  # m
     columns: int  # of the lattice
     rows: int
-    parts: int  # along each axis
+    across: int  # subarrays along y
+    up: int  # and along z
 
     @property
-    def part_columns(self) -> int:
-        """Columns of a part; the last may lack some."""
-        return -(-self.columns // self.parts)
+    def subarray_columns(self) -> int:
+        """Columns of a subarray; the last may lack some."""
+        return -(-self.columns // self.across)
 
     @property
-    def part_rows(self) -> int:
-        """Rows of a part."""
-        return -(-self.rows // self.parts)
+    def subarray_rows(self) -> int:
+        """Rows of a subarray."""
+        return -(-self.rows // self.up)
 
     @property
     def half_width(self) -> float:
-        """Distance (m) along y from the middle of a part at which slopes are taken."""
-        return 0.5 * REACH * self.pitch * self.part_columns
+        """Distance (m) along y from the middle of a subarray at which slopes are taken."""
+        return 0.5 * REACH * self.pitch * self.subarray_columns
 
     @property
     def half_height(self) -> float:
         """The same along z."""
-        return 0.5 * REACH * self.pitch * self.part_rows
+        return 0.5 * REACH * self.pitch * self.subarray_rows
 
     def middle(self, y: Floats, z: Floats) -> tuple[Floats, Floats]:
-        """y and z (...) in m of the middle of the part of sensors at y, z (...) m."""
-        middles = []
-        for place, count, step in ((y, self.columns, self.part_columns), (z, self.rows, self.part_rows)):
+        """y and z (...) in m of the middle of the subarray of sensors at y, z (...) m."""
+
+        def middle(place: Floats, count: int, step: int, last: int) -> Floats:
             part = np.floor((0.5 * count - place / self.pitch) / step)  # counted as columns and rows are: from above
-            middles.append(0.5 * self.pitch * (count - step - 2 * step * np.clip(part, 0, self.parts - 1)))
-        return middles[0], middles[1]
+            return np.asarray(0.5 * self.pitch * (count - step - 2 * step * np.clip(part, 0, last)))
+
+        across = middle(y, self.columns, self.subarray_columns, self.across - 1)
+        return across, middle(z, self.rows, self.subarray_rows, self.up - 1)
 
     def bulge(self, y: Floats, z: Floats, u: Floats) -> Floats:
         """W (...) in s at y, z (...) m for directions u (..., yz): the delay of a sphere less that of a plane wave.
@@ -130,6 +140,8 @@ class Zone:
 
     def sines(self, glass: Lens, elevation: Floats, azimuth: Floats) -> tuple[Floats, Floats]:
         """Of a shared zone: sines of elevation (...) and azimuth (...) whose plane wave has the slopes of W as well."""
+        if self.axial:
+            return np.sin(elevation), np.sin(azimuth)
         middle = np.sqrt(1.0 - self.centre[1] ** 2)
         on_axis = np.zeros(2)
 
@@ -161,30 +173,31 @@ class Zone:
         across = (y - middle_y) * glass.slope_along_y(middle_y, middle_z, u, self.centre)
         return np.asarray(exact - glass.bulge(y, z, self.centre) - middle - rise - across)
 
-    def variances(self, glass: Lens, moments: ArrayMoments, u: Floats) -> tuple[Floats, Floats]:
-        """Variance over the array (beam,) in rad2 of what is left out in beams u (beam, yz): even and odd part."""
-        y, z = (np.concatenate([q, -q]) for q in (moments.y, moments.z))
-        direct, mirrored = np.split(self.left_out(glass, y, z, u), 2, axis=1)
-        even, odd = 0.5 * moments.angular * (direct + mirrored), 0.5 * moments.angular * (direct - mirrored)
-        return np.square(even) @ moments.weight - np.square(even @ moments.weight), np.square(odd) @ moments.weight
-
     def estimate(self, glass: Lens, moments: ArrayMoments, u: Floats) -> float:
         """About how much (dB) what is left out changes beams u (beam, yz) of the zone within 20 dB of the peak.
 
         A phase that is even over the array changes energy by its square, an odd one, which shifts beams, in proportion.
         """
-        even, odd = self.variances(glass, moments, u)
-        return float(np.max(EVEN * even + ODD * np.sqrt(odd)))
+        y, z = (np.concatenate([q, -q]) for q in (moments.y, moments.z))
+        direct, mirrored = np.split(self.left_out(glass, y, z, u), 2, axis=1)
+        even, odd = 0.5 * moments.angular * (direct + mirrored), 0.5 * moments.angular * (direct - mirrored)
+        variance = np.square(even) @ moments.weight - np.square(even @ moments.weight)
+        return float(np.max(EVEN * variance + ODD * np.sqrt(np.square(odd) @ moments.weight)))
 
 
-def corners(zone: Zone) -> list[tuple[int, int]]:
-    """Row and column of the beams in the corners of a zone, from the middle outwards."""
-    return [(row, column) for row in {zone.low, zone.high - 1} for column in {zone.near, zone.far - 1}]
+def lens(elements: Elements, focus: float | None, sound_speed: float, subarrays: Subarrays) -> Lens:
+    """The lens of a lattice that is cut into subarrays; focus in m, None for plane waves."""
+    across, up = (1, 1) if subarrays == "axis" else subarrays
+    focus = np.inf if focus is None else focus
+    return Lens(focus, sound_speed, elements.pitch, elements.columns, elements.rows, across, up)
 
 
-def lens(elements: Elements, focus: float, sound_speed: float, parts: int) -> Lens:
-    """The lens of a lattice that is cut into parts (0: its axis does for all beams, so it is one)."""
-    return Lens(focus, sound_speed, elements.pitch, elements.columns, elements.rows, max(parts, 1))
+def cuts(elements: Elements, focus: float | None) -> list[Subarrays]:
+    """Ways to cut a lattice that are tried, the fewest subarrays first; one for plane waves."""
+    if focus is None:
+        return ["axis"]
+    square = ((min(n, elements.columns), min(n, elements.rows)) for n in COUNTS)
+    return ["axis", *dict.fromkeys(square)]
 
 
 def for_sensors(elements: Elements, weight: Floats, band: Band) -> ArrayMoments:
@@ -205,24 +218,24 @@ def quadrant(beams: BeamGrid) -> Floats:
     return np.stack(np.broadcast_arrays(across, np.sin(elevation)[:, None]), axis=-1)
 
 
-def zones_of(glass: Lens, moments: ArrayMoments, beams: BeamGrid, parts: int) -> list[Zone]:
-    """The zones of a beam grid for an array cut into parts x parts.
+def zones_of(glass: Lens, moments: ArrayMoments, beams: BeamGrid, subarrays: Subarrays) -> list[Zone]:
+    """The zones of a beam grid for an array cut into subarrays.
 
-    None: one, with the delays of the acoustic axis. One part: a shared zone in the middle, all rows high and as wide as
-    may be for what it leaves out (as `Zone.estimate` has it) not to be more than at the edges of the picture; and the
-    rest. More: all of the picture.
+    By the axis: one. One subarray: a shared zone in the middle, all rows high and as wide as may be for what it leaves
+    out (as `Zone.estimate` has it) not to be more than at the edges of the picture; and the rest. More: all of the
+    picture.
     """
     u = quadrant(beams)
     wide = u.shape[1]
-    if parts == 0:
+    if subarrays == "axis":
         return [Zone(0, u.shape[0], 0, wide, np.zeros(2), True, True)]
     whole = _zone(u, 0, wide, False)
-    if parts > 1:
+    if subarrays != (1, 1):
         return [whole]
 
     def estimate(zone: Zone) -> float:
-        rows, columns = zip(*corners(zone), strict=True)
-        return zone.estimate(glass, moments, u[list(rows), list(columns)])
+        ends = u[[zone.low, zone.high - 1]][:, [zone.near, zone.far - 1]]
+        return zone.estimate(glass, moments, ends.reshape(-1, 2))
 
     worst = max(estimate(whole), estimate(_zone(u, wide - 1, wide, False)))
     good, bad = 0, wide + 1

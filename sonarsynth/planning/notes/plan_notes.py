@@ -162,7 +162,7 @@ def _accuracy(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
     if errors.image > allowed.image_db:
         lines.append(
             f"beams out of focus have errors of {errors.image:.2g} dB: accuracy.image_db allows "
-            f"{allowed.image_db:g}; use more scene.processing.beamforming.parts, or kind dense"
+            f"{allowed.image_db:g}; use more scene.processing.beamforming.subarrays, or kind dense"
         )
     return lines
 

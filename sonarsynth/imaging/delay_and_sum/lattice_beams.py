@@ -1,0 +1,76 @@
+"""Spectra of single beams of a lattice, in any directions."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.equations.arrays.apertures import focus_delay
+from sonarsynth.equations.arrays.beams import first_and_spacing
+from sonarsynth.equations.arrays.lattices import mirrored_sensors, rows_in_use
+from sonarsynth.receiver import Elements
+
+AHEAD = np.array([1.0, 0.0, 0.0])
+
+
+def lattice_beam_spectra(
+    spectra: npt.NDArray[np.complex64], frequencies: Floats, elements: Elements, weight: Floats, directions: Floats,
+    sound_speed: float, focus: float | None,
+) -> npt.NDArray[np.complex64]:  # fmt: skip
+    """As `beams.beam_spectra` for elements on a lattice, focused in every direction as on the axis; several times as
+    fast.
+
+    The delay of focusing is (sqrt(R^2 + q^2) - R)/c: off the axis that is not quite a sphere (`FocusedDelayAndSum` has
+    a table). weight (sensor,) of sum one. Beams of one elevation share the sums over rows. Float32 sums: error 1e-6 of
+    the largest |B| (508 elements), 3e-6 for 64 in a row, 1.3e-5 for 300.
+    """
+    from sonarsynth.equations.kernels.lanes import LANES
+    from sonarsynth.equations.kernels.phasors import padded_bins
+    from sonarsynth.imaging.delay_and_sum.lattice_kernel import lattice_beams
+
+    places, heights, columns, middle = _halves(elements)
+    padded = padded_bins(spectra, elements.count + 1, LANES)
+    later = np.append(focus_delay(elements.position, AHEAD, focus, sound_speed), 0.0)[places]
+    order = np.argsort(directions[:, 2], kind="stable")
+    levels, first = np.unique(directions[order, 2], return_index=True)
+    half = 0.5 * elements.pitch / sound_speed
+    across = directions[order, 1]
+    rise = np.broadcast_to(half * levels[:, None, None], (len(levels), 2, places.shape[1]))
+    beams = np.empty((len(order), padded.shape[1]), np.complex64)
+    lattice_beams(
+        padded.view(np.float32).ravel(),
+        padded.shape[1],
+        places,
+        np.append(weight, 0.0).astype(np.float32),
+        later,
+        heights,
+        elements.rows % 2 == 1,
+        columns % 2 == 1,
+        np.ascontiguousarray(rise),
+        np.append(first, len(order)),
+        half * across,
+        across * (-middle / sound_speed),
+        *first_and_spacing(frequencies),
+        beams.view(np.float32).ravel(),
+    )
+    sums = np.empty((len(order), len(frequencies)), np.complex64)
+    sums[order] = beams[:, : len(frequencies)]
+    return sums
+
+
+@lru_cache(maxsize=16)
+def _halves(elements: Elements) -> tuple[Ints, Ints, int, float]:
+    """Sensors (half, half column, half row, 4) of the halves of a lattice to port and to starboard, rows in use (half
+    column,), columns of a half, and how far (m) its middle is from that of the array."""
+    columns, nobody = -(-elements.columns // 2), elements.count
+    port, live = elements.column < columns, elements.gain > 0
+    column = np.where(port, elements.column, elements.column - (elements.columns - columns))
+    places = np.stack(
+        [mirrored_sensors(column, elements.row, columns, elements.rows, np.flatnonzero(live & which), nobody)
+         for which in (port, ~port)]
+    )  # fmt: skip
+    used = rows_in_use(np.min(places, axis=(0, 3)) < nobody)
+    return places, used, columns, 0.5 * elements.pitch * (elements.columns - columns)
