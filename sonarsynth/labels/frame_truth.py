@@ -9,18 +9,20 @@ import numpy as np
 
 from sonarsynth.casting.ray_casting import first_hit
 from sonarsynth.conventions import NO_TARGET, Floats, direction
-from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.oriented_box import oriented_box
 from sonarsynth.labels.views.appearance import Appearance, Connect, appearance, finite, lit_fraction
-from sonarsynth.labels.views.box_in_view import box_in_view, pixel_box, truncation, whole_box
+from sonarsynth.labels.views.box_in_view import box_in_view, pixel_box, truncation
 from sonarsynth.labels.views.coverage import coverage
 from sonarsynth.products import Truth, View
 from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import BeamGrid
 from sonarsynth.state import FrameContext, meeting_times, positions
+
+MARGIN = 1e-9
+"""rad: how far beyond the box of a body beams are looked at."""
 
 
 def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -> Truth:
@@ -37,9 +39,11 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     connect = partial(propagation.direct.connect, medium.profile, medium.depth)
     bent = connect if propagation.bends else None
     appearances = [appearance(body, bodies, sonar_pose, bent) for body in bodies]
-    target, facet, distance = _label_beams(bodies, [a.corners for a in appearances], beams, sonar_pose, bent is None)
+    target, facet, distance = _label_beams(bodies, appearances, beams, sonar_pose)
     tracks = [body.track if context.receiver.track else body.frozen.track for body in bodies]
-    met = meeting_times(tracks, context.snaps, partial(_direct_times, connect))
+    by_lines = medium.profile.uniform and propagation.straight(medium.profile)
+    travel = partial(_straight_times, 1.0 / medium.profile.speed[0]) if by_lines else partial(_direct_times, connect)
+    met = meeting_times(tracks, context.snaps, travel)
     lit = [
         [lit_fraction(b, a.visible, bodies, snap, medium, bent) for b, a in zip(bodies, appearances, strict=True)]
         for snap in context.snaps
@@ -99,7 +103,7 @@ def _boxes(
     return {
         "image_box": _rows([box.bounds for box in views], 4),
         "true_image_box": _rows(straight, 4),
-        "full_box": _rows([whole_box(apparent.boxes) for apparent in appearances], 4),
+        "full_box": _rows([apparent.full_box for apparent in appearances], 4),
         "pixel_box": _rows([pixel_box(box.bounds, beams) for box in views], 4),
         "view": np.array([box.view for box in views], np.int8),
         "in_view": np.array(in_view, np.int8),
@@ -116,6 +120,11 @@ def _direct_times(connect: Connect, start: Floats, end: Floats) -> Floats:
     return times
 
 
+def _straight_times(slowness: float, start: Floats, end: Floats) -> Floats:
+    """The same of straight lines, all at one slowness (s/m)."""
+    return np.asarray(np.linalg.norm(end - start, axis=1) * slowness)
+
+
 def _rows(rows: list[Floats], width: int) -> Floats:
     return np.array(rows, float).reshape(-1, width)
 
@@ -127,7 +136,7 @@ def _rays_of(beams: BeamGrid) -> Floats:
 
 
 def _label_beams(
-    bodies: tuple[PlacedTarget, ...], corners: list[Floats], beams: BeamGrid, sonar_pose: Pose, straight: bool
+    bodies: tuple[PlacedTarget, ...], appearances: list[Appearance], beams: BeamGrid, sonar_pose: Pose
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Target, facet and range (elevation, azimuth) of each beam."""
     rays = _rays_of(beams)
@@ -135,36 +144,24 @@ def _label_beams(
     target = np.full(shape, NO_TARGET, np.int16)
     facet = np.full(shape, NO_TARGET, np.int32)
     nearest = np.full(shape, np.inf)
-    for index, (body, vertices) in enumerate(zip(bodies, corners, strict=True)):
-        valid = np.flatnonzero(finite(vertices, body.mesh.faces))
-        if not len(valid):
+    for index, (body, apparent) in enumerate(zip(bodies, appearances, strict=True)):
+        left, right, low, high = apparent.full_box + [-MARGIN, MARGIN, -MARGIN, MARGIN]
+        near = tuple(
+            slice(*angles.searchsorted(ends))  # none where they are NaN
+            for angles, ends in ((beams.elevation, (low, high)), (beams.azimuth, (left, right)))
+        )
+        look = rays[near].reshape(-1, 3)
+        if not len(look):
             continue
-        faces = body.mesh.faces if len(valid) == len(body.mesh.faces) else body.mesh.faces[valid]
-        named = np.zeros(len(vertices), bool)
-        named[faces] = True
-        rows, columns = _beams_near(vertices if named.all() else vertices[named], rays)
-        look = rays[rows, columns]
-        if straight:  # in the frame of the mesh, which is made ready for casting once
+        if not apparent.bent:  # in the frame of the mesh, which is made ready for casting once
             origin = np.broadcast_to(body.pose.to_body(sonar_pose.position), look.shape)
             hit, distance = first_hit(body.mesh, origin, body.pose.turn_to_body(sonar_pose.turn_to_world(look)))
         else:
-            hit, distance = first_hit(Mesh(np.nan_to_num(vertices), faces), np.zeros_like(look), look)
+            valid = np.flatnonzero(finite(apparent.corners, body.mesh.faces))
+            seen = Mesh(np.nan_to_num(apparent.corners), body.mesh.faces[valid])
+            hit, distance = first_hit(seen, np.zeros_like(look), look)
             hit = np.where(hit >= 0, valid[hit], hit)
-        closer = (hit >= 0) & (distance < nearest[rows, columns])
-        rows, columns = rows[closer], columns[closer]
-        target[rows, columns], facet[rows, columns] = index, hit[closer]
-        nearest[rows, columns] = distance[closer]
+        hit, distance = hit.reshape(rays[near].shape[:2]), distance.reshape(rays[near].shape[:2])
+        closer = (hit >= 0) & (distance < nearest[near])
+        target[near][closer], facet[near][closer], nearest[near][closer] = index, hit[closer], distance[closer]
     return target, facet, np.where(np.isfinite(nearest), nearest, np.nan).astype(np.float32)
-
-
-def _beams_near(points: Floats, rays: Floats) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of the rays inside the cone, about the mean direction of the points, that holds them all."""
-    towards = points / np.sqrt(dot(points, points))[:, None]
-    axis = np.full(len(towards), 1.0 / len(towards)) @ towards
-    if np.linalg.norm(axis) < 0.5:  # the array is within the body, or close to it: every ray may hit
-        every = np.indices(rays.shape[:2]).reshape(2, -1)
-        return every[0], every[1]
-    axis /= np.linalg.norm(axis)
-    widest = np.arccos(np.clip((towards @ axis).min(), -1.0, 1.0)) + 1e-3
-    rows, columns = np.nonzero(rays @ axis >= np.cos(min(widest, np.pi)))
-    return rows, columns

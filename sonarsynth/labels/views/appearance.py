@@ -12,7 +12,8 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.labels.views.box_in_view import facet_boxes
+from sonarsynth.labels.views import view_kernels
+from sonarsynth.labels.views.box_in_view import facet_boxes, whole_box
 from sonarsynth.products import Paths
 from sonarsynth.state import Emission, Medium
 from sonarsynth.tracing.occlusion.ray_cones import hidden
@@ -27,6 +28,7 @@ class Appearance(NamedTuple):
 
     corners: Floats  # (vertex, xyz) m, sonar frame: where they appear; NaN where no ray arrives (a shadow)
     boxes: Floats  # (facet, 4) rad: `facet_boxes` of all facets
+    full_box: Floats  # (4,) rad: of all of them; NaN where none is ahead
     visible: Ints  # facets that the array sees, in the view of the beams or not
     fraction: float  # their share of the area that faces the array
     bent: bool  # whether rays bend, so that corners are not where they appear
@@ -38,7 +40,7 @@ def appearance(
     """A body among all bodies; connect: None where rays are straight."""
     corners = _apparent(body, sonar_pose, connect)
     boxes, visible = facet_boxes(corners, body.mesh.faces), _visible(body, corners, bodies, sonar_pose)
-    return Appearance(corners, boxes, *visible, bent=connect is not None)
+    return Appearance(corners, boxes, whole_box(boxes), *visible, bent=connect is not None)
 
 
 def _apparent(body: PlacedTarget, sonar_pose: Pose, connect: Connect | None) -> Floats:
@@ -60,29 +62,26 @@ def _visible(
     body: PlacedTarget, corners: Floats, bodies: tuple[PlacedTarget, ...], sonar_pose: Pose
 ) -> tuple[Ints, float]:
     """The visible facets, in the view of the beams or not, and their share of the area that faces the array."""
-    mesh, sonar = body.mesh, body.pose.to_body(sonar_pose.position)
-    facing = _facing(body, slice(None), sonar)
-    visible = np.zeros(len(mesh.faces), bool)
+    mesh, visible, facing = body.mesh, [], 0.0
     for block in in_blocks(len(mesh.faces)):
-        rows = np.flatnonzero(facing[block]) + block.start
-        start = _clear(body, rows)
+        rows = np.arange(block.start, block.stop)
+        faces, start = _leaving(body, rows, sonar_pose.position)
+        rows, start = rows[faces], start[faces]
+        facing += float(mesh.area[rows].sum())
         clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
-        visible[rows] = clear & finite(corners, mesh.faces[rows])
-    fraction = float(mesh.area[visible].sum() / mesh.area[facing].sum()) if visible.any() else 0.0
-    return np.flatnonzero(visible), fraction
+        visible.append(rows[clear & finite(corners, mesh.faces[rows])])
+    seen = np.concatenate(visible)
+    return seen, float(mesh.area[seen].sum() / facing) if len(seen) else 0.0
 
 
-def _facing(body: PlacedTarget, rows: Ints | slice, position: Floats) -> Bools:
-    """Whether a place (xyz), in the frame of a body, is on the outer side of facets (row,)."""
-    ahead = position - body.mesh.centroid[rows]
-    return np.asarray(np.einsum("ij,ij->i", ahead, body.mesh.normal[rows]) > 0.0)
-
-
-def _clear(body: PlacedTarget, rows: Ints) -> Floats:
-    """(row, xyz) world: middles of facets (row,), moved off them."""
+def _leaving(body: PlacedTarget, rows: Ints, to: Floats) -> tuple[Bools, Floats]:
+    """Whether a place (xyz), world, is on the outer side of facets (row,), and their middles (row, xyz), moved off."""
     farthest = float(np.abs(body.pose.position).max()) + body.mesh.radius
     offset = max(OFFSET * body.mesh.radius, 8.0 * np.finfo(float).eps * farthest)  # rounding of places in the world
-    return body.pose.to_world(body.mesh.centroid[rows] + offset * body.mesh.normal[rows])
+    facing, start = np.empty(len(rows), bool), np.empty((len(rows), 3))
+    of = rows, body.mesh.centroid, body.mesh.normal
+    view_kernels.leaving(*of, offset, body.pose.rotation, body.pose.position, to, facing, start)
+    return facing, start
 
 
 def lit_fraction(
@@ -102,22 +101,19 @@ def lit_fraction(
     lit = np.zeros(len(visible), bool)
     for block in in_blocks(len(visible)):
         rows = visible[block]
+        facing, start = _leaving(body, rows, snap.position)
         if connect is None:
-            faced = np.flatnonzero(_facing(body, rows, body.pose.to_body(snap.position)))
-            start = _clear(body, rows[faced])
-            blocked = occluded(bodies, start, np.broadcast_to(snap.position, start.shape))
+            faced = np.flatnonzero(facing)
+            blocked = occluded(bodies, start[faced], np.broadcast_to(snap.position, (len(faced), 3)))
         else:
-            position, normal = (
-                body.pose.to_world(body.mesh.centroid[rows]),
-                body.pose.turn_to_world(body.mesh.normal[rows]),
-            )
+            position = body.pose.to_world(body.mesh.centroid[rows])
+            normal = body.pose.turn_to_world(body.mesh.normal[rows])
             paths = connect(np.broadcast_to(snap.position, position.shape), position)
             towards = -paths.arrival
             lighting = np.flatnonzero(usable(paths) & (np.einsum("ij,ij->i", towards, normal[paths.pair]) > 0.0))
             faced = paths.pair[lighting]
-            start = _clear(body, rows[faced])
-            end = np.broadcast_to(snap.position, start.shape)
-            blocked = hidden(bodies, medium, start, end, towards[lighting], paths.length[lighting])
+            end = np.broadcast_to(snap.position, (len(faced), 3))
+            blocked = hidden(bodies, medium, start[faced], end, towards[lighting], paths.length[lighting])
         lit[faced[~blocked] + block.start] = True
     area = body.mesh.area[visible]
     return float(area[lit].sum() / area.sum())

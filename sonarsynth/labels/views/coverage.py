@@ -53,43 +53,44 @@ def cells_of(beams: BeamGrid) -> Cells:
 
 
 @compiled
-def _planes(corners: tuple[Floats, Floats, Floats], planes: Floats) -> bool:
+def _planes(corners: Floats, face: tuple[int, int, int], planes: Floats) -> bool:
     """Write inward normals (3, xyz) of the planes through the origin and each side of a triangle; returns whether its
     outer side, from which its corners are counter-clockwise, is seen."""
     for i in range(3):
-        a, b = corners[i], corners[(i + 1) % 3]
-        planes[i, 0] = a[1] * b[2] - a[2] * b[1]
-        planes[i, 1] = a[2] * b[0] - a[0] * b[2]
-        planes[i, 2] = a[0] * b[1] - a[1] * b[0]
-    c = corners[2]
-    outer = c[0] * planes[0, 0] + c[1] * planes[0, 1] + c[2] * planes[0, 2] < 0.0
+        a, b = face[i], face[i + 1 if i < 2 else 0]
+        for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            planes[i, x] = corners[a, y] * corners[b, z] - corners[a, z] * corners[b, y]
+    c = face[2]
+    outer = corners[c, 0] * planes[0, 0] + corners[c, 1] * planes[0, 1] + corners[c, 2] * planes[0, 2] < 0.0
     if outer:
         for i in range(3):
-            for j in range(3):
-                planes[i, j] = -planes[i, j]
+            for x in range(3):
+                planes[i, x] = -planes[i, x]
     return bool(outer)
 
 
 @compiled
 def _mark(
-    planes: Floats, box: Floats, azimuth: Floats, level: Floats, sine: Floats, cosine: Floats, covered: Words
-) -> int:
-    """Mark the directions of a cell that are inside planes, and in a box; returns how many were not yet."""
-    last = len(sine) - 1
-    spacing, count = (sine[last] - sine[0]) / last, 0
-    begin = max(math.floor((math.sin(box[2]) - sine[0]) / spacing), 0)
-    end = min(math.ceil((math.sin(box[3]) - sine[0]) / spacing), last) + 1
-    for i in range(begin, end):
-        bit = np.uint64(1) << np.uint64(i & 63)
-        if not box[0] <= azimuth[i] <= box[1] or covered[i >> 6] & bit:
+    planes: Floats, boxes: Floats, f: int, azimuth: Floats, level: Floats, sine: Floats, cosine: Floats, row: int,
+    column: int, covered: Words,
+) -> int:  # fmt: skip
+    """Mark the directions of a cell that are inside planes, and in the box of facet f; returns how many were not yet.
+    Whole arrays and numbers: to cut a row out of an array takes longer than what is done with it."""
+    last, west, east, added = sine.shape[1] - 1, boxes[f, 0], boxes[f, 1], 0
+    spacing = (sine[row, last] - sine[row, 0]) / last
+    begin = max(math.floor((math.sin(boxes[f, 2]) - sine[row, 0]) / spacing), 0)
+    end = min(math.ceil((math.sin(boxes[f, 3]) - sine[row, 0]) / spacing), last) + 1
+    for n in range(begin, end):
+        bit = np.uint64(1) << np.uint64(n & 63)
+        if not west <= azimuth[column, n] <= east or covered[row, column, n >> 6] & bit:
             continue
-        x, y, within = cosine[i] * level[i, 0], cosine[i] * level[i, 1], True
-        for j in range(3):
-            within &= x * planes[j, 0] + y * planes[j, 1] + sine[i] * planes[j, 2] >= 0.0
+        x, y, within = cosine[row, n] * level[column, n, 0], cosine[row, n] * level[column, n, 1], True
+        for i in range(3):
+            within &= x * planes[i, 0] + y * planes[i, 1] + sine[row, n] * planes[i, 2] >= 0.0
         if within:
-            covered[i >> 6] |= bit
-            count += 1
-    return count
+            covered[row, column, n >> 6] |= bit
+            added += 1
+    return added
 
 
 @compiled
@@ -104,23 +105,20 @@ def _cover(
     rows, columns, directions = len(sine), len(azimuth), sine.shape[1]
     planes = np.empty((3, 3))
     for f in range(len(faces)):
-        box = boxes[f]
-        if not box[0] <= box[1]:  # NaN: behind, or in a shadow
+        if not boxes[f, 0] <= boxes[f, 1]:  # NaN: behind, or in a shadow
             continue
-        left = max(math.floor((box[0] - first[0]) / step[0]), 0)
-        right = min(math.floor((box[1] - first[0]) / step[0]), columns - 1)
-        bottom = max(math.floor((box[2] - first[1]) / step[1]), 0)
-        top = min(math.floor((box[3] - first[1]) / step[1]), rows - 1)
+        left = max(math.floor((boxes[f, 0] - first[0]) / step[0]), 0)
+        right = min(math.floor((boxes[f, 1] - first[0]) / step[0]), columns - 1)
+        bottom = max(math.floor((boxes[f, 2] - first[1]) / step[1]), 0)
+        top = min(math.floor((boxes[f, 3] - first[1]) / step[1]), rows - 1)
         if left > right or bottom > top:
             continue
-        if not _planes((corners[faces[f, 0]], corners[faces[f, 1]], corners[faces[f, 2]]), planes) and outside:
+        if not _planes(corners, (faces[f, 0], faces[f, 1], faces[f, 2]), planes) and outside:
             continue
         for row in range(bottom, top + 1):
             for column in range(left, right + 1):
                 if count[row, column] < directions:
-                    count[row, column] += _mark(
-                        planes, box, azimuth[column], level[column], sine[row], cosine[row], covered[row, column]
-                    )
+                    count[row, column] += _mark(planes, boxes, f, azimuth, level, sine, cosine, row, column, covered)
 
 
 def coverage(bodies: list[tuple[Floats, np.ndarray, Floats, bool]], beams: BeamGrid) -> npt.NDArray[np.float32]:
@@ -133,8 +131,7 @@ def coverage(bodies: list[tuple[Floats, np.ndarray, Floats, bool]], beams: BeamG
     covered = np.zeros((beams.elevations, beams.azimuths, (DIRECTIONS + 63) // 64), np.uint64)
     count = np.zeros(covered.shape[:2], np.int16)
     for corners, faces, boxes, closed in bodies:
-        outside = closed and bool(
-            np.isfinite(corners).all() and not ((corners.T.min(1) < 0.0) & (corners.T.max(1) > 0.0)).all()
-        )
-        _cover(np.ascontiguousarray(corners, float), faces, boxes, *cells, outside, covered, count)
+        beside = closed and any(x.min() >= 0.0 or x.max() <= 0.0 for x in corners.T)
+        outside = beside and bool(np.isfinite(corners).all())
+        _cover(corners, faces, boxes, *cells, outside, covered, count)
     return (count / DIRECTIONS).astype(np.float32)

@@ -70,14 +70,17 @@ def widen(p: Floats, slopes: Floats) -> None:
 
 
 @compiled
-def steepest(a: Floats, b: Floats, out: Floats) -> bool:
-    """The point between two ends where the elevation of an edge is extreme, if there is one."""
-    d0, d1, d2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    square, along, across = a[0] * a[0] + a[1] * a[1], a[0] * d0 + a[1] * d1, d0 * d0 + d1 * d1
-    rate = d2 * along - a[2] * across
-    t = (a[2] * along - d2 * square) / rate if rate != 0.0 else -1.0
-    out[0], out[1], out[2] = a[0] + t * d0, a[1] + t * d1, a[2] + t * d2
-    return 0.0 < t < 1.0
+def steepest(points: Floats, a: int, b: int, out: Floats) -> bool:
+    """The point between two of some (point, xyz) where the elevation of an edge is extreme, if there is one."""
+    x, y, z = points[a, 0], points[a, 1], points[a, 2]
+    d0, d1, d2 = points[b, 0] - x, points[b, 1] - y, points[b, 2] - z
+    square, along, across = x * x + y * y, x * d0 + y * d1, d0 * d0 + d1 * d1
+    rate, part = d2 * along - z * across, z * along - d2 * square
+    if not (0.0 < part < rate or rate < part < 0.0):
+        return False
+    t = part / rate
+    out[0], out[1], out[2] = x + t * d0, y + t * d1, z + t * d2
+    return True
 
 
 @compiled
@@ -110,7 +113,7 @@ def bounds(corners: Floats, faces: Ints, azimuth: float, elevation: float, out: 
         for i in range(count):
             inside = True
             widen(polygon[i], slopes)
-            if steepest(polygon[i], polygon[(i + 1) % count], extreme):
+            if steepest(polygon, i, (i + 1) % count, extreme):
                 widen(extreme, slopes)
                 outside |= depth_in_view(extreme, 2, half) < 0.0 or depth_in_view(extreme, 3, half) < 0.0
     for i in range(4):
@@ -123,27 +126,55 @@ def bounds(corners: Floats, faces: Ints, azimuth: float, elevation: float, out: 
 def boxes_ahead(corners: Floats, faces: Ints, boxes: Floats) -> None:
     """Write bounds (facet, 4) in azimuth and elevation (rad) of the part of each triangle (facet, 3) of points (vertex,
     xyz) that is ahead, x > 0; NaN where none is, or a corner is NaN."""
-    half = np.array([1.0, 0.0])
-    polygon, clipped, extreme, slopes = np.empty((MOST, 3)), np.empty((MOST, 3)), np.empty(3), np.empty(4)
+    seen, extreme = np.empty((len(corners), 2)), np.empty(3)
+    for v in range(len(corners)):
+        x, y, z = corners[v, 0], corners[v, 1], corners[v, 2]
+        seen[v, 0], seen[v, 1] = math.atan(y / abs(x)), math.atan(z / math.sqrt(x * x + y * y))
     for f in range(len(faces)):
-        valid = True
-        for i in range(3):
-            p = corners[faces[f, i]]
-            polygon[i, 0], polygon[i, 1], polygon[i, 2] = p[0], p[1], p[2]
-            valid &= math.isfinite(p[0] + p[1] + p[2])
-        count = 3 if valid else 0
-        if valid and not (polygon[0, 0] > 0.0 and polygon[1, 0] > 0.0 and polygon[2, 0] > 0.0):
-            count = cut(polygon, 3, 0, half, clipped)
-            polygon, clipped = clipped, polygon
-        slopes[0], slopes[1], slopes[2], slopes[3] = np.inf, -np.inf, np.inf, -np.inf
-        furthest = 0.0
-        for i in range(count):
-            furthest = max(furthest, polygon[i, 0])
-            widen(polygon[i], slopes)
-            if steepest(polygon[i], polygon[(i + 1) % count], extreme):
-                widen(extreme, slopes)
-        for i in range(4):
-            boxes[f, i] = math.atan(slopes[i]) if furthest > 0.0 else np.nan
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        if not (corners[i, 0] > 0.0 and corners[j, 0] > 0.0 and corners[k, 0] > 0.0):
+            box_of_part_ahead(corners, faces[f], boxes[f])
+            continue
+        low, high = min(seen[i, 1], seen[j, 1], seen[k, 1]), max(seen[i, 1], seen[j, 1], seen[k, 1])
+        for a, b in ((i, j), (j, k), (k, i)):
+            if steepest(corners, a, b, extreme):
+                up = math.atan(extreme[2] / math.hypot(extreme[0], extreme[1]))
+                low, high = min(low, up), max(high, up)
+        boxes[f, 0], boxes[f, 1] = min(seen[i, 0], seen[j, 0], seen[k, 0]), max(seen[i, 0], seen[j, 0], seen[k, 0])
+        boxes[f, 2], boxes[f, 3] = low, high
+
+
+@compiled
+def box_of_part_ahead(corners: Floats, face: Ints, box: Floats) -> None:
+    """As `boxes_ahead`, of one facet (3,) that is not ahead as a whole."""
+    polygon, clipped, extreme = corners[face], np.empty((MOST, 3)), np.empty(3)
+    count = cut(polygon, 3, 0, np.array([1.0, 0.0]), clipped) if np.isfinite(polygon).all() else 0
+    slopes, furthest = np.array([np.inf, -np.inf, np.inf, -np.inf]), 0.0
+    for i in range(count):
+        furthest = max(furthest, clipped[i, 0])
+        widen(clipped[i], slopes)
+        if steepest(clipped, i, (i + 1) % count, extreme):
+            widen(extreme, slopes)
+    for i in range(4):
+        box[i] = math.atan(slopes[i]) if furthest > 0.0 else np.nan
+
+
+@compiled
+def leaving(
+    rows: Ints, centroid: Floats, normal: Floats, offset: float, rotation: Floats, position: Floats, to: Floats,
+    facing: Bools, start: Floats,
+) -> None:  # fmt: skip
+    """Write whether a place `to` (xyz), world, is on the outer side of facets (row,), and their middles, moved off by
+    `offset` (m): start (row, xyz), world. rotation (xyz, xyz), position (xyz): the pose of their body."""
+    for r in range(len(rows)):
+        f, ahead = rows[r], 0.0
+        for x in range(3):
+            start[r, x], turned = position[x], 0.0
+            for y in range(3):
+                start[r, x] += rotation[x, y] * (centroid[f, y] + offset * normal[f, y])
+                turned += rotation[x, y] * normal[f, y]
+            ahead += turned * (to[x] - start[r, x])
+        facing[r] = ahead + offset > 0.0
 
 
 @compiled
