@@ -138,7 +138,5 @@ class GriddedSynthesis(Method):
         for span in plan.stretches:
             paths, bins = bins_of(span, front.select(span.paths), sonar, absorption, self.tolerance)
             origin, highest = start + span.first / fs, stop_frequency(sonar.antialias)
-            add_segment(
-                out, span.first, span.samples, paths, elements, bins, origin=origin, highest=highest, method=method
-            )
+            add_segment(out, span, paths, elements, bins, origin=origin, highest=highest, method=method)
         return out, plan.outside

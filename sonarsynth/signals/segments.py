@@ -35,6 +35,10 @@ class Segment:
     coherent: bool  # all pulses are differentiated, or none
     first: int  # sample of the window where it begins; may be negative
     samples: int  # even
+    before: (
+        float  # s: no pulse begins sooner before it arrives at the array centre, of a front that others are steered to
+    )
+    after: float  # s: none ends later
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +85,11 @@ def layout(
         for coherent, direct in ((False, True), (False, False), (True, True), (True, False)):
             rows = np.flatnonzero(same & (front.coherent == coherent) & (arrivals.direct == direct))
             for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
-                spread, delay = steered_spread(front, chosen), front.delay[chosen] - start
-                first = int(np.floor(((delay - before[chosen]).min() - spread) * fs)) - GUARD
-                last = int(np.ceil(((delay + after[chosen]).max() + spread) * fs)) + GUARD
-                stretches.append(Segment(chosen, waveform, coherent, first, fast_length(last - first + 1)))
+                sooner, later = support[:, chosen].max(axis=1) + steered_spread(front, chosen)
+                delay = front.delay[chosen] - start
+                first = int(np.floor((delay.min() - sooner) * fs)) - GUARD
+                length = fast_length(int(np.ceil((delay.max() + later) * fs)) + GUARD + 1 - first)
+                stretches.append(Segment(chosen, waveform, coherent, first, length, float(sooner), float(later)))
     return Layout(tuple(stretches), audible, int((cut & (arrivals.kind != Kind.REVERBERATION)).sum()), support)
 
 

@@ -27,6 +27,7 @@ from sonarsynth.signals.gridded.low_rank import face_pairs, sinc_polynomials, sp
 from sonarsynth.signals.gridded.nodes import DEGREES, Axis, chebyshev, interpolation, nodes_for, polynomials_for
 from sonarsynth.signals.gridded.tiles import Tile, TileSettings, tiles
 from sonarsynth.signals.pulse_variation import PulseVariation, changed, shares
+from sonarsynth.signals.segments import GUARD, Segment
 
 RELAXING = np.log(4.0)
 """Chebyshev coefficients of absorption over the band fall by this (Np) from each degree to the next, or by more."""
@@ -83,8 +84,7 @@ class Stage(NamedTuple):
     aim: TileSettings
     bins: Bins
     origin: float  # s
-    first: int  # sample of the window at the origin
-    samples: int  # of the stretch
+    segment: Segment
     grid: Kernel  # that paths are deposited on
     wave: Kernel  # of time at twice the sampling rate, that hydrophones hear
     dtype: str
@@ -92,8 +92,7 @@ class Stage(NamedTuple):
 
 def add_segment(
     out: npt.NDArray[Any],
-    first: int,
-    samples: int,
+    segment: Segment,
     front: Wavefronts,
     elements: Elements,
     bins: Bins,
@@ -102,13 +101,12 @@ def add_segment(
     highest: float,
     method: tuple[int, float, str, float],
 ) -> None:
-    """Add to out (sensor, sample) the pressure of paths in a stretch that holds the whole of their pulses, as the array
-    centre hears them.
+    """Add to out (sensor, sample) the pressure of paths in a stretch, which begins at `origin` (s).
 
-    The stretch begins at `origin` (s) and at sample `first` of out, which may be negative, and has `samples`, even.
     highest (Hz) is the stop edge of the filter; method is width, oversampling, precision and tolerance of
     `GriddedSynthesis`.
     """
+    samples = segment.samples
     width, oversampling, dtype, tolerance = method
     circle = 2 * int(next_fast_len(int(np.ceil(highest * oversampling / bins.step)) + width, real=True))
     used = min(bins.frequency.size, circle // 2 - bins.first)
@@ -126,7 +124,7 @@ def add_segment(
         circle=circle,
     )
     wave = kernel(-8 * (-width // 8), samples * bins.step / highest, 2 * samples, dtype)  # as wide as its lanes
-    stage = Stage(aim, bins, origin, first, samples, grid, wave, dtype)
+    stage = Stage(aim, bins, origin, segment, grid, wave, dtype)
     for tile in tiles(front, aim):
         _add_tile(out, tile, front.select(tile.paths), stage)
 
@@ -135,9 +133,9 @@ def _add_tile(out: npt.NDArray[Any], tile: Tile, paths: Wavefronts, stage: Stage
     """Add the pressure of a tile at the hydrophones to out (sensor, sample)."""
     from sonarsynth.signals.gridded.deposit_kernels import hear
 
-    elements, bins, dtype = stage.aim.elements, stage.bins, stage.dtype
+    elements, bins, dtype, samples = stage.aim.elements, stage.bins, stage.dtype, stage.segment.samples
     steering, alone = Steering.at(tile.nodes(elements), tile.reference), paths.count == 1
-    field = np.zeros((len(steering.points), stage.samples + 1), np.result_type(dtype, np.complex64))
+    field = np.zeros((len(steering.points), samples + 1), np.result_type(dtype, np.complex64))
     some = field[:, bins.first : bins.first + bins.frequency.size]
     if alone:  # everything is steered to it: the field is that of the snap, through its face
         power, response = _power(tile, stage, stage.wave.spectrum), _responses(paths.modes, stage)
@@ -152,13 +150,15 @@ def _add_tile(out: npt.NDArray[Any], tile: Tile, paths: Wavefronts, stage: Stage
     if alone and paths.occluded.shape[1]:
         gain = gain * ~paths.occluded[0]
     onto, column, weight = to_sensors(elements, tile.axes, dtype)
-    wave = irfft(field, 2 * stage.samples, axis=1, overwrite_x=True)
-    wave = np.stack([wave[:, ::2], wave[:, 1::2]], axis=1).reshape(-1, weight.shape[1] * 2 * stage.samples)
+    rate, centre = samples * bins.step, paths.delay - stage.origin
+    begin = max(int((centre.min() - stage.segment.before) * rate) - GUARD, 0)
+    end = min(int((centre.max() + stage.segment.after) * rate) + GUARD + 1, samples)
+    wave = irfft(field, 2 * samples, axis=1, overwrite_x=True)[:, 2 * begin : 2 * end]
+    wave = np.stack([wave[:, ::2], wave[:, 1::2]], axis=1).reshape(-1, weight.shape[1] * 2 * (end - begin))
     if onto is not None:
         wave = onto @ wave
-    wave = wave.reshape(len(wave), weight.shape[1], 2, stage.samples)
-    late, kernel = delay[0] * bins.step * 2 * stage.samples, stage.wave
-    hear(wave, column, weight, late, gain, kernel.taps, kernel.lanes, stage.first, out)
+    wave, kernel = wave.reshape(len(wave), weight.shape[1], 2, end - begin), stage.wave
+    hear(wave, column, weight, 2.0 * rate * delay[0], gain, kernel.taps, kernel.lanes, stage.segment.first + begin, out)
 
 
 def _deposit(field: npt.NDArray[Any], tile: Tile, paths: Wavefronts, steering: Steering, stage: Stage) -> None:
@@ -246,7 +246,9 @@ def _responses(weight: Floats, stage: Stage) -> npt.NDArray[Any]:
     modes."""
     bins = stage.bins
     value = weight @ bins.modes if len(bins.modes) else bins.spectrum[None]
-    return np.asarray(value * (2.0 * stage.samples * bins.step)).astype(np.result_type(stage.dtype, np.complex64))
+    return np.asarray(value * (2.0 * stage.segment.samples * bins.step)).astype(
+        np.result_type(stage.dtype, np.complex64)
+    )
 
 
 def _power(tile: Tile, stage: Stage, spectrum: Floats) -> npt.NDArray[Any]:
