@@ -52,7 +52,7 @@ SHARD_BYTES = 64e6
 SHARD_FRAMES = 8
 MANY_FRAMES = 256
 """Frames of a shard of a large dataset of short frames: a shard costs some 30 ms, whatever it holds, and 80 files."""
-SHARDS = 128
+SHARDS = 64
 """Shards of a dataset, at least, for there to be more than SHARD_FRAMES frames in one."""
 SHARD_SECONDS = 10.0
 """Seconds that such a shard takes at most, by counts of work: those of the machine that costs were measured on."""

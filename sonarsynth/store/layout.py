@@ -108,12 +108,6 @@ class Layout:
             raise IndexError(f"shard {shard} is outside 0..{self.shards - 1}")
         return range(shard * self.shard_frames, min((shard + 1) * self.shard_frames, self.frames))
 
-    def check_region(self, start: int, stop: int) -> None:
-        """Raise ValueError unless start:stop is one whole shard: two writers of a shard lose each other's frames."""
-        shard, remainder = divmod(start, self.shard_frames)
-        if remainder or not 0 <= shard < self.shards or stop != self.region(shard).stop:
-            raise ValueError(f"frames {start}:{stop} are not one whole shard of {self.shard_frames}")
-
     def files(self, shards: int | None = None) -> int:
         """Files and folders of a store with so many shards (left out: all) at most: each array has a file of each."""
         shards = self.shards if shards is None else shards
@@ -133,15 +127,12 @@ class Layout:
             raise ValueError(f"a frame's values and the layout differ in {names}")
         return {a.key: a.cast(values[a.key]) for a in self.arrays}
 
-    def block(self, array: ArrayLayout, shard: int, frames: Mapping[int, Values]) -> np.ndarray:
-        """A whole shard of an array: the frames given, as `check` returns them, the fill value elsewhere."""
-        region, key = self.region(shard), array.key
-        if len(frames) == len(region):
-            return np.stack([frames[frame][key] for frame in region])
-        block = np.full((len(region), *array.shape[1:]), array.variable.fill, array.dtype)
-        for frame, values in frames.items():
-            block[frame - region.start] = values[key]
-        return block
+    def chunks(self, array: ArrayLayout, shard: int, frames: Mapping[int, Values]) -> list[np.ndarray]:
+        """The chunks (frame, ...) of a shard of an array: the frames given, as `check` returns them, the fill value
+        elsewhere."""
+        fill = np.broadcast_to(np.asarray(array.variable.fill, array.dtype), array.inner)
+        rows = [frames[frame][array.key] if frame in frames else fill for frame in self.region(shard)]
+        return [row[None] for row in rows] if array.chunk == 1 else [np.stack(rows)]
 
 
 @lru_cache(maxsize=8)

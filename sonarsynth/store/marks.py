@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -156,12 +156,19 @@ class ContentDigest:
         self._crc = like.startswith(_CRC)
         self._sum = hashlib.sha256()
 
-    def add(self, name: str, block: np.ndarray) -> None:
-        """Add a shard of an array."""
-        little = np.ascontiguousarray(block, block.dtype.newbyteorder("<"))
-        self._sum.update(f"{name} {little.dtype.str} {little.shape}\n".encode())
-        numbers = little.reshape(-1).view(np.uint8)
-        self._sum.update(f"{google_crc32c.value(numbers):08x}\n".encode() if self._crc else numbers.data)
+    def add(self, name: str, chunks: Sequence[np.ndarray]) -> None:
+        """Add a shard of an array, in one or several parts (frame, ...)."""
+        little = [np.ascontiguousarray(chunk, chunk.dtype.newbyteorder("<")) for chunk in chunks]
+        shape = sum(map(len, little)), *little[0].shape[1:]
+        self._sum.update(f"{name} {little[0].dtype.str} {shape}\n".encode())
+        crc = 0
+        for chunk in little:
+            numbers = chunk.reshape(-1).view(np.uint8)
+            if self._crc:
+                crc = google_crc32c.extend(crc, numbers)
+            else:
+                self._sum.update(numbers.data)
+        self._sum.update(f"{crc:08x}\n".encode() if self._crc else b"")
 
     def __str__(self) -> str:
         return (_CRC if self._crc else "") + self._sum.hexdigest()

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import errno
 import os
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
-
-import numpy as np
 
 from sonarsynth.pipeline import Values
 from sonarsynth.store.creating import attributes_in
 from sonarsynth.store.encoding import encoded
 from sonarsynth.store.files import within
-from sonarsynth.store.files.place import FileRecord, Folder, Opened, absolute, folder_of, held, remove, write_new
+from sonarsynth.store.files.place import Folder, Opened, absolute, folder_of, held, record_of, remove, write_each
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import OpenedFolder
-from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
+from sonarsynth.store.layout import layout_of
 from sonarsynth.store.marks import ABSENT, ContentDigest, Damage, Mark, drop_mark, load_marks, marked, save_mark
 from sonarsynth.store.provenance import other_versions
 
@@ -31,9 +26,6 @@ GONE: Final = (
     "the store was moved, removed or exchanged while it was built: put it back, or use its "
     "new name, and run the same command again to resume"
 )
-
-AT_ONCE: Final = 8
-"""Files of a shard that are on their way at once: each waits for the disk, which takes several in the time of one."""
 
 
 def write_shard(
@@ -69,21 +61,15 @@ def _write(store: Opened, plan: Plan, shard: int, frames: Mapping[int, Values], 
         raise ValueError(f"frame {outside[0]} is not in shard {shard} (frames {region.start} to {region.stop - 1})")
     checked = {frame: layout.check(values) for frame, values in sorted(frames.items())}
     drop_mark(store, shard)
-    content = ContentDigest()
-    files: dict[str, FileRecord] = {}
-    under_way: deque[tuple[str, Future[FileRecord]]] = deque()
-    try:
-        for array in sorted((a for a in layout.arrays if not a.empty), key=lambda a: a.path):
-            if len(under_way) == AT_ONCE:
-                name, first = under_way.popleft()
-                files[name] = first.result()
-            block = layout.block(array, shard, checked)
-            content.add(array.path, block)
-            packed = _content(layout, array, region.start, block)  # here: threads keep the memory that they allocate
-            under_way.append((array.file(shard), _writers().submit(_put, store, array.file(shard), packed)))
-    finally:
-        wait([task for _, task in under_way])  # the folder is let go of then
-    files |= {name: task.result() for name, task in under_way}
+    content, packed = ContentDigest(), dict[str, bytes | None]()
+    for array in sorted((a for a in layout.arrays if not a.empty), key=lambda a: a.path):
+        chunks = layout.chunks(array, shard, checked)
+        content.add(array.path, chunks)
+        packed[array.file(shard)] = encoded(array, chunks)
+    for name in (name for name, of_file in packed.items() if of_file is None):
+        remove(store, name, sync=False)
+    write_each(store, {name: of_file for name, of_file in packed.items() if of_file is not None})
+    files = {name: ABSENT if of_file is None else record_of(of_file) for name, of_file in packed.items()}
     if isinstance(store, OpenedFolder) and not store.in_its_place():
         raise Damage(f"{store}: {GONE}")
     still()
@@ -111,28 +97,6 @@ def _other_versions(store: Opened, plan: Plan) -> dict[str, str]:
 
 
 _seen: dict[tuple[object, ...] | None, dict[str, str]] = {}
-
-
-def _content(layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) -> bytes | None:
-    """What the file of a shard is to hold."""
-    layout.check_region(start, start + len(block))
-    return encoded(array, block)
-
-
-@lru_cache(maxsize=1)
-def _writers() -> ThreadPoolExecutor:
-    """Threads of this process that write: to start them anew takes longer than to write a small shard."""
-    return ThreadPoolExecutor(AT_ONCE, "write")
-
-
-os.register_at_fork(after_in_child=_writers.cache_clear)  # a fork has none of the threads
-
-
-def _put(store: Opened, name: str, content: bytes | None) -> FileRecord:
-    if content is not None:
-        return write_new(store, name, content)
-    remove(store, name, sync=False)
-    return ABSENT
 
 
 def missing(path: Folder | str, plan: Plan, frames: Iterable[int] | None = None) -> dict[int, tuple[int, ...]]:

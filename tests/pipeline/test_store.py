@@ -80,13 +80,6 @@ def test_codecs_have_checksums_and_frames_are_chunks(laid_out: Path) -> None:
     assert [type(codec).__name__ for codec in pressure.compressors] == ["BloscCodec", "Crc32cCodec"]
 
 
-def test_only_whole_shards_are_written(small_plan: Plan) -> None:
-    layout = layout_of(small_plan)
-    for start, count in ((0, 7), (1, 8), (4, 4), (8, 16), (16, 8), (24, 4), (-8, 8)):
-        with pytest.raises(ValueError, match="not one whole shard"):
-            layout.check_region(start, start + count)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -71,7 +71,7 @@ def written(plan: Plan, folder: Path, values: list[pipeline.Values]) -> tuple[fl
         store.write_shard(path, plan, first // step, frames)
         done = time.process_time()
         for array in (a for a in layout.arrays if not a.empty):
-            encoded(array, layout.block(array, first // step, frames))
+            encoded(array, layout.chunks(array, first // step, frames))
         compressing += time.process_time() - done
         writing += done - began
     return 1e3 * compressing / len(values), 1e3 * (writing - compressing) / len(values)

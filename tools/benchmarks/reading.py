@@ -145,7 +145,7 @@ def many(folder: Path) -> dict[str, float]:
         if array.path in ("truth/sonar_position", "split"):
             for shard in range(layout.shards):
                 shape = (len(layout.region(shard)), *array.shape[1:])
-                content = encoded(array, random.integers(0, 3, shape).astype(array.dtype))
+                content = encoded(array, [random.integers(0, 3, shape).astype(array.dtype)])
                 (path / array.file(shard)).parent.mkdir(parents=True, exist_ok=True)
                 (path / array.file(shard)).write_bytes(content or b"")
     times = {}

@@ -41,7 +41,7 @@ def read_back(path: Folder, mark: Mark) -> Iterator[Problem]:
         except Exception as error:  # whatever a codec raises on what it cannot decode
             yield Problem(f"{name}, shard {shard}", f"cannot be decoded: {error}", mark.frames)
             return
-        digest.add(name, block)
+        digest.add(name, [block])
         yield from _finite(name, block, mark.frames, shard * step)
     if str(digest) != mark.content:
         yield Problem(f"shard {shard}", "its data are not those that were written", mark.frames)

@@ -234,13 +234,12 @@ def is_folder(folder: Folder, name: str) -> bool:
     return status is not None and stat.S_ISDIR(status.st_mode)
 
 
-def write_new(folder: Opened, name: str, content: bytes) -> FileRecord:
-    """Write a file of a store, with its folders: on the disk when this returns. Its record."""
+def write_each(folder: Opened, contents: Mapping[str, bytes]) -> None:
+    """Write files of a store, with their folders: on the disk when this returns."""
     if isinstance(folder, Remote):
-        (folder / name).write_bytes(content)
+        folder.write_each(contents)
     else:
-        within.write_new(folder, name, content)
-    return record_of(content)
+        within.write_each(folder, contents)
 
 
 def write_in(folder: Opened, name: str, content: bytes) -> None:

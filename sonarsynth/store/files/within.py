@@ -10,14 +10,19 @@ import errno
 import os
 import stat
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import BufferedReader
+from itertools import repeat
 from pathlib import Path
 from typing import Final
 
 IS_LINK: Final = "is a link, which is not followed"
+
+AT_ONCE: Final = 8
+"""Files that are written at once."""
 
 _FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 _NEW: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -80,11 +85,18 @@ def opened(root: Root, name: str) -> Iterator[BufferedReader]:
         yield file
 
 
-def write_new(root: Root, name: str, content: bytes) -> None:
-    """Write a file anew, with its folders: on the disk when this returns. What had its name is another file's now.
+def write_each(root: Root, contents: Mapping[str, bytes]) -> None:
+    """Write files anew, with their folders: all on the disk when this returns. What had their names is another file's
+    now. Several are on their way at once: each waits for the disk, which takes several in the time of one.
 
     The folder `root` itself is never made.
     """
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        for _ in pool.map(_write_new, repeat(root), contents, contents.values()):
+            pass
+
+
+def _write_new(root: Root, name: str, content: bytes) -> None:
     with folder_of(root, name, make=True) as (folder, last):
         try:
             handle = os.open(last, _NEW, 0o666, dir_fd=folder)
