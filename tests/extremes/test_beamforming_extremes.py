@@ -8,10 +8,10 @@ import pytest
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.imaging.delay_and_sum.dense import dense_energies
 from sonarsynth.products import Signals
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, Sonar, elements
 from tests.axial import axial_energies
+from tests.dense import dense_energies
 
 SPEED = 1540.0
 RATE = 196e3

@@ -8,11 +8,11 @@ import pytest
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging import Capon, DenseDelayAndSum
-from sonarsynth.imaging.delay_and_sum.dense import dense_energies
 from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.imaging.lattice_blocks import subarrays
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
+from tests.dense import dense_energies
 
 RATE, SAMPLES = 196e3, 600
 ROMANIS = elements(Romanis())

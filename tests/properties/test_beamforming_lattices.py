@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.gates import gate_samples, gate_taper
-from sonarsynth.imaging.delay_and_sum.dense import dense_energies
 from sonarsynth.receiver import BeamGrid, PlanarLattice, elements
 from tests.axial import axial_energies
+from tests.dense import dense_energies
 
 
 @st.composite

@@ -10,9 +10,9 @@ from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.beams import beam_spectra
 from sonarsynth.equations.arrays.gates import fast_length, frequency_spacing, gate_taper, gated_spectra
-from sonarsynth.imaging.delay_and_sum.dense import dense_energies
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, elements
 from tests.axial import axial_energies
+from tests.dense import dense_energies
 
 SPEED = 1540.0
 

@@ -8,12 +8,12 @@ import pytest
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging import AutoBeamforming, DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.imaging.delay_and_sum.dense import dense_energies
 from sonarsynth.imaging.delay_and_sum.focus_error import focus_error, subarrays_for
 from sonarsynth.imaging.delay_and_sum.lattice_image import lattice_image, steered_zones
 from sonarsynth.imaging.delay_and_sum.zones import cuts, for_sensors, lens, quadrant, zones_of
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
+from tests.dense import dense_energies
 
 SPEED = 1540.0
 BAND = Band(low=25e3, high=85e3)

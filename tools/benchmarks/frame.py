@@ -61,7 +61,7 @@ def bench(index: int = 32) -> dict[str, Any]:
     kernel, check = (method.image(signals, plan.elements, sonar, start, stop).energy for method in plane)
     stages["beamform"] = {
         "ms": 1e3 * image_seconds,
-        "error_of_peak_kernel": relative(kernel, check),  # the same plane waves, float64
+        "error_of_peak_kernel": relative(kernel, check),  # the same plane waves, sensor by sensor
         "error_of_peak_focus": relative(image.energy, dense.energy),  # separable against spherical focusing
     }
     if isinstance(beamformer, FocusedDelayAndSum):

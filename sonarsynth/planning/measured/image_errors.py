@@ -10,9 +10,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, direction
 from sonarsynth.description.method import Demand
-from sonarsynth.equations.arrays.apertures import focus_delay
-from sonarsynth.imaging.delay_and_sum.dense import dense_energies
-from sonarsynth.imaging.image_window import snapshots_of, weights
+from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import sampled_arrivals
 from sonarsynth.planning.plans import Plan
@@ -75,8 +73,7 @@ def exact_beams(plan: Plan, method: Any, signals: Signals, start: float, stop: f
     row, column = row[::every], column[::every]
     snapshots = snapshots_of(signals, sonar, start, stop)
     beams = direction(sonar.beams.azimuth[column], sonar.beams.elevation[row])
-    delay = focus_delay(elements.position, beams, slow.focus, sonar.assumed_sound_speed)
-    exact = dense_energies(snapshots.spectra, delay, weights(elements, slow.shading), snapshots.frequency)
+    exact = np.sum(np.abs(slow.steer(snapshots, elements, sonar, beams)).astype(float) ** 2, axis=1)
     return ExactBeams(signals, start, stop, row, column, snapshots.unit * exact)
 
 
