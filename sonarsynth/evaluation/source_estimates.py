@@ -119,9 +119,8 @@ def _frame(block: SmallVariables, i: int, tally: _Tally, normal: np.ndarray) -> 
         tally.frames.add(i)
         refused = [REASONS[n] for n in column["reason"] if n not in (ACCEPTED, PLACELESS)]
         tally.reasons.update(refused[:missing])
-    truth = {name: block.of(f"truth/emissions/{name}", i) for name in ("arrival", "azimuth", "elevation", "position")}
-    pose = Pose(block.of("truth/sonar_position", i), block.of("truth/sonar_orientation", i))
-    true = pose.to_body(truth["position"])
+    truth = {name: block.of(f"truth/emissions/{name}", i) for name in ("arrival", "azimuth", "elevation")}
+    true = _places(block, i)
     for row in estimates:
         emission, estimate = int(column["emission"][row]), {name: values[row] for name, values in column.items()}
         snaps = range(len(truth["arrival"]))
@@ -138,6 +137,14 @@ def _frame(block: SmallVariables, i: int, tally: _Tally, normal: np.ndarray) -> 
             within["position"] = bool(error @ np.linalg.solve(estimate["position_covariance"], error) <= NEAR)
         tally.add(i, within)
         tally.useless += _useless(block.tree, estimate)
+
+
+def _places(block: SmallVariables, i: int) -> np.ndarray:
+    """Where each snap is (emission, xyz) m in the sonar frame, when it is heard."""
+    if block.has("truth/emissions/position_at_arrival"):
+        return block.of("truth/emissions/position_at_arrival", i)
+    pose = Pose(block.of("truth/sonar_position", i), block.of("truth/sonar_orientation", i))
+    return pose.to_body(block.of("truth/emissions/position", i))  # a store from before there was that
 
 
 def _within(

@@ -229,7 +229,7 @@ def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFr
     values |= link_budget_values(traced.budget, beamformed.isolated) | soundscape_values(plan, frame, traced.chorus)
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
     values |= clear_values(plan, traced.chorus, traced.echoes, direct, frame.moment.snaps)
-    values |= estimate_truth(direct, len(frame.moment.snaps)) | beamformed.snr
+    values |= estimate_truth(plan, frame, direct) | beamformed.snr
     if "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(beamformed.recorded or beamformed.signals, counts)

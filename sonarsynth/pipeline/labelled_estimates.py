@@ -10,6 +10,7 @@ from sonarsynth.pipeline.stored_values import Values, table
 from sonarsynth.planning import Plan
 from sonarsynth.products import Arrivals, Signals, SourceEstimates
 from sonarsynth.ranging.location.association import in_record
+from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import envelope_delay
 from sonarsynth.state import Emission
@@ -28,10 +29,17 @@ def heard_directly(plan: Plan, arrivals: Arrivals, snaps: tuple[Emission, ...]) 
     return direct_paths(arrivals, envelope)
 
 
-def estimate_truth(direct: Direct, snaps: int) -> Values:
-    """When and from where the array hears each snap directly, in degrees."""
-    time, azimuth, elevation = heard_first(direct, snaps)
-    return table("/truth/emissions", arrival=time, azimuth=np.rad2deg(azimuth), elevation=np.rad2deg(elevation))
+def estimate_truth(plan: Plan, frame: Frame, direct: Direct) -> Values:
+    """When and from where the array hears each snap directly, in degrees, and where the snap is then."""
+    snaps, track = frame.moment.snaps, frame.sonar_track
+    time, azimuth, elevation = heard_first(direct, len(snaps))
+    place = np.full((len(snaps), 3), np.nan)
+    moves = plan.scene.physics.doppler and not track.still
+    for n in np.flatnonzero(np.isfinite(time)):
+        own = track.later(float(time[n])).pose if moves else frame.sonar_pose
+        place[n] = own.to_body(snaps[n].position)
+    angles = {"azimuth": np.rad2deg(azimuth), "elevation": np.rad2deg(elevation)}
+    return table("/truth/emissions", arrival=time, position_at_arrival=place, **angles)
 
 
 def emission_values(

@@ -18,8 +18,9 @@ from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.refraction import first_rays
 from sonarsynth.ranging.location.source_position import ACCEPTED, UNRESOLVED, bending_covariance
+from sonarsynth.ranging.location.triggered import Triggered
 from sonarsynth.receiver import PlanarLattice, Romanis, Sonar, elements
-from sonarsynth.state import Receiver, Survey
+from sonarsynth.state import Receiver, Survey, Trigger
 from tests.heard import RATE, envelope_late, hear, hear_direct, silence
 
 C = 1540.0
@@ -82,6 +83,17 @@ def test_an_array_that_moves_locates_as_one_at_rest():
     known, taken_for_still = (SensorDelays().locate(signals, receiver, survey, 1) for receiver in receivers)
     assert np.linalg.norm(known.position[0] - source) < 1e-3
     assert np.linalg.norm(taken_for_still.position[0] - source) > 2e-2
+
+
+def test_what_a_trigger_tells_is_seen_from_where_the_array_is_when_it_hears():
+    """It closes in on the source, which then is as far as sound has come."""
+    source, velocity = np.array([20.0, -5.0, -6.0]), np.array([10.0, 2.0, 0.0])
+    track, told = Track(AHEAD, AHEAD.turn_to_world(velocity)), (Trigger(0.0, AHEAD.to_world(source)),)
+    receiver = Receiver(AHEAD, SMALL, Sonar(assumed_sound_speed=C), track)
+    found = Triggered().locate(silence(SMALL, 0.0, 8), receiver, Survey(20.0, WATER, told), 1)
+    arrival = float(found.time[0])
+    np.testing.assert_allclose(found.position[0], source - velocity * arrival, atol=1e-6)
+    assert np.linalg.norm(found.position[0]) == pytest.approx(C * arrival, rel=1e-9)
 
 
 def test_a_later_clock_moves_only_the_time():

@@ -34,6 +34,14 @@ _EMISSIONS = group_of(
         attributes=NONE,
     ),
     row("position", (*EMISSION, "xyz"), "float64", "m", "position of the snap in the world"),
+    row(
+        "position_at_arrival",
+        (*EMISSION, "xyz"),
+        "float64",
+        "m",
+        "position of the snap in the sonar frame when its direct pulse arrives; NaN without a direct path",
+        product="levels",
+    ),
     row("time", EMISSION, "float64", "s", "time of the snap after the instant of the frame"),
     row("level", EMISSION, "float64", "dB", "peak source level of the snap re 1 uPa at 1 m"),
     row(

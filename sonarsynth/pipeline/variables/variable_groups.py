@@ -116,7 +116,7 @@ _ESTIMATES = group_of(
     row("range_from_depth_error", ESTIMATE, "float64", "m", "predicted standard error of range_from_depth"),
     row("range_from_curvature", ESTIMATE, "float64", "m", "distance from the curvature of the wavefront"),
     row("range_from_curvature_error", ESTIMATE, "float64", "m", "predicted standard error of range_from_curvature"),
-    row("position", (*ESTIMATE, "xyz"), "float64", "m", "position of the snap in the sonar frame"),
+    row("position", (*ESTIMATE, "xyz"), "float64", "m", "position of the snap in the sonar frame at that time"),
     row("position_covariance", (*ESTIMATE, "xyz", "xyz_other"), "float64", "m2", "predicted covariance of position"),
     row("residual", ESTIMATE, "float64", "s", "root mean square residual of the sensor delays"),
     row(

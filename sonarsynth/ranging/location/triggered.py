@@ -51,6 +51,9 @@ class Triggered(LocatingMethod):
         sonar_depth = float(depth(receiver.pose.position))
         for trigger in survey.triggers:
             own = receiver.pose.to_body(trigger.position)
+            if (track := receiver.track) is not None and not track.still:  # it goes on until the sound arrives
+                for _ in range(3):
+                    own = track.later(trigger.time + float(np.linalg.norm(own)) / c).pose.to_body(trigger.position)
             r = float(np.linalg.norm(own))
             source_depth = float(depth(trigger.position))
             gradient = mean_gradient(survey.profile, sonar_depth, source_depth, receiver.elements.aperture or 1.0)
