@@ -17,6 +17,9 @@ from sonarsynth.tracing.transmit_paths import TransmitPaths
 if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
 
+PRUNE_MARGIN = 1e-3
+"""Of what is negligible: fainter echoes are not held while others are looked at."""
+
 
 @dataclass(frozen=True, eq=False)
 class EchoBatch:
@@ -85,9 +88,13 @@ def echo_batches(
     leg: Ints,
     components: tuple[tuple[Component, ...], ...],
     carried: MotionTerms | None,
+    factor: Floats,
 ) -> list[EchoBatch]:
-    """Echoes of pairs of a way and a leg (pair,), by owner and part; those that are nothing are left out; carried: by
-    how much pairs differ from those that were traced, where anything moves."""
+    """Echoes of pairs of a way and a leg (pair,), by owner and part; carried: by how much pairs differ from those that
+    were traced, where anything moves; factor (pair,): what ways do to amplitudes.
+
+    Those that are nothing are left out, and those that all together are much fainter than what is pruned.
+    """
     facets, context, receiver, batches = array.facets, array.context, array.context.receiver, []
     looked_for = context.tolerances.occlusion == "sensors" and receiver.elements.count > 1
     owner = facets.owner[out.facet]
@@ -110,7 +117,9 @@ def echo_batches(
             amplitude = component.amplitude(incident, scattered, patch, wavenumber)
             sign = surface.polarity(component)[facet]
             batch = EchoBatch(surface, component, row, patch, incident, scattered, wavenumber, amplitude, sign)
-            batches.append(batch.select(picked(amplitude != 0.0)))
+            strength = np.abs(amplitude) * factor[row]
+            faint = np.sqrt(PRUNE_MARGIN * context.tolerances.negligible) / max(len(row), 1)
+            batches.append(batch.select(picked(strength > faint * strength.max(initial=0.0))))
     return batches
 
 

@@ -17,7 +17,7 @@ from sonarsynth.scattering import Component
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Emission
 from sonarsynth.tracing.doppler import MotionTerms, apply_doppler, meets, met_paths, received, velocities
-from sonarsynth.tracing.echo_batches import EchoBatch, echo_batches, in_band
+from sonarsynth.tracing.echo_batches import PRUNE_MARGIN, EchoBatch, echo_batches, in_band
 from sonarsynth.tracing.expansion.amplitude_polynomials import variations
 from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
 from sonarsynth.tracing.expansion.scattering_points import delay_to_scattering_points, shift_to_scattering_points
@@ -29,9 +29,6 @@ from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arriva
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
-
-PRUNE_MARGIN = 1e-3
-"""Of what is negligible: fainter echoes are not held while other facets are looked at."""
 
 MAX_PHASE_CHANGE = 1.0
 """rad: a phase of reflection that varies by more over the aperture is not followed."""
@@ -174,8 +171,8 @@ def _found(array: FacetPaths, snap: Emission, components: tuple[tuple[Component,
     out, leg, carried = out.select(way[within]), leg[within], None
     if array.meeting is not None:
         out, carried = _carried(array, snap, out, leg)
-    groups = echo_batches(array, out, leg, components, carried)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
+    groups = echo_batches(array, out, leg, components, carried, factor)
     away = [_departure(array, leg[g.row], carried and carried.select(g.row), QUADRATIC_PROBES) for g in groups]
     few = np.concatenate([g.over(of) for g, of in zip(groups, away, strict=True)])
     pulses = PulseResponse.join([g.pulses(array.context.receiver.centre) for g in groups])
