@@ -40,7 +40,10 @@ def product(tmp_path: Path):  # type: ignore[no-untyped-def]
         text = CALLED.format(factor=factor, term=term)
         if not called.exists() or called.read_text() != text:
             called.write_text(text)
-        run = subprocess.run([sys.executable, "caller.py"], cwd=tmp_path, check=True, capture_output=True, text=True)
+        # -B: Python itself does not see a file change within a second
+        run = subprocess.run(
+            [sys.executable, "-B", "caller.py"], cwd=tmp_path, check=True, capture_output=True, text=True
+        )
         return [float(word) for word in run.stdout.split()]
 
     return value

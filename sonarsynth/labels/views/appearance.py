@@ -62,16 +62,16 @@ def _visible(
     body: PlacedTarget, corners: Floats, bodies: tuple[PlacedTarget, ...], sonar_pose: Pose
 ) -> tuple[Ints, float]:
     """The visible facets, in the view of the beams or not, and their share of the area that faces the array."""
-    mesh, visible, facing = body.mesh, [], 0.0
+    mesh, visible, facing = body.mesh, [], []
     for block in in_blocks(len(mesh.faces)):
         rows = np.arange(block.start, block.stop)
         faces, start = _leaving(body, rows, sonar_pose.position)
         rows, start = rows[faces], start[faces]
-        facing += float(mesh.area[rows].sum())
+        facing.append(mesh.area[rows])
         clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
         visible.append(rows[clear & finite(corners, mesh.faces[rows])])
     seen = np.concatenate(visible)
-    return seen, float(mesh.area[seen].sum() / facing) if len(seen) else 0.0
+    return seen, float(mesh.area[seen].sum() / np.concatenate(facing).sum()) if len(seen) else 0.0
 
 
 def _leaving(body: PlacedTarget, rows: Ints, to: Floats) -> tuple[Bools, Floats]:
