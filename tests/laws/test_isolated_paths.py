@@ -107,6 +107,10 @@ def test_a_frame_has_the_levels_that_its_link_budget_says_until_one_is_changed(l
     louder = replace(alone, amplitude=1.02 * alone.amplitude)  # by 0.17 dB
     wrong = link_budget_measured(rows(replace(traced, budget=replace(traced.budget, isolated=louder))), np.array([0]))
     assert wrong.ok is False and wrong.numbers["worst_db"] == pytest.approx(0.172, abs=0.01)
+    for asked, enough in ((0.01, False), (0.021, True)):
+        tree = rows(replace(traced, budget=replace(traced.budget, isolated=louder)))
+        tree.attrs["accuracy_signal"] = asked
+        assert link_budget_measured(tree, np.array([0])).ok is enough
     good["link_budget/scattering"].values[0, 0, 0, 0] += 0.2
     assert link_budget_adds_up(good, np.array([0])).ok is False
 

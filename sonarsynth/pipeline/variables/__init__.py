@@ -77,6 +77,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
         "band_low": plan.scene.sonar.band.low,
         "band_high": plan.scene.sonar.band.high,
         "assumed_sound_speed": plan.scene.sonar.assumed_sound_speed,
+        "accuracy_signal": recipe.accuracy.signal,
         "aperture_radius": plan.elements.aperture,
         "choices": plan.choices.as_json(),
         "validity": list(plan.validity),
