@@ -100,17 +100,18 @@ class Unit:
         if not isinstance(value, str):
             return value
         accepted = UNITS[self.symbol]
-        number, _, symbol = value.strip().partition(" ")
+        text, _, symbol = value.strip().partition(" ")
         symbol = symbol.strip()
         try:
-            format_bytes = float(number)
+            number = float(text)
         except ValueError:
-            raise ValueError(f"must be a number in {self.symbol}, or a text such as '1 {self.symbol}'") from None
+            spaced = f"must be a number in {self.symbol}, or a text such as '1 {self.symbol}', with a space"
+            raise ValueError(f"{spaced}, not {value[:40]!r}") from None
         if symbol not in accepted:
             raise ValueError(
                 (f"has unit '{symbol}'" if symbol else "has no unit") + f"; use one of {', '.join(accepted)}"
             )
-        return format_bytes * accepted[symbol]
+        return number * accepted[symbol]
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
