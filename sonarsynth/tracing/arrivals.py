@@ -110,4 +110,4 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     )  # fmt: skip
     if meeting is None:
         return direct
-    return apply_doppler(direct, legs, none_out, met, meeting, medium.profile, receiver.elements.aperture)
+    return apply_doppler(direct, legs, none_out, met, meeting, medium.profile, receiver.elements)

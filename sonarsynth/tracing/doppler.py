@@ -12,10 +12,10 @@ and each leg is longer by its curvature, as a straight one of its length is (`pa
 in uniform water. Directions at facet and array, and spreading, are those of the lengthened leg, exact there as well. v
 is the velocity of the facet: its body may turn, by omega tau_1 till then, and with it all that its law asks for. The
 pulse is longer by dt_2/dt_s; of a source that moves at w by 1 - w.n/c times as much, n the direction in which the ray
-leaves it. Of direct sound the source is the facet. Left out in bent water: how much more or less than straight rays the
-rays turn and spread for the remainder v tau_1; of a moving array, u/c of the curvature of the wavefront; that what
-moves is seen from another side at each sensor, v/c of the angle that the array takes up there: parts of the array see
-it from their own.
+leaves it. Of direct sound the source is the facet. Each sensor meets the wavefront when it is there (`_over_aperture`).
+Left out in bent water: how much more or less than straight rays the rays turn and spread for the remainder v tau_1; and
+of the pulse's length, not of its delay, that what moves is seen from another side at each sensor, v/c of the angle that
+the array takes up there: parts of the array see it from their own.
 """
 
 from __future__ import annotations
@@ -26,13 +26,15 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.kernels.row_products import row_products
 from sonarsynth.equations.kernels.unit_vectors import moved
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.motion import Track
-from sonarsynth.products import Arrivals
+from sonarsynth.products import ArrayExpansion, Arrivals
+from sonarsynth.receiver import Elements
 from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Emission
-from sonarsynth.tracing.expansion.probe_sensors import TERMS
+from sonarsynth.tracing.expansion.probe_sensors import probes, sphere
 from sonarsynth.tracing.receive_paths import ReceivePaths
 from sonarsynth.tracing.transmit_paths import TransmitPaths
 
@@ -173,21 +175,37 @@ def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, profile: Pro
 
 def apply_doppler(
     arrivals: Arrivals, legs: ReceivePaths, out: TransmitPaths, of: MotionTerms, meeting: Meeting, profile: Profile,
-    aperture: float,
+    elements: Elements,
 ) -> Arrivals:  # fmt: skip
-    """Arrivals with their Doppler, that of the array centre; legs and ways: those of `received` and `meets`.
-
-    An array that moves meets a wavefront later, or sooner, the farther it has still to go: delays over the aperture (m)
-    are longer by u.b/c, which goes into their linear terms.
-    """
+    """Arrivals with their Doppler, that of the array centre; legs and ways: those of `received` and `meets`."""
     array = meeting.sonar
     c, c_array = profile.at(depth(legs.point)), float(profile.at(depth(array.pose.position)))
     rate_out, rate_in = dot(of.velocity, out.arrival) / c, -dot(of.velocity, legs.departure) / c
     of_array = dot(legs.arrival, array.velocity) / c_array
     doppler = (1.0 - out.approach) * (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
-    if not array.velocity.any() or not aperture:
-        return replace(arrivals, doppler=doppler)
-    expansion = replace(arrivals.expansion, aperture=aperture)
-    terms = expansion.delay.copy() if expansion.delay.shape[1] else np.zeros((len(doppler), TERMS))
-    terms[:, 1:4] -= (of_array / (1.0 - of_array) * aperture / c_array)[:, None] * legs.direction
-    return replace(arrivals, doppler=doppler, expansion=replace(expansion, delay=terms))
+    arrivals = replace(arrivals, doppler=doppler)
+    if not elements.aperture or not (array.velocity.any() or array.spin.any()):
+        return arrivals
+    return replace(arrivals, expansion=_over_aperture(arrivals, legs, array, c_array, 1.0 / (1.0 - of_array), elements))
+
+
+def _over_aperture(
+    arrivals: Arrivals, legs: ReceivePaths, array: Track, c: float, longer: Floats, elements: Elements
+) -> ArrayExpansion:
+    """Wavefronts as sensors meet them that move, and turn with the array: later, or sooner, the farther these have
+    still to go; longer (path,): 1/(1 - u.b/c).
+
+    A sensor q at velocity w meets the sphere about R d at |R d - q - w t| = R + c t, a quadratic equation of t. What
+    bent rays are late beside it is longer as at the centre.
+    """
+    probe, over = probes(elements), arrivals.expansion
+    q, turn = probe.position, array.pose.turn_to_body
+    w = turn(array.velocity) + np.cross(turn(array.spin), q)
+    farther, radius = sphere(legs.direction, legs.radius, q), legs.radius[:, None]
+    square = farther * (farther + 2.0 * radius)
+    along = radius * (c + row_products(legs.direction, w.T)) - dot(q, w)
+    late = square / (along + np.sqrt(along**2 + (c**2 - dot(w, w)) * square)) - farther / c
+    terms, missed = probe.expand(late)
+    if over.delay.shape[1]:
+        terms += over.delay * longer[:, None]
+    return replace(over, delay=terms, error=over.error + missed, aperture=elements.aperture)

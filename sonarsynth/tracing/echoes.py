@@ -130,7 +130,7 @@ def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...
             facet=facet, scattering=scattered, pulses=block.pulses, amplitude_error=error,
         )  # fmt: skip
         if meeting is not None and block.carried is not None:
-            echo = apply_doppler(echo, legs, out, block.carried, meeting, profile, receiver.elements.aperture)
+            echo = apply_doppler(echo, legs, out, block.carried, meeting, profile, receiver.elements)
         if spot.any() and array.bending.profile.uniform:
             echo = shift_to_scattering_points(echo, legs, spot, receiver.pose)
         arrivals.append(replace(echo, delay=echo.delay + block.pulses.late))

@@ -17,8 +17,6 @@ HELD_OUT = 3
 """Probes that only measure the error of a fit; those that it is fitted to are as many and as three in ten more."""
 QUADRATIC_PROBES = 9
 """Probes, the first ones, that a polynomial of the second degree is fitted to and measured at."""
-TERMS = 20
-"""Terms over the aperture, up to the third degree."""
 SECOND_DEGREE = 10
 """Terms up to the second degree."""
 BRANCH = 0.05
