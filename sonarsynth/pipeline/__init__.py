@@ -263,7 +263,8 @@ def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointClou
     pressure = signals.pressure
     loudest = float(max(pressure.max(initial=0.0), -pressure.min(initial=0.0)))
     window = ReceivedWindow(elements, sonar, image, beams, loudest, beamformed.signals, estimates)
-    return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile)
+    track = receiver_of(plan, frame).track
+    return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile, track)
 
 
 def _values(plan: Plan, index: int) -> Values:

@@ -9,6 +9,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, direction
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose, unit
+from sonarsynth.geometry.motion import Track
 from sonarsynth.products import PointCloud, SourceEstimates, no_points
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes
 from sonarsynth.ranging.placing.solution import Solution
@@ -21,15 +22,21 @@ if TYPE_CHECKING:
 
 
 def point_cloud(
-    window: ReceivedWindow, picking: PickingMethod, placing: PlacingMethod, sonar_pose: Pose, profile: Profile
-) -> PointCloud:
+    window: ReceivedWindow, picking: PickingMethod, placing: PlacingMethod, sonar_pose: Pose, profile: Profile,
+    track: Track | None = None,
+) -> PointCloud:  # fmt: skip
     """Points lit by the first located snap: the echoes of `picking` where `placing` puts them; none of an echo that
-    has no place, and none at all where no snap was located. profile: the sound speed of the water."""
+    has no place, and none at all where no snap was located. profile: the sound speed of the water; track: of a sonar
+    that moves, which places are relative to where it hears the echo."""
     if not window.located:
         return no_points()
     echoes = picking.picks(window)
     beam, source = direction(echoes.azimuth, echoes.elevation), window.estimates.position[0]
     solution = placing.place(echoes.delay, beam, source, window.sonar, sonar_pose, profile)
+    if track is not None and not track.still:
+        turn = track.pose.turn_to_body
+        drift = -turn(track.velocity) - np.cross(turn(track.spin), source)
+        solution = solution.as_array_moves(source, echoes.delay[:, None] * drift)
     error = range_error(solution, echoes, window.estimates, window.sonar)
     cloud = PointCloud(
         position=solution.position.astype(np.float32),

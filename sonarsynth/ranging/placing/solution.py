@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,13 @@ class Solution:
     by_path: Floats  # (echo,) dr/dx, x the excess path
     by_angle: Floats  # (echo,) m/rad
     by_source: Floats  # (echo, xyz) dr/dS
+
+    def as_array_moves(self, source: Floats, shift: Floats) -> Solution:
+        """Of an array that has moved between the direct arrival and the echo, so that the source (xyz) m, sonar frame,
+        has shifted (echo, xyz) m there by then: to the first order, and the direct path is as long as it was."""
+        longer = np.linalg.norm(source + shift, axis=1) - np.linalg.norm(source)
+        r = self.range + np.einsum("ex,ex->e", self.by_source, shift) - self.by_path * longer
+        return replace(self, position=self.position * (r / self.range)[:, None], range=r)
 
 
 def isovelocity_solution(delay: Floats, beam: Floats, source: Floats, sound_speed: float) -> Solution:
