@@ -133,9 +133,9 @@ def build(
         bool, typer.Option("--dashboard", help="Start Dask's dashboard; all users of this machine can read it.")
     ] = False,
     predicting: Annotated[
-        bool,
-        typer.Option("--predict/--no-predict", help="Predict time and size first, and compare them with the result."),
-    ] = True,
+        bool | None,
+        typer.Option("--predict/--no-predict", help="Predict time and size first. Default: of what takes over 5 s."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Build a dataset, or the part of it that is missing. Run the same command again to resume."""
@@ -156,6 +156,7 @@ def build(
     with reading.locating(source), printing.planning():
         plan = planning.plan(made_from, chosen)
     prediction = None
+    predicting = not schedule.brief(plan, wanted) if predicting is None else predicting
     if predicting and scheduler is None and (restart or stores.missing(store, plan, wanted)):
         with printing.planning("timing frames"):
             prediction = schedule.predict(plan, prepared=time.process_time())

@@ -259,5 +259,5 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
     size, factor = frame_size(plan), machine_factor()
     rows = [*_trace_rows(plan, size), *_signal_rows(plan, size), *_sonar_rows(plan, size)]
     total = sum(row[5] for row in rows)
-    rows.append(("write", "zarr, blosc-lz4, crc32c", "always", "none", total * SECONDS["write byte"], 0))
+    rows.append(("write", "zarr, blosc, crc32c", "always", "none", total * SECONDS["write byte"], 0))
     return tuple(Stage(a, b, c, d, seconds * factor, size) for a, b, c, d, seconds, size in rows)

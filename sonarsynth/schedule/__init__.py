@@ -13,17 +13,16 @@ from sonarsynth.description.memory import free_bytes
 from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.reading import Source
-from sonarsynth.schedule import connecting
 from sonarsynth.schedule.build_log import append_lines, read_lines, write_lines
 from sonarsynth.schedule.build_report import BuildProgress, BuildReport, Progress
 from sonarsynth.schedule.disk_space import DiskRoom, TooLarge, check_space, told_when_full
-from sonarsynth.schedule.making import job_of, make_shards, reachable_by_workers, usable_cores
+from sonarsynth.schedule.making import brief, job_of, make_shards, reachable_by_workers, usable_cores, with_shards_of
 from sonarsynth.schedule.predicting import Prediction, predict
 from sonarsynth.schedule.tasks import Failure
 from sonarsynth.store import Damage, Folder, Mismatch, cards, provenance
 from sonarsynth.store.creating import plain_recipe, spelled
 
-__all__ = ["BuildReport", "Failure", "Prediction", "Progress", "TooLarge", "build", "predict", "usable_cores"]
+__all__ = ["BuildReport", "Failure", "Prediction", "Progress", "TooLarge", "brief", "build", "predict", "usable_cores"]
 
 LEAST_MEMORY: Final = 300_000_000
 """Bytes that a worker needs before it has done anything."""
@@ -64,7 +63,8 @@ def build(
     path: folder of the store, or a URL that fsspec knows, such as s3://bucket/remus.zarr.
     frames: numbers of the frames (default: all).
     products: of signals, image and cloud, those that are stored; a plan has its own.
-    workers: processes on this machine (default: one a usable core; 0: in this process).
+    workers: processes on this machine (default: one a usable core, and none for a single shard of a few seconds' work
+        that no other option is for; 0: in this process).
     scheduler: address of a running Dask scheduler, whose workers are used instead.
     restart: whether a store of something else is replaced.
     retry_failed: whether frames that failed in earlier builds are tried again.
@@ -119,7 +119,8 @@ def build(
         with course.logged(plan), _dashboard(dashboard):
             job = job_of(path, plan, name, frame_timeout)
             make_shards(
-                job, plan, todo, course.done, workers=workers, scheduler=scheduler, memory=worker_memory,
+                job, plan, todo, course.done, scheduler=scheduler, memory=worker_memory,
+                workers=_processes(workers, plan, todo, frame_timeout or worker_memory or dashboard),
                 started=course.started, lost=course.lost,
             )  # fmt: skip
         _describe(path, report, prediction)
@@ -156,19 +157,28 @@ def _check_files(path: Folder, plan: Plan) -> None:
         )
 
 
+def _processes(workers: int | None, plan: Plan, todo: Mapping[int, tuple[int, ...]], asked: object) -> int | None:
+    """Worker processes: none for one brief shard, unless something is asked that only they do."""
+    alone = workers is None and not asked and len(todo) == 1 and brief(plan, *todo.values())
+    return 0 if alone else workers
+
+
 def _dashboard(shown: bool) -> AbstractContextManager[None]:
     if not shown:
         return nullcontext()
+    from sonarsynth.schedule import connecting
+
     return connecting.dashboard_shown()
 
 
 def _as_begun(path: Folder, plan: Plan) -> Plan:
-    """The plan, with the choices that a store of the same recipe was begun with: another machine may choose others."""
+    """The plan, with the choices and the shards that a store of the same recipe was begun with: others may be made
+    elsewhere."""
     stored = store.root_attributes(path)
     if stored.get("recipe_digest") != plan.digest or "choices" not in stored:
         return plan
     try:
-        return replace(plan, choices=choices_from(stored["choices"]))
+        return with_shards_of(replace(plan, choices=choices_from(stored["choices"])), stored)
     except ValueError:
         raise Damage(f"{path}: its choices cannot be read: use --restart to overwrite it") from None
 
@@ -188,6 +198,8 @@ def _check(
     if worker_memory is not None and worker_memory < LEAST_MEMORY:
         raise ValueError(f"worker_memory must be {LEAST_MEMORY:g} bytes or more, not {worker_memory}")
     if scheduler is not None:
+        from sonarsynth.schedule import connecting
+
         connecting.check_address(scheduler, insecure)
 
 

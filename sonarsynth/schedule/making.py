@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping
-from typing import Final
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
+from typing import Any, Final
 
-from sonarsynth.planning import Plan
-from sonarsynth.schedule import cluster, connecting, tasks, worker_status
+from sonarsynth.planning import MANY_FRAMES, Plan
+from sonarsynth.schedule import tasks, worker_status
 from sonarsynth.schedule.tasks import Job, WrittenShard
 from sonarsynth.store import Folder, Remote, Unreachable
 
 PATIENCE: Final = 600.0
 """Seconds that a stage of a frame may always take (a first one compiles), and a worker to start again."""
+
+BRIEF: Final = 5.0
+"""Seconds of one core, by counts of work, that a build takes for it to be predicted and to have worker processes."""
 
 BLOCK_SECONDS: Final = 3.0
 """A task is of as many frames as take so long in all stages, by counts of work: each costs some ms to schedule."""
@@ -26,6 +30,12 @@ def reachable_by_workers(path: Folder, workers: int | None) -> Folder:
     if isinstance(path, Remote) and not path.shared and workers != 0:
         raise Unreachable(f"{path}: is of this process alone: give workers=0 (--workers 0)")
     return path
+
+
+def with_shards_of(plan: Plan, attributes: Mapping[str, Any]) -> Plan:
+    """The plan, with as many frames a shard as the attributes of a store of it say: today's rule may be another."""
+    frames = attributes.get("shard_frames")
+    return replace(plan, shard_frames=frames) if type(frames) is int and 0 < frames <= MANY_FRAMES else plan
 
 
 def job_of(path: Folder, plan: Plan, build: str, frame_timeout: float | None = None) -> Job:
@@ -65,10 +75,18 @@ def make_shards(
         for shard, frames in todo.items():
             done(tasks.write(job, shard, [[tasks.render_frame(job, frame) for frame in frames]]))
         return
+    from sonarsynth.schedule import cluster, connecting
+
     count = min(usable_cores() if workers is None else workers, len(todo))
     with connecting.connected(count, scheduler, memory) as client:
         started(len(client.nthreads()), client.dashboard_link or "")
         cluster.run(client, job, todo, done, lost, math.inf if scheduler else PATIENCE)
+
+
+def brief(plan: Plan, frames: Collection[int] | None = None) -> bool:
+    """Whether frames (left out: all) take little, by counts of work, beside predicting them or starting workers."""
+    share = 1.0 if frames is None else len(frames) / plan.recipe.frames
+    return share * plan.predicted_seconds < BRIEF
 
 
 def usable_cores() -> int:

@@ -12,8 +12,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, choices_from
 from sonarsynth.schedule.build_log import append_lines
 from sonarsynth.schedule.build_report import Progress
-from sonarsynth.schedule.connecting import check_address
-from sonarsynth.schedule.making import job_of, make_shards, reachable_by_workers
+from sonarsynth.schedule.making import job_of, make_shards, reachable_by_workers, with_shards_of
 from sonarsynth.schedule.tasks import Failure, WrittenShard
 from sonarsynth.store import Findings, Folder, Mismatch, Problem, Remote, cards, provenance
 from sonarsynth.store.checking.examining import shard_of
@@ -91,6 +90,8 @@ def repair(
     another machine without TLS, unless `insecure`.
     """
     if scheduler is not None:
+        from sonarsynth.schedule.connecting import check_address
+
         check_address(scheduler, insecure)
     path = reachable_by_workers(store.absolute(path), workers)
     store.must_be_store(path)
@@ -156,6 +157,7 @@ def _plan_of(path: Folder, findings: Findings, force: bool, files: Path | str | 
         raise Mismatch(f"{path}: its recipe cannot be followed any more: {error}") from None
     if plan.digest != digest:
         raise Mismatch(f"{path}: a file that its recipe names has changed since the store was built")
+    plan = with_shards_of(plan, attrs)
     now = identity(plan)
     if attrs.get("shard_frames") != now["shard_frames"]:
         raise Mismatch(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from zarr.core.metadata.v3 import ArrayV3Metadata
 
-from sonarsynth.store.encoding import CODEC, LEVEL, shuffle
+from sonarsynth.store.encoding import PLAIN, compression
 from sonarsynth.store.layout import ArrayLayout
 
 
@@ -17,7 +17,7 @@ def framed_array(array: ArrayLayout) -> ArrayV3Metadata:
     attrs: dict[str, Any] = {"units": variable.units, "long_name": variable.long_name, **dict(variable.attributes)}
     if "scale_factor" in attrs:  # packed: readers must know the fill value to give NaN
         attrs["_FillValue"] = int(variable.fill)
-    chunk, codecs = (array.chunk, *inner), _codecs(array.dtype, shuffle(array))
+    chunk, codecs = (array.chunk, *inner), _codecs(array.dtype, compression(array))
     if array.chunk != array.shard:
         index = [{"name": "bytes", "configuration": {"endian": "little"}}, {"name": "crc32c"}]
         sharding = {"chunk_shape": chunk, "codecs": codecs, "index_codecs": index, "index_location": "end"}
@@ -30,7 +30,7 @@ def fixed_array(dims: tuple[str, ...], values: np.ndarray, attrs: dict[str, Any]
     """An array that no frame changes, in one chunk."""
     text = values.dtype.kind == "U"
     words: list[dict[str, Any]] = [{"name": "vlen-utf8", "configuration": {}}, {"name": "crc32c"}]
-    codecs = words if text else _codecs(values.dtype, "shuffle")
+    codecs = words if text else _codecs(values.dtype, PLAIN)
     name, fill = ("string", "") if text else (values.dtype.name, 0)
     return _document(values.shape, name, tuple(max(1, n) for n in values.shape), codecs, fill, dims, attrs)
 
@@ -64,9 +64,9 @@ def _document(
     )
 
 
-def _codecs(dtype: np.dtype[Any], shuffled: str) -> list[dict[str, Any]]:
+def _codecs(dtype: np.dtype[Any], compressed: dict[str, Any]) -> list[dict[str, Any]]:
     """Blosc, and a checksum."""
-    blosc = {"cname": CODEC, "clevel": LEVEL, "shuffle": shuffled, "typesize": dtype.itemsize, "blocksize": 0}
+    blosc = {**compressed, "typesize": dtype.itemsize, "blocksize": 0}
     return [
         {"name": "bytes", "configuration": {"endian": "little"}},
         {"name": "blosc", "configuration": blosc},

@@ -15,18 +15,19 @@ from numcodecs import blosc
 if TYPE_CHECKING:
     from sonarsynth.store.layout import ArrayLayout
 
-CODEC: Final = "lz4"
-"""What blosc compresses with. Zstd at level 1 takes three times as long to write and to read, for no fewer bytes of the
-image, clouds and noisy pressure, 11 % fewer of noisy counts, and 35 % fewer of those of a silent sea."""
+PLAIN: Final = {"cname": "lz4", "clevel": 5, "shuffle": "shuffle"}
+"""How blosc compresses what is no signal: the bytes of numbers that are like their neighbours or all fill value."""
+FLOATS: Final = {"cname": "lz4", "clevel": 5, "shuffle": "bitshuffle"}
+"""Of signals in numbers with a point. Zstd takes three times as long to write and to read, for no fewer bytes."""
+COUNTS: Final = {"cname": "zstd", "clevel": 1, "shuffle": "bitshuffle"}
+"""Of a converter's counts. lz4 saves 2 ms a frame for 12 % more bytes of noisy ones, 55 % more of a silent sea."""
 
-LEVEL: Final = 5
-"""Compression level."""
 
-
-def shuffle(array: ArrayLayout) -> str:
-    """What blosc sorts before it compresses: the bits of noisy samples, the bytes of numbers that are like their
-    neighbours or all fill value."""
-    return "bitshuffle" if "sample" in array.variable.dims else "shuffle"
+def compression(array: ArrayLayout) -> dict[str, Any]:
+    """How blosc compresses an array, in the words of its metadata."""
+    if "sample" not in array.variable.dims:
+        return PLAIN
+    return COUNTS if array.dtype.kind == "i" else FLOATS
 
 
 _SHUFFLES: Final = {"bitshuffle": blosc.BITSHUFFLE, "shuffle": blosc.SHUFFLE}
@@ -61,7 +62,8 @@ def _chunk(array: ArrayLayout, frames: np.ndarray) -> bytes:
     if len(numbers) < array.chunk:
         fill = np.full((array.chunk - len(numbers), *numbers.shape[1:]), array.variable.fill, numbers.dtype)
         numbers = np.concatenate([numbers, fill])
-    packed: Any = blosc.compress(numbers, CODEC.encode(), LEVEL, _SHUFFLES[shuffle(array)], 0)
+    how = compression(array)
+    packed: Any = blosc.compress(numbers, how["cname"].encode(), how["clevel"], _SHUFFLES[how["shuffle"]], 0)
     return _checked(bytes(packed))
 
 

@@ -219,6 +219,17 @@ def test_another_version_is_refused_unless_told_otherwise(
     assert_identical(copy, whole)
 
 
+def test_a_store_keeps_the_shards_that_it_was_begun_with(
+    copy: Path, whole: Path, small: Recipe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sonarsynth.planning._shard_frames", lambda plan: 4)  # today's rule: others, of 8
+    os.truncate(copy / SHARD, 10)
+    assert repair(copy, workers=0).shards == (1,)
+    assert_identical(copy, whole)
+    assert build(small, copy, workers=0).ok
+    assert store.verify(copy).ok
+
+
 def test_numbers_that_come_out_differently_are_said(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     works = pipeline.trace_frame
     monkeypatch.setattr(pipeline, "trace_frame", lambda made, i: works(made, i - i % 2))
