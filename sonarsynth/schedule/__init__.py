@@ -178,7 +178,7 @@ def _as_begun(path: Folder, plan: Plan) -> Plan:
     if stored.get("recipe_digest") != plan.digest or "choices" not in stored:
         return plan
     try:
-        return with_shards_of(replace(plan, choices=choices_from(stored["choices"])), stored)
+        return with_shards_of(path, replace(plan, choices=choices_from(stored["choices"])), stored)
     except ValueError:
         raise Damage(f"{path}: its choices cannot be read: use --restart to overwrite it") from None
 

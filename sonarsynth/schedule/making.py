@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
+from sonarsynth import store
 from sonarsynth.planning import MANY_FRAMES, Plan
 from sonarsynth.schedule import tasks, worker_status
 from sonarsynth.schedule.tasks import Job, WrittenShard
 from sonarsynth.store import Folder, Remote, Unreachable
+from sonarsynth.store.files.place import read
 
 PATIENCE: Final = 600.0
 """Seconds that a stage of a frame may always take (a first one compiles), and a worker to start again."""
@@ -32,10 +35,20 @@ def reachable_by_workers(path: Folder, workers: int | None) -> Folder:
     return path
 
 
-def with_shards_of(plan: Plan, attributes: Mapping[str, Any]) -> Plan:
-    """The plan, with as many frames a shard as the attributes of a store of it say: today's rule may be another."""
+def with_shards_of(path: Folder, plan: Plan, attributes: Mapping[str, Any]) -> Plan:
+    """The plan, with as many frames a shard as a store of it was begun with: today's rule may be another.
+
+    Unless its attributes and its arrays agree on that, the plan as it is.
+    """
     frames = attributes.get("shard_frames")
-    return replace(plan, shard_frames=frames) if type(frames) is int and 0 < frames <= MANY_FRAMES else plan
+    if type(frames) is not int or not 0 < frames <= MANY_FRAMES:
+        return plan
+    try:
+        metadata: Any = json.loads(read(path, f"{store.layout_of(plan).arrays[0].path}/zarr.json"))
+        laid: Any = metadata["chunk_grid"]["configuration"]["chunk_shape"][0]
+    except (OSError, ValueError, KeyError, TypeError, IndexError, RecursionError):
+        return plan
+    return replace(plan, shard_frames=frames) if laid == frames else plan
 
 
 def job_of(path: Folder, plan: Plan, build: str, frame_timeout: float | None = None) -> Job:

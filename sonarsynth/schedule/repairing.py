@@ -157,7 +157,7 @@ def _plan_of(path: Folder, findings: Findings, force: bool, files: Path | str | 
         raise Mismatch(f"{path}: its recipe cannot be followed any more: {error}") from None
     if plan.digest != digest:
         raise Mismatch(f"{path}: a file that its recipe names has changed since the store was built")
-    plan = with_shards_of(plan, attrs)
+    plan = with_shards_of(path, plan, attrs)
     now = identity(plan)
     if attrs.get("shard_frames") != now["shard_frames"]:
         raise Mismatch(
