@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Callable, Iterator
-from functools import cache, partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
@@ -62,7 +62,7 @@ def _made_of(function: Any, seen: set[Any]) -> Iterator[str]:
             yield from _made_of(value.py_func, seen)
 
 
-@cache
+@lru_cache(maxsize=4096)  # files of a package
 def _digest(file: str) -> str:
     """Digest of a file of this package, as it was when first asked for: when what it holds was imported."""
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()

@@ -35,9 +35,7 @@ class Segment:
     coherent: bool  # all pulses are differentiated, or none
     first: int  # sample of the window where it begins; may be negative
     samples: int  # even
-    before: (
-        float  # s: no pulse begins sooner before it arrives at the array centre, of a front that others are steered to
-    )
+    before: float  # s: no pulse begins sooner before it arrives at the centre, where others may be steered to it
     after: float  # s: none ends later
 
 
@@ -67,13 +65,16 @@ def layout(
     sonar: Sonar,
     start: float,
     samples: int,
+    *,
+    tolerance: float = SUPPORT_TOLERANCE,
 ) -> Layout:
     """Sort arrivals into stretches: direct and echoes apart (they differ by tens of dB), each waveform apart, and
-    coherent echoes, whose pulses are differentiated."""
+    coherent echoes, whose pulses are differentiated; tolerance: what pulses may be where they are cut, of their peak.
+    """
     if samples < 1:
         raise ValueError("a window needs at least one sample")
     fs = sonar.sampling_frequency
-    plain, support, silent = _supports(arrivals, front, snaps, sonar)
+    plain, support, silent = _supports(arrivals, front, snaps, sonar, min(tolerance, SUPPORT_TOLERANCE))
     before, after = support
     early, late = _extent(front, elements, before, after, start, start + (samples - 1) / fs)
     cut = ~silent & ((early < start) | (late > start + (samples - 1) / fs))
@@ -94,7 +95,7 @@ def layout(
 
 
 def _supports(
-    arrivals: Arrivals, front: ArrayPaths, snaps: tuple[Emission, ...], sonar: Sonar
+    arrivals: Arrivals, front: ArrayPaths, snaps: tuple[Emission, ...], sonar: Sonar, tolerance: float
 ) -> tuple[Floats, Floats, Bools]:
     """Support (before or after, path) of each pulse in s: in its plain shape or its slope's, and in its own; and which
     (path,) are silent, blurred or from a facet that is not rough."""
@@ -112,7 +113,7 @@ def _supports(
         table = np.zeros((8, len(snaps), 2))
         for kind in np.flatnonzero(np.bincount(kinds)).tolist():
             shape = PulseChanges(turned=kind & 2 > 0, sloped=kind % 2 == 1, rough=roughest * (kind >= 4))
-            table[kind] = [support_of(w, chosen, shape) for w in longest]
+            table[kind] = [support_of(w, chosen, shape, tolerance) for w in longest]
         return np.asarray(table[kinds, arrivals.snap].T)
 
     none, silent = np.zeros(front.count, bool), np.zeros(front.count, bool)

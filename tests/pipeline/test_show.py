@@ -202,6 +202,7 @@ def _tree(frames, groups, size, angle, sensors, vertices, faces) -> xr.DataTree:
     sets["truth/targets"] = sets["truth/targets"].assign_coords(target=["hull"], group=("target", ["hull"]))
     if "signals" in sets:
         sets["signals"]["position"] = (("sensor", "xyz"), sensors)
+        sets["signals"]["outside"] = sets["signals"]["clipped"] = ("frame", np.zeros(len(frames), int))
         sets["signals"]["gain"] = ("sensor", np.ones(len(sensors)))
         sets["signals"]["sampling_frequency"] = RATE
     sets["targets/hull"] = xr.Dataset({"vertices": (("vertex", "xyz"), vertices), "faces": (("face", "corner"), faces)})

@@ -78,6 +78,7 @@ ELSEWHERE = (
     "/truth/targets/echo_",
     "/truth/emissions/a",
     "/truth/emissions/elev",
+    "/truth/emissions/position_at",
     "/link_budget/wavefront_error",
 )
 """Where the reason is another: no snap was found, no point; echoes from no side, or several."""
