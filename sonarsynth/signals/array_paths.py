@@ -3,7 +3,7 @@ inf)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -67,6 +67,22 @@ class Wavefronts:
             for name, value in vars(self).items()
         }
         return type(self)(**rows)
+
+    def without_faint_shadows(self, tolerance: float) -> Self:
+        """The paths with some of those that miss a part of the hydrophones reaching all or none, whichever is nearer:
+        the faintest, as many as change the energy of all by `tolerance` squared at most, where no path counts as louder
+        than the loudest of those. Paths to none are left out."""
+        rows = np.flatnonzero(self.occluded.any(axis=1))
+        if not len(rows):
+            return self
+        missed, energy = self.occluded[rows].mean(axis=1), self.amplitude**2
+        change = energy[rows] * np.minimum(missed, 1.0 - missed)
+        order = np.argsort(change, kind="stable")
+        faint = order[np.cumsum(change[order]) <= tolerance**2 * np.minimum(energy, energy[rows].max()).sum()]
+        occluded = self.occluded.copy()
+        occluded[rows[faint]] = False
+        none = rows[faint[missed[faint] > 0.5]]
+        return replace(self, occluded=occluded).select(np.delete(np.arange(self.count), none))
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from sonarsynth.receiver import BeamGrid, PlanarLattice
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe import Recipe
 from sonarsynth.signals import GriddedSynthesis
+from sonarsynth.signals.array_paths import array_paths
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target import Target
@@ -60,6 +61,23 @@ def test_paths_are_hidden_as_each_hydrophone_finds_for_itself() -> None:
         alone = own.facet + 10_000 * (own.target + 1)
         ball = (whole.target == 0) & ~hidden[:, sensor]
         assert set(key[ball]) == set(alone[own.target == 0])
+
+
+def test_shadows_that_are_rounded_off_change_no_more_than_is_allowed() -> None:
+    made = planning.plan(screened(0.02), {"signals"})
+    made = replace(made, choices=replace(made.choices, occlusion="sensors", negligible=0.0))
+    front = array_paths(arrivals_of(made, made.recipe.frame(0)[1]), SNAPS, made.elements)
+    front = replace(front, delay=np.arange(front.count, dtype=float))  # names them
+    rows = front.occluded.any(axis=1)
+    energy, partly = front.amplitude**2, [rows.sum()]
+    for tolerance in (2e-2, 6e-2, 0.2):
+        few = front.without_faint_shadows(tolerance)
+        occluded = np.ones_like(front.occluded)
+        occluded[few.delay.astype(int)] = few.occluded
+        changed = energy @ (occluded != front.occluded).mean(axis=1)
+        assert 0.0 < changed <= tolerance**2 * np.minimum(energy, energy[rows].max()).sum()  # not of the direct snap
+        partly.append(few.occluded.any(axis=1).sum())
+    assert (np.diff(partly) < 0).all()
 
 
 def test_convex_and_alone_nothing_is_hidden_from_some() -> None:

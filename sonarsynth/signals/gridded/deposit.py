@@ -125,7 +125,8 @@ def add_segment(
     )
     wave = kernel(-8 * (-width // 8), samples * bins.step / highest, 2 * samples, dtype)  # as wide as its lanes
     stage = Stage(aim, bins, origin, segment, grid, wave, dtype)
-    for tile in tiles(front, aim):
+    front = front.without_faint_shadows(0.1 * tolerance)
+    for tile in tiles(front, aim) if front.count else ():
         _add_tile(out, tile, front.select(tile.paths), stage)
 
 
