@@ -197,7 +197,8 @@ def towards(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:
 
 
 BENT = 4
-"""The first of the terms that turn the wavefront: a linear one is the motion of the array, which turns no wave."""
+"""The first of the terms that turn the wavefront: a linear one is the motion of the array, which turns no wave. Of its
+curvature the motion has u/c, which turns one by too little for a face."""
 
 
 def tilt(front: Wavefronts, gradient: Floats) -> Floats:

@@ -69,12 +69,14 @@ def layout(
     tolerance: float = SUPPORT_TOLERANCE,
 ) -> Layout:
     """Sort arrivals into stretches: direct and echoes apart (they differ by tens of dB), each waveform apart, and
-    coherent echoes, whose pulses are differentiated; tolerance: what pulses may be where they are cut, of their peak.
+    coherent echoes, whose pulses are differentiated; tolerance: what pulses may be, of their peak, at the ends of
+    a stretch.
     """
     if samples < 1:
         raise ValueError("a window needs at least one sample")
     fs = sonar.sampling_frequency
-    plain, support, silent = _supports(arrivals, front, snaps, sonar, min(tolerance, SUPPORT_TOLERANCE))
+    plain, support, silent = _supports(arrivals, front, snaps, sonar, SUPPORT_TOLERANCE)
+    longer = support if tolerance >= SUPPORT_TOLERANCE else _supports(arrivals, front, snaps, sonar, tolerance)[1]
     before, after = support
     early, late = _extent(front, elements, before, after, start, start + (samples - 1) / fs)
     cut = ~silent & ((early < start) | (late > start + (samples - 1) / fs))
@@ -86,7 +88,7 @@ def layout(
         for coherent, direct in ((False, True), (False, False), (True, True), (True, False)):
             rows = np.flatnonzero(same & (front.coherent == coherent) & (arrivals.direct == direct))
             for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
-                sooner, later = support[:, chosen].max(axis=1) + steered_spread(front, chosen)
+                sooner, later = longer[:, chosen].max(axis=1) + steered_spread(front, chosen)
                 delay = front.delay[chosen] - start
                 first = int(np.floor((delay.min() - sooner) * fs)) - GUARD
                 length = fast_length(int(np.ceil((delay.max() + later) * fs)) + GUARD + 1 - first)
