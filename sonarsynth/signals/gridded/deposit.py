@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.fft import irfft, next_fast_len, rfft
 
 from sonarsynth.conventions import Bools, Floats
-from sonarsynth.equations.noise.filters import kaiser_bessel, kaiser_bessel_beta, kaiser_bessel_transform
+from sonarsynth.equations.noise import filters
 from sonarsynth.receiver import Elements
 from sonarsynth.signals.array_paths import (
     NEPER,
@@ -49,13 +49,13 @@ class Kernel(NamedTuple):
 def kernel(width: int, oversampling: float, circle: int, dtype: str) -> Kernel:
     """The kernel for a grid of `circle` samples at `oversampling` times twice the highest frequency."""
     rows, lanes = (32 if dtype == "float32" else 512), 8 * ((width + 7) // 8)
-    beta = kaiser_bessel_beta(width, oversampling)
+    beta = filters.kaiser_bessel_beta(width, oversampling)
     x = 0.5 * chebyshev(4)
     fraction = (np.arange(rows)[:, None] + 0.5 + x) / rows  # (row, point)
     taps = np.zeros((rows, 4, lanes))
-    value = kaiser_bessel(fraction[:, :, None] + np.arange(width) - width / 2, width, beta)
+    value = filters.kaiser_bessel(fraction[:, :, None] + np.arange(width) - width / 2, width, beta)
     taps[:, :, :width] = np.linalg.inv(np.vander(x, increasing=True)) @ value
-    spectrum = kaiser_bessel_transform(np.arange(circle // 2 + 1) / circle, width, beta)
+    spectrum = filters.kaiser_bessel_transform(np.arange(circle // 2 + 1) / circle, width, beta)
     return Kernel(width, taps.astype(dtype).ravel(), lanes, circle, spectrum)
 
 
@@ -152,12 +152,12 @@ def _add_tile(out: npt.NDArray[Any], tile: Tile, paths: Wavefronts, stage: Stage
         gain = gain * ~paths.occluded[0]
     onto, column, weight = to_sensors(elements, tile.axes, dtype)
     rate, centre = samples * bins.step, paths.delay - stage.origin
-    begin = max(int((centre.min() - stage.segment.before) * rate) - GUARD, 0)
-    end = min(int((centre.max() + stage.segment.after) * rate) + GUARD + 1, samples)
+    spare = GUARD if stage.aim.tolerance > 10.0 * filters.SUPPORT_TOLERANCE else samples  # tails that absorption leaves
+    begin = max(int((centre.min() - stage.segment.before) * rate) - spare, 0)
+    end = min(int((centre.max() + stage.segment.after) * rate) + spare + 1, samples)
     wave = irfft(field, 2 * samples, axis=1, overwrite_x=True)[:, 2 * begin : 2 * end]
     wave = np.stack([wave[:, ::2], wave[:, 1::2]], axis=1).reshape(-1, weight.shape[1] * 2 * (end - begin))
-    if onto is not None:
-        wave = onto @ wave
+    wave = wave if onto is None else onto @ wave
     wave, kernel = wave.reshape(len(wave), weight.shape[1], 2, end - begin), stage.wave
     hear(wave, column, weight, 2.0 * rate * delay[0], gain, kernel.taps, kernel.lanes, stage.segment.first + begin, out)
 
