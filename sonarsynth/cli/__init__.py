@@ -151,12 +151,12 @@ def build(
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
     some = frames is not None or sequences is not None
-    wanted = chosen_frames(frames, sequences, made_from.spanned.first_frames.tolist()) if some else None
+    with reading.locating(source):
+        wanted = chosen_frames(frames, sequences, made_from.spanned.first_frames.tolist()) if some else None
     stores.try_writing(stores.folder_of(store))
     with reading.locating(source), printing.planning():
         plan = planning.plan(made_from, chosen)
-    prediction = None
-    predicting = not schedule.brief(plan, wanted) if predicting is None else predicting
+    prediction, predicting = None, not schedule.brief(plan, wanted) if predicting is None else predicting
     if predicting and scheduler is None and (restart or stores.missing(store, plan, wanted)):
         with printing.planning("timing frames"):
             prediction = schedule.predict(plan, prepared=time.process_time())

@@ -49,9 +49,7 @@ class Wavefronts:
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
     sound_speed: float  # m/s
     aperture: float  # m: no hydrophone is farther out
-    attenuation: (
-        float  # dB/m at the band centre: absorption of what the way to a hydrophone is longer than to the centre
-    )
+    attenuation: float  # dB/m at the band centre: of what the way to a hydrophone is longer than to the array centre
 
     @property
     def count(self) -> int:

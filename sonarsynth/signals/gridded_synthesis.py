@@ -132,7 +132,7 @@ class GriddedSynthesis(Method):
         """Pressure (sensor, sample) in the precision of the method, and the number of arrivals that the window cuts."""
         fs = sonar.sampling_frequency
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
-        plan = layout(arrivals, front, snaps, elements, sonar, start, samples, tolerance=0.1 * self.tolerance)
+        plan = layout(arrivals, front, snaps, elements, sonar, start, samples, tolerance=0.01 * self.tolerance)
         out = np.zeros((elements.count, samples), self.precision)
         method = (self.width, self.oversampling, self.precision, self.tolerance)
         for span in plan.stretches:

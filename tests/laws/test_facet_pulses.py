@@ -21,7 +21,7 @@ from tests.laws.test_synthesis import FACES, MODEL, SHARP, SNAPS, C, absorption,
 
 CENTRE = SHARP.band.centre
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
-PRECISE = GriddedSynthesis(precision="float64", width=14, tolerance=1e-11)
+PRECISE = GriddedSynthesis(precision="float64", width=14, tolerance=1e-10)
 METHODS = (DirectSum(), PRECISE)
 
 

@@ -154,9 +154,8 @@ def chorus_arrivals(
     of its reflections is lost (2 pi f sigma > 1 in the middle of the band) keeps its energy, with a random sign. Paths
     that are `FAINT` are left out.
     """
-    ring = (
-        np.clip(np.searchsorted(reach.edges, np.hypot(*(snaps.position - receiver.pose.position[:2]).T)), 1, None) - 1
-    )
+    distance = np.hypot(*(snaps.position - receiver.pose.position[:2]).T)
+    ring = np.clip(np.searchsorted(reach.edges, distance), 1, None) - 1
     stands_for = reach.stands_for[np.minimum(ring, len(reach.stands_for) - 1)]
     chosen = np.flatnonzero(snaps.thinning * stands_for < 1.0)
     snaps, louder = snaps.select(chosen), np.sqrt(stands_for[chosen])
