@@ -138,6 +138,7 @@ def kinds(cloud: Points) -> dict[str, np.ndarray]:
     rows = {
         "the snap itself": by_origin["snap itself"],
         "unexplained": by_origin["unexplained"],
+        "of reverberation": by_origin["reverberation"],
         "lit by another snap": cloud.strange,
     }
     rows |= {"mirror images": by_origin["mirror image"]}

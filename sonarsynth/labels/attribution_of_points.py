@@ -86,6 +86,7 @@ def pattern_of(elements: Elements, speed: float, curvature: Floats, focus: float
 class Attribution:
     """Whose energy beams hold at delays: groups of paths of one snap and target, and of one way to each."""
 
+    clock: float  # s: when the direct pulse that delays are counted from arrives
     paths: Arrivals  # that may be heard, ascending in delay
     first: Ints  # (point,) the first path that may be heard then
     target: Ints  # (group,) -1: the snap itself, or scatterers without a body
@@ -108,7 +109,8 @@ def attribution(
     """
     elements, width = listening.elements, band.high - band.low
     gate, reach = GATE / width, elements.aperture / listening.sound_speed
-    moment = _clock(arrivals, listening.clock, gate) + late
+    clock = _clock(arrivals, listening.clock, gate)
+    moment = clock + late
     longer = float(np.abs(arrivals.corner_delays).max(initial=0.0))
     slowness = listening.sound_speed / arrivals.sound_speed
     across = gate + reach * _apart(slowness * arrivals.direction, beam)
@@ -122,7 +124,7 @@ def attribution(
     if not len(audible):
         none = np.zeros((len(beam), 0))
         owner, share = np.full(len(beam), NO_TARGET), np.zeros((len(beam), 1))
-        return Attribution(paths, first, *groups, none, none, owner, share)
+        return Attribution(clock, paths, first, *groups, none, none, owner, share)
     across = gate + reach * _apart(slowness * paths.direction, beam)  # without those that come at other times
     fine = band.sliced(min(2.0 * width * across, MOST_BINS))
     focus = 0.0 if listening.focus is None else 1.0 / listening.focus
@@ -150,7 +152,7 @@ def attribution(
         reach,
         pattern_of(elements, listening.sound_speed, curvature, focus, band.high),
     )
-    return Attribution(paths, first, *groups, columns[0], 2.0 * columns[1], *columns[2:])
+    return Attribution(clock, paths, first, *groups, columns[0], 2.0 * columns[1], *columns[2:])
 
 
 def _code(paths: Arrivals, snaps: int) -> Ints:

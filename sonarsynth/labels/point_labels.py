@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -29,19 +30,27 @@ def label_points(
     band: Band,
     moment: WorldState,
     listening: SonarTiming,
+    scattered: Arrivals | None = None,
 ) -> PointLabels:
     """Labels of the points of a cloud.
 
     arrivals: paths of the frame; band: what each snap sends in the sonar's band; moment: the world at the frame's
-    instant. Bodies and the array are where sound meets them.
+    instant; scattered: paths by what scatters in surface, bottom and water. Bodies and the array are where sound meets
+    them.
     """
     beam = direction(cloud.azimuth, cloud.elevation)
     late, energy = cloud.delay.astype(float), cloud.energy.astype(float)
     attributed = attribution(arrivals, band, listening, beam, late, energy)
     explained = (attributed.owner >= 0) & (attributed.energy.sum(axis=1) >= EXPLAINED * energy)
+    own = np.where(explained, attributed.energy.max(axis=1, initial=0.0), EXPLAINED * energy)
+    lit = np.full(len(cloud), NO_TARGET)  # by which snap, of what scatters more than that
+    if scattered is not None and len(cloud):
+        brought = attribution(scattered, band, replace(listening, clock=attributed.clock), beam, late, energy)
+        lit = np.where(brought.energy.sum(axis=1) > own, np.append(brought.snap, NO_TARGET)[brought.owner], NO_TARGET)
+    explained &= lit == NO_TARGET
     labels: dict[str, np.ndarray] = {
         "target": np.full(len(cloud), NO_TARGET, np.int16),
-        "emission": np.full(len(cloud), NO_TARGET, np.int16),
+        "emission": lit.astype(np.int16),
         "family": np.full(len(cloud), NO_TARGET, np.int8),
         "lit_by": np.full(len(cloud), NO_TARGET, np.int8),
         "facet": np.full(len(cloud), NO_TARGET, np.int32),
@@ -49,6 +58,7 @@ def label_points(
         "distance": np.full(len(cloud), np.nan, np.float32),
         "origin": np.full(len(cloud), ORIGINS.index("unexplained"), np.int8),
     }
+    labels["origin"][lit != NO_TARGET] = ORIGINS.index("reverberation")
     rows = np.flatnonzero(explained)
     owner, loudest = attributed.owner[rows], attributed.first[rows] + attributed.share[rows].argmax(axis=1)
     for name in ("target", "emission", "family", "lit_by"):

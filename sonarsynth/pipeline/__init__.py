@@ -16,7 +16,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.labels import echo_levels, label, link_budget, path_powers
 from sonarsynth.pipeline.echo_image import image_of, image_without_clock
 from sonarsynth.pipeline.frame_chorus import clear_values, frame_chorus, soundscape_values, with_chorus
-from sonarsynth.pipeline.frame_reverberation import frame_reverberation, with_reverberation
+from sonarsynth.pipeline.frame_reverberation import frame_reverberation, scattered_paths, with_reverberation
 from sonarsynth.pipeline.labelled_estimates import emission_values, estimate_truth, heard_directly
 from sonarsynth.pipeline.labelling import band_of, expansion_error, frame_values, isolated_levels, point_labels
 from sonarsynth.pipeline.requested_rays import follow_rays
@@ -247,7 +247,8 @@ def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFr
     if "cloud" in plan.products:
         cloud = cloud_of(plan, frame, beamformed).loudest(plan.sizes["point"])
         mark_stage("range")
-        labels = point_labels(plan, frame, traced.arrivals, beamformed.estimates, cloud)
+        scattered = scattered_paths(plan, traced.arrivals, traced.reverberation)
+        labels = point_labels(plan, frame, traced.arrivals, beamformed.estimates, cloud, scattered)
         values |= cloud_values(cloud, labels, plan.sizes["point"], len(frame.moment.bodies))
     return values
 

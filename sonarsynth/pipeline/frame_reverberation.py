@@ -6,15 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonarsynth.conventions import NO_TARGET
 from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.pipeline.synthesis import true_elements
 from sonarsynth.planning import Plan, frame_start
 from sonarsynth.planning.measured.reverberation_levels import frame_scatterers
 from sonarsynth.planning.reverberation_rows import REVERBERATION
-from sonarsynth.products import Signals
+from sonarsynth.products import Arrivals, Kind, Signals
+from sonarsynth.products.array_expansion import ArrayExpansion
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import reverberation_pressure
 from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
+
+MOST_PATHS = 500
+"""Scatterers that labels of points take of a frame: of more, one in so many stands for all, as loud as they are."""
 
 
 def frame_reverberation(plan: Plan, frame: Frame) -> ReverberationArrivals | None:
@@ -41,3 +46,31 @@ def with_reverberation(plan: Plan, frame: Frame, signals: Signals, arrivals: Rev
     )
     mark_stage(REVERBERATION)
     return replace(signals, pressure=np.asarray(signals.pressure + pressure))
+
+
+def scattered_paths(plan: Plan, arrivals: Arrivals, scattered: ReverberationArrivals | None) -> Arrivals | None:
+    """Reverberation as labels of points take it: paths as the arrivals of a frame, spheres, at most `MOST_PATHS`."""
+    if scattered is None or not len(scattered.delay):
+        return None
+    every = -(-len(scattered.delay) // MOST_PATHS)
+    some = scattered.select(np.arange(0, len(scattered.delay), every))
+    count, length = len(some.delay), some.length + some.before
+    loss = length * float(plan.absorption(np.array([arrivals.centre]))[0])
+    nothing = {
+        n: np.zeros((count, *v.shape[1:]), v.dtype) for n, v in vars(arrivals).items() if isinstance(v, np.ndarray)
+    }
+    known = {
+        "delay": some.delay,
+        "direction": some.direction,
+        "radius": some.length,
+        "length": length,
+        "amplitude": np.sqrt(every) * some.gain * 10.0 ** (-loss / 20.0),
+        "absorption": loss,
+        "phase": some.phase,
+        "delay_std": some.delay_std,
+        "kind": np.full(count, Kind.REVERBERATION, np.int8),
+        "snap": some.emission,
+        "target": np.full(count, NO_TARGET),
+        "facet": np.full(count, NO_TARGET),
+    }
+    return replace(arrivals, **(nothing | known), expansion=ArrayExpansion.none(count))

@@ -45,9 +45,14 @@ def isolated_levels(plan: Plan, frame: Frame, budget: LinkBudget, snap_level: Fl
 
 
 def point_labels(
-    plan: Plan, frame: Frame, arrivals: Arrivals, estimates: SourceEstimates, cloud: PointCloud
+    plan: Plan,
+    frame: Frame,
+    arrivals: Arrivals,
+    estimates: SourceEstimates,
+    cloud: PointCloud,
+    scattered: Arrivals | None = None,
 ) -> PointLabels:
-    """Whose echo each point of a cloud is."""
+    """Whose echo each point of a cloud is; scattered: paths of what scatters in surface, bottom and water."""
     sonar = plan.scene.sonar
     moves = plan.scene.physics.doppler
     moment = frame.moment if moves else replace(frame.moment, bodies=tuple(body.frozen for body in frame.moment.bodies))
@@ -60,7 +65,7 @@ def point_labels(
         frame.sonar_velocity * moves,
     )
     band = band_of(plan, frame.moment.snaps)
-    return label_points(cloud, arrivals, band, moment, listening)
+    return label_points(cloud, arrivals, band, moment, listening, scattered)
 
 
 def frame_values(plan: Plan, frame: Frame) -> Values:

@@ -15,11 +15,13 @@ from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.reverberation.speckle import SINC
 from sonarsynth.frontiers.signal_knobs import speckle_points
 from sonarsynth.geometry.motion import Still
-from sonarsynth.pipeline import synthesise, trace_at
+from sonarsynth.pipeline import render, synthesise, trace_at
+from sonarsynth.pipeline.frame_reverberation import scattered_paths
 from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.planning import Plan, arrivals_of, frame_start, plan
 from sonarsynth.planning.measured.reverberation_levels import frame_scatterers, sent_energy
-from sonarsynth.receiver import Band, BandPass, PlanarLattice, Sonar
+from sonarsynth.products import ORIGINS
+from sonarsynth.receiver import Band, BandPass, BeamGrid, PlanarLattice, Sonar
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import EchoWindow, Processing, Scene, Trajectory, World
 from sonarsynth.recipe.tolerance import Accuracy
@@ -29,6 +31,7 @@ from sonarsynth.signals.pulse_sums.reverberation_synthesis import path_error
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.tracing.reverberation.cells import cells_about, scatterers, texture
 from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
+from tests.scenes import remus
 
 SPEED, DEPTH, HEIGHT, MU = 1500.0, 60.0, 8.0, -15.0
 BACK = Still(position=(0.0, 0.0, -52.0))
@@ -238,3 +241,31 @@ def test_many_scatterers_make_gaussian_noise_and_few_the_law() -> None:
         spectrum[(frequency < 0.2) | (frequency >= 0.2 + band)] = 0.0
         power = np.abs(np.fft.ifft(spectrum)) ** 2
         assert (power**2).mean() / power.mean() ** 2 == pytest.approx(2.0 + SINC / per_pulse, rel=0.02)
+
+
+@pytest.mark.parametrize(("most", "explained"), [(10**6, 0.98), (500, 0.9)])
+def test_points_that_scatterers_make_say_so_and_those_of_targets_stay(
+    most: int, explained: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where nothing else is heard every point is of reverberation, if all scatterers are asked, and 9 in 10 if some
+    are; a target in the midst of it keeps what is its own."""
+    monkeypatch.setitem(scattered_paths.__globals__, "MOST_PATHS", most)
+    array = PlanarLattice(columns=12, rows=10, pitch=0.05)
+    base = remus(2, array=array, beams=BeamGrid(elevation_span=np.deg2rad(60), azimuth_span=np.deg2rad(60)))
+    base = replace(base, accuracy=replace(base.accuracy, speckle=0.2))
+    world = replace(base.scene.world, reverberation=Reverberation())
+    processing = replace(base.scene.processing, echo_window=EchoWindow(start=7e-3, stop=12.7e-3))
+    labels = []
+    for some in (replace(world, targets=()), world):
+        made = plan(replace(base, scene=replace(base.scene, world=some, processing=processing)))
+        labels.append(render(made, 1)["cloud"].dataset.dropna("point", subset=["range"]))
+    alone, beside = labels
+    origin = ORIGINS.index("reverberation")
+    assert alone.sizes["point"] > 20
+    assert (alone.origin == origin).mean() > explained
+    assert (alone.emission == 0).mean() > explained
+    assert (alone.target == -1).all()
+    echo = beside.isel(point=np.flatnonzero(beside.target == 0))
+    assert echo.sizes["point"] > 0
+    assert (echo.distance < 0.3).all()
+    assert (beside.origin == origin).sum() > 50
