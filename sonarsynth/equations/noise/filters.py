@@ -88,9 +88,16 @@ def response(frequency: npt.ArrayLike, fir: Fir) -> Floats:
     return (_transform(f.ravel(), fir) / _scale(fir)).reshape(f.shape)
 
 
-@lru_cache(maxsize=64)
 def pulse_support(bubble: Bubble, fir: Fir, tolerance: float = SUPPORT_TOLERANCE) -> tuple[float, float]:
     """How long (s) before and after the collapse the filtered snap exceeds `tolerance` of its peak."""
+    t, step, wave = _filtered_snap(bubble, fir)
+    loud = np.flatnonzero(wave > tolerance * wave.max())
+    return float(max(step - t[loud[0]], 0.0)), float(max(t[loud[-1]] + step, 0.0))
+
+
+@lru_cache(maxsize=64)
+def _filtered_snap(bubble: Bubble, fir: Fir) -> tuple[Floats, float, Floats]:
+    """Times (time,) s about the collapse, their step, and the modulus of the filtered snap then, in any unit."""
     half = 0.5 * duration(fir)
     step = 1.0 / (8.0 * (fir.high + 0.5 * fir.transition))
     t = np.arange(snap_pressure.onset(bubble) - half, half + step, step)
@@ -98,9 +105,7 @@ def pulse_support(bubble: Bubble, fir: Fir, tolerance: float = SUPPORT_TOLERANCE
     p = w * snap_pressure.pressure(-x, bubble)
     lag = np.linspace(-half, half, int(np.ceil(2.0 * half / step)) * 64 + 1)  # a table of h, linear: 1e-5 of it
     h = impulse_response(lag, fir)
-    wave = np.abs([np.interp(now + x, lag, h, left=0.0, right=0.0) @ p for now in t])
-    loud = np.flatnonzero(wave > tolerance * wave.max())
-    return float(max(step - t[loud[0]], 0.0)), float(max(t[loud[-1]] + step, 0.0))
+    return t, step, np.abs([np.interp(now + x, lag, h, left=0.0, right=0.0) @ p for now in t])
 
 
 def kaiser_bessel(x: npt.ArrayLike, width: float, beta: float) -> Floats:
