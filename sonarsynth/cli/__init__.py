@@ -56,7 +56,7 @@ Settings = Annotated[
 ]
 Products = Annotated[
     str,
-    typer.Option(metavar="LIST", help="Stored besides the truth: signals, image, cloud, beams; 'truth': nothing else."),
+    typer.Option(metavar="LIST", help="Stored besides truth: signals, image, cloud, beams, paths; 'truth': no more."),
 ]
 Scale = Literal["common", "frame"]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]

@@ -4,19 +4,21 @@
     beamform_frame    TracedFrame -> BeamformedFrame: Signals, SourceEstimates, EnergyImage
     range_frame       TracedFrame, BeamformedFrame -> Values: everything that is stored, the PointCloud with it
 
-The three are the tasks that the scheduler runs; what nobody asked for is not computed: of truth alone, `truth_frame`.
+The three are the tasks that the scheduler runs; what nobody asked for is not computed: without sound, `silent_frame`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sonarsynth.conventions import Floats
 from sonarsynth.labels import echo_levels, label, link_budget, path_powers
+from sonarsynth.labels.estimate_labels import Direct
 from sonarsynth.pipeline.echo_image import image_of, image_without_clock
 from sonarsynth.pipeline.frame_chorus import clear_values, frame_chorus, soundscape_values, with_chorus
 from sonarsynth.pipeline.frame_reverberation import frame_reverberation, scattered_paths, with_reverberation
+from sonarsynth.pipeline.handed_on import BeamformedFrame, TracedFrame
 from sonarsynth.pipeline.labelled_estimates import emission_values, estimate_truth, heard_directly
 from sonarsynth.pipeline.labelling import band_of, expansion_error, frame_values, isolated_levels, point_labels
 from sonarsynth.pipeline.requested_rays import follow_rays
@@ -30,6 +32,7 @@ from sonarsynth.pipeline.stored_values import (
     image_values,
     in_slots,
     link_budget_values,
+    path_values,
     signal_values,
     source_estimate_values,
     truth_values,
@@ -39,27 +42,14 @@ from sonarsynth.pipeline.synthesis import Hearing, digitise, frame_signals, keep
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, frame_tree, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
-from sonarsynth.products import (
-    Arrivals,
-    BeamSpectra,
-    Echoes,
-    EnergyImage,
-    LinkBudget,
-    PointCloud,
-    Signals,
-    SourceEstimates,
-    Truth,
-    no_points,
-)
+from sonarsynth.products import PointCloud, Signals, no_points
 from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.location.association import in_record, light_first
 from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.signals.chorus.chorus_arrivals import ChorusArrivals
 from sonarsynth.signals.filtered_pulse import snap_levels
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,49 +70,26 @@ __all__ = [
     "locate_and_image",
     "range_frame",
     "render",
+    "silent_at",
+    "silent_frame",
     "stage_timer",
     "trace_at",
     "trace_frame",
-    "truth_at",
-    "truth_frame",
     "variables",
 ]
 
 
-@dataclass(frozen=True, eq=False)
-class TracedFrame:
-    """What the trace task gives."""
-
-    frame: Frame
-    arrivals: Arrivals
-    truth: Truth
-    budget: LinkBudget
-    echoes: Echoes
-    chorus: ChorusArrivals | None = None  # None: the scene has none
-    reverberation: ReverberationArrivals | None = None
+def silent_frame(plan: Plan, index: int) -> Values:
+    """Every stored value of a frame of which no sound is wanted: truth alone, or paths too."""
+    return silent_at(*_checked(plan, index))
 
 
-@dataclass(frozen=True, eq=False)
-class BeamformedFrame:
-    """What the beamform task gives; None where no product needs it."""
-
-    signals: Signals  # as processing has them
-    estimates: SourceEstimates | None
-    image: EnergyImage | None
-    imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
-    beams: BeamSpectra | None = None  # of the echo window of these
-    isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the link budget, in signals
-    recorded: Signals | None = None  # as the converter gave them, where the sonar corrected them since
-    snr: Values = field(default_factory=dict)
-
-
-def truth_frame(plan: Plan, index: int) -> Values:
-    """Every stored value of a frame of which truth alone is wanted: no path is traced, no sound made."""
-    return truth_at(*_checked(plan, index))
-
-
-def truth_at(plan: Plan, frame: Frame) -> Values:
+def silent_at(plan: Plan, frame: Frame) -> Values:
     """The same of a frame that is at hand; `plan` is that of its sequence."""
+    if plan.products:
+        traced = trace_at(plan, frame)
+        direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
+        return in_slots(plan, _traced_values(plan, traced, direct) | which_values(plan), VARIABLES)
     truth = label(context_of(plan, frame), plan.propagation, snap_levels(frame.moment.snaps))
     mark_stage("label")
     sound = soundscape_values(plan, frame, frame_chorus(plan, frame))
@@ -222,14 +189,22 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, beamformed: Beamfor
     return values
 
 
+def _traced_values(plan: Plan, traced: TracedFrame, direct: Direct, isolated: Floats | None = None) -> Values:
+    """What paths and truth tell; isolated: levels of single paths in signals of their own."""
+    frame = traced.frame
+    values = frame_values(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
+    values |= link_budget_values(traced.budget, isolated) | soundscape_values(plan, frame, traced.chorus)
+    values |= clear_values(plan, traced.chorus, traced.echoes, direct, frame.moment.snaps)
+    if "paths" in plan.products:
+        values |= path_values(traced.arrivals, plan.sizes["path"], plan.sizes["sensor"])
+    return values | estimate_truth(plan, frame, direct)
+
+
 def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFrame) -> Values:
     """The same of the bodies that are there; `plan` is that of the frame's sequence."""
     frame = traced.frame
-    values = frame_values(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
-    values |= link_budget_values(traced.budget, beamformed.isolated) | soundscape_values(plan, frame, traced.chorus)
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
-    values |= clear_values(plan, traced.chorus, traced.echoes, direct, frame.moment.snaps)
-    values |= estimate_truth(plan, frame, direct) | beamformed.snr
+    values = _traced_values(plan, traced, direct, beamformed.isolated) | beamformed.snr
     if "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(beamformed.recorded or beamformed.signals, counts)
@@ -270,8 +245,8 @@ def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointClou
 
 def _values(plan: Plan, index: int) -> Values:
     """Every stored value of a frame."""
-    if not plan.products:
-        return truth_frame(plan, index)
+    if not plan.makes_sound:
+        return silent_frame(plan, index)
     traced = trace_frame(plan, index)
     return range_frame(plan, index, traced, beamform_frame(plan, index, traced))
 

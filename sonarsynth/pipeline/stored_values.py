@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET, Floats
+from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation
 from sonarsynth.equations.kernels.rounding import multiples
 from sonarsynth.imaging.beam_envelopes import envelope_levels
 from sonarsynth.pipeline.variables.variable import Variable
@@ -137,13 +137,36 @@ def cloud_values(cloud: PointCloud, labels: PointLabels, size: int, targets: int
     return values | table("/truth/targets", points=of_targets)
 
 
+def path_values(arrivals: Arrivals, size: int, sensors: int) -> Values:
+    """Paths as they reach the middle of the array, padded to `size` of them: the loudest, in the order of arrivals."""
+    order = np.argsort(-np.abs(arrivals.amplitude), kind="stable")
+    kept = arrivals.select(np.sort(order[:size]))
+    azimuth, elevation = azimuth_elevation(kept.direction)
+    hidden = kept.hidden(sensors)
+    numbers = {
+        "azimuth": np.rad2deg(azimuth),
+        "elevation": np.rad2deg(elevation),
+        "hidden": hidden.mean(axis=1) if hidden.shape[1] else np.zeros(len(kept.delay)),
+        **{name: getattr(kept, name) for name in ("radius", "length", "amplitude", "phase", "delay_std", "doppler")},
+        "absorption": kept.absorption,
+    }
+    columns: dict[str, np.ndarray] = {name: value.astype(np.float32) for name, value in numbers.items()}
+    whose = {"target": np.int16, "emission": np.int16, "facet": np.int32, "kind": np.int8}
+    how = dict.fromkeys(("family", "lit_by", "surface", "bottom"), np.int8)
+    own_names = {"emission": "snap", "family": "arrives_by"}
+    columns |= {n: getattr(kept, own_names.get(n, n)).astype(dtype) for n, dtype in {**whose, **how}.items()}
+    padded = {name: _padded(values, size) for name, values in columns.items()}
+    count, overflow = len(kept.delay), len(arrivals.delay) - len(kept.delay)
+    return table("/paths", count=count, overflow=overflow, delay=_padded(kept.delay, size), **padded)
+
+
 def _padded(values: np.ndarray, size: int) -> np.ndarray:
     rows = np.full(size, NO_TARGET if values.dtype.kind == "i" else np.nan, values.dtype)
     rows[: len(values)] = values
     return rows
 
 
-INDICES = (("/truth/beams", "target"), ("/cloud", "target"))
+INDICES = (("/truth/beams", "target"), ("/cloud", "target"), ("/paths", "target"))
 """Variables that are numbers of targets."""
 
 

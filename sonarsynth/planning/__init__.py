@@ -11,6 +11,7 @@ from sonarsynth.planning.choices import ALL_PRODUCTS, OF_BEAMS, PRODUCTS, Choice
 from sonarsynth.planning.choosing import choose
 from sonarsynth.planning.costs import machine_factor, stages
 from sonarsynth.planning.listening_windows import check_windows, frame_start, listening_windows
+from sonarsynth.planning.measured.path_counts import room_for_paths
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, context_of, receiver_of, survey_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene, check_alike, sample_frames
@@ -71,7 +72,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
     Parameters
     ----------
     recipe: what is resolved.
-    products: what is stored besides the truth, of signals, image and cloud.
+    products: what is stored besides the truth, of `ALL_PRODUCTS`.
     choices: those that another plan of the same recipe made (default: the cheapest that keep within its accuracy).
 
     Returns
@@ -106,6 +107,8 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
     sizes = _sizes(recipe, windows)
     resolved = Plan(recipe, products, fewer, paths, windows, sizes=sizes, thinning=thinning)
     resolved = choose(resolved, looks) if choices is None else replace(resolved, choices=choices)
+    if "paths" in products:
+        resolved = replace(resolved, sizes=sizes | {"path": room_for_paths(resolved, looks)})
     resolved = replace(resolved, stages=_mean_stages(resolved, looks))
     resolved = replace(resolved, shard_frames=_shard_frames(resolved), validity=stored_validity(recipe, looks))
     return replace(resolved, left_out=left_out(resolved), warnings=notes(resolved, looks))

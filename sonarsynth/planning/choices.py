@@ -17,7 +17,7 @@ from sonarsynth.state import OcclusionPoint
 PRODUCTS = ("signals", "image", "cloud")
 """What a build makes where nothing else is asked for. Truth is always written; with any product, levels of what is
 traced too."""
-ALL_PRODUCTS = (*PRODUCTS, "beams")
+ALL_PRODUCTS = (*PRODUCTS, "beams", "paths")
 """What a build can be asked for."""
 OF_BEAMS = frozenset({"image", "cloud", "beams"})
 """Products that the signals are steered for."""

@@ -124,7 +124,11 @@ def _synthesis(plan: Plan, size: FrameSize) -> Row:
     stored = size.sensors * size.samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
     error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis else "rounding"
     error = NOT_STATED if np.isnan(plan.errors.synthesis) else error
-    why = "requested" if "signals" in plan.products else f"needed by the {' and the '.join(sorted(plan.products))}"
+    why = (
+        "requested"
+        if "signals" in plan.products
+        else f"needed by the {' and the '.join(sorted(plan.products - {'paths'}))}"
+    )
     method = plan.choices.synthesis.row() + "".join(
         f", {noise.row()} noise" for noise in plan.scene.world.environment.noises
     )
@@ -181,6 +185,9 @@ def _expanded(plan: Plan) -> str:
     return f"{plan.errors.expansion:.1g} of the signals, measured at some hydrophones"
 
 
+PATH_BYTES = 55
+"""Of a stored path."""
+
 Row = tuple[str, str, str, str, float, int]
 """A stage as `Stage` has it, in seconds of the reference machine."""
 
@@ -193,15 +200,16 @@ def _trace_rows(plan: Plan, size: FrameSize) -> list[Row]:
         bent = plan.propagation.bends
         why = "the sound speed varies with depth" if bent else "refraction is below the required accuracy"
         seconds = _tracing(plan, size) * max(size.emissions, 1) * _ways(plan) * traced
-        rows.append(("trace", _traced(plan), why, _expanded(plan), seconds, 0))
+        stored = PATH_BYTES * plan.sizes["path"] if "paths" in plan.products else 0
+        rows.append(("trace", _traced(plan), why, _expanded(plan), seconds, stored))
     seconds = size.beams * SECONDS["label beam"] + size.facets * SECONDS["label facet"] + plan.propagation.cost(size)
     return [*rows, ("label", "one ray per beam", "always", "none", seconds, size.beams * 10 + 4096)]
 
 
 def _signal_rows(plan: Plan, size: FrameSize) -> list[Row]:
     """Signals, where any product needs them, and paths measured in signals of their own."""
-    rows = [_synthesis(plan, size), *reverberation_rows(plan), *noise_rows(plan, size)] if plan.products else []
-    if plan.products and (parts := plan.scene.sound_parts):
+    rows = [_synthesis(plan, size), *reverberation_rows(plan), *noise_rows(plan, size)] if plan.makes_sound else []
+    if plan.makes_sound and (parts := plan.scene.sound_parts):
         rows.append(_signal_to_noise(plan, size, len(parts)))
     if "signals" in plan.products:
         seconds = max(size.emissions, 1) * (plan.sizes["target"] + 1) * SECONDS["measure path"]

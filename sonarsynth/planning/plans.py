@@ -100,6 +100,11 @@ class Plan:
         return self if sequence == self.sequence else _of_sequence(self, sequence)
 
     @property
+    def makes_sound(self) -> bool:
+        """Whether a product is made of sound: truth and paths are there without."""
+        return bool(self.products - {"paths"})
+
+    @property
     def looked_at(self) -> int:
         """Frames that were looked at."""
         return int(np.isfinite(self.windows.start).sum())

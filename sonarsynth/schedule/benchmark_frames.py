@@ -20,7 +20,7 @@ import numpy as np
 from sonarsynth import store
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.labels.odds import NO_ODDS, Odds, odds
-from sonarsynth.pipeline import Values, beamform_frame, range_frame, stage_timer, trace_at, truth_at
+from sonarsynth.pipeline import Values, beamform_frame, range_frame, silent_at, stage_timer, trace_at
 from sonarsynth.pipeline.labelled_estimates import beam_width
 from sonarsynth.pipeline.synthesis import subarray_signals
 from sonarsynth.planning import Plan, check_unsampled_frame
@@ -206,7 +206,9 @@ def _make(plan: Plan, index: int, every: int = 1) -> _TimedFrame:
             frame = _thinned(frame, every)
         count = plan.choices.subarrays
         undivided = replace(plan, choices=replace(plan.choices, subarrays=1)) if count > PARTS else plan
-        values = layout_of(undivided).check(_stages(undivided, frame) if plan.products else truth_at(undivided, frame))
+        values = layout_of(undivided).check(
+            _stages(undivided, frame) if plan.makes_sound else silent_at(undivided, frame)
+        )
     if undivided is not plan and plan.products:
         every_part = subarrays(plan.elements, count)
         timed = every_part[:: -(-len(every_part) // PARTS)]

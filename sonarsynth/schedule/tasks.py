@@ -30,8 +30,8 @@ WARM_UP: Final = 300.0
 
 
 def tasks_of(products: Sequence[str]) -> tuple[str, ...]:
-    """Those of frames with such products: truth alone is traced, and the last is for what takes single beams."""
-    return STAGES[: 1 if not products else 3 if {"cloud", "beams"} & set(products) else 2]
+    """Those of frames with such products: truth and paths are traced, and the last is for what takes single beams."""
+    return STAGES[: 1 if set(products) <= {"paths"} else 3 if {"cloud", "beams"} & set(products) else 2]
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,9 @@ def trace(job: Job, frames: Sequence[int]) -> list[StageResult]:
 
     def work(before: StageResult) -> Any:
         plan = plan_of(job)
-        if job.products:
+        if plan.makes_sound:
             return pipeline.trace_frame(plan, before.frame)
-        return layout_of(plan).check(pipeline.truth_frame(plan, before.frame))
+        return layout_of(plan).check(pipeline.silent_frame(plan, before.frame))
 
     return [_stage(job, "trace", StageResult(frame), work) for frame in frames]
 

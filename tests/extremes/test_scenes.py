@@ -16,7 +16,7 @@ from sonarsynth.environment.sea import Environment, Isovelocity, Tabulated
 from sonarsynth.geometry.motion import Circle, Still
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.pipeline import render
-from sonarsynth.planning import Plan, plan
+from sonarsynth.planning import PRODUCTS, Plan, plan
 from sonarsynth.propagation import Straight
 from sonarsynth.receiver import BeamGrid, Converter, LowPass, PlanarLattice, PositionTable, Sonar
 from sonarsynth.recipe import Recipe
@@ -132,8 +132,11 @@ UNHEARD: dict[str, Recipe] = {
 
 def frame_of(recipe: Recipe) -> tuple[Plan, xr.DataTree]:
     """The first frame, none of whose numbers is infinite; those of `/` and `/signals` are not NaN either."""
-    made = plan(recipe)
+    made = plan(recipe, (*PRODUCTS, "paths"))
     tree = render(made, 0)
+    paths = tree["paths"].dataset
+    there = np.arange(paths.sizes["path"]) < int(paths["count"])
+    assert all((np.isfinite(paths[name]) == there).all() for name in ("delay", "azimuth", "amplitude", "radius"))
     for node in tree.subtree:
         for name, variable in node.to_dataset(inherit=False).variables.items():
             if variable.dtype.kind == "f":

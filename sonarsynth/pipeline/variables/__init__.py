@@ -41,7 +41,7 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
         wanted.add("sensors")
     if plan.scene.world.chorus is not None:
         wanted |= {"chorus"} | ({"chorus and levels"} if plan.products else set())
-    if plan.products and (parts := plan.scene.sound_parts):
+    if plan.makes_sound and (parts := plan.scene.sound_parts):
         wanted |= {"snr", *(f"snr {name}" for name in parts)}
     chosen = [v for v in VARIABLES if v.product in wanted]
     if not plan.windows.direct_removed:

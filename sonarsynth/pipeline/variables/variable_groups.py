@@ -3,8 +3,19 @@
 from __future__ import annotations
 
 from sonarsynth.pipeline.variables.truth_variables import LEVELS, SENSORS, SOUNDSCAPE, TRUTH
-from sonarsynth.pipeline.variables.variable import BEAMS, ESTIMATE, NONE, POINT, Variable, comment, flags, group_of, row
-from sonarsynth.products import FAMILIES, ORIGINS, REASONS, SPLITS
+from sonarsynth.pipeline.variables.variable import (
+    BEAMS,
+    ESTIMATE,
+    NONE,
+    PATH,
+    POINT,
+    Variable,
+    comment,
+    flags,
+    group_of,
+    row,
+)
+from sonarsynth.products import FAMILIES, ORIGINS, REASONS, SPLITS, Kind
 
 _ROOT = group_of(
     "/",
@@ -59,6 +70,38 @@ _BEAMS = group_of(
         attributes=(("scale_factor", LEVEL_STEP), *comment("missing: silence, or a beam that the image lacks")),
     ),
     row("start", ("frame",), "float64", "s", "time of delay 0 after the instant of the frame"),
+)
+KINDS = tuple(kind.name.lower() for kind in Kind)
+_PATHS = group_of(
+    "/paths",
+    "paths",
+    row("count", ("frame",), "int32", "1", "paths of the frame: the first ones along path, the rest is NaN and -1"),
+    row("overflow", ("frame",), "int32", "1", "paths left out because there was no room: the faintest"),
+    row("delay", PATH, "float64", "s", "arrival at the array centre, after the instant of the frame"),
+    row("azimuth", PATH, "float32", "degree", "azimuth that the path seems to come from, port positive"),
+    row("elevation", PATH, "float32", "degree", "elevation that the path seems to come from, up positive"),
+    row("radius", PATH, "float32", "m", "radius of curvature of the wavefront at the array"),
+    row("length", PATH, "float32", "m", "length of the whole path"),
+    row(
+        "amplitude",
+        PATH,
+        "float32",
+        "m-1",
+        "pressure over that of the source at 1 m, at the centre of the band; signed",
+    ),
+    row("phase", PATH, "float32", "radian", "phase of caustics and lossy reflections, at all frequencies"),
+    row("absorption", PATH, "float32", "dB", "absorption at the centre of the band, which is in the amplitude"),
+    row("delay_std", PATH, "float32", "s", "blur of roughness, a Gaussian in time"),
+    row("doppler", PATH, "float32", "1", "how much longer the pulse lasts"),
+    row("hidden", PATH, "float32", "1", "share of the hydrophones that a body hides the path from"),
+    row("target", PATH, "int16", "1", "target that the path met", attributes=NONE),
+    row("emission", PATH, "int16", "1", "snap", attributes=NONE),
+    row("facet", PATH, "int32", "1", "facet that the path met, in the mesh of its target", attributes=NONE),
+    row("kind", PATH, "int8", "1", "what the path met on its way", attributes=flags(KINDS)),
+    row("family", PATH, "int8", "1", "boundaries touched on the way to the array", attributes=flags(FAMILIES)),
+    row("lit_by", PATH, "int8", "1", "boundaries touched on the way to the target", attributes=flags(FAMILIES)),
+    row("surface", PATH, "int8", "1", "reflections at the surface"),
+    row("bottom", PATH, "int8", "1", "reflections at the bottom"),
 )
 WHOSE = comment(
     "of the paths that bring most energy in the beam of the point at its delay. A range is wrong where the emission is "
@@ -156,7 +199,7 @@ _ESTIMATES = group_of(
     ),
 )
 VARIABLES: tuple[Variable, ...] = (
-    *(*_ROOT, *_SIGNALS, *_IMAGE, *_BEAMS, *_CLOUD, *_ESTIMATES),
+    *(*_ROOT, *_SIGNALS, *_IMAGE, *_BEAMS, *_PATHS, *_CLOUD, *_ESTIMATES),
     *(*TRUTH, *SENSORS, *SOUNDSCAPE, *LEVELS),
 )
 """Every variable that a frame may have."""

@@ -52,7 +52,7 @@ def recipe(
     return Recipe(scene=Scene(world=world, sonar=sonar, processing=processing))
 
 
-def frame(of: Recipe, products: tuple[str, ...] = ("signals", "image", "cloud")) -> xr.DataTree:
+def frame(of: Recipe, products: tuple[str, ...] = ("signals", "image", "cloud", "paths")) -> xr.DataTree:
     """The first frame."""
     return render(plan(of, products), 0)
 
@@ -74,6 +74,7 @@ REASONS: dict[str, tuple[str, Callable[[Any], Any]]] = {
 ELSEWHERE = (
     "/image",
     "/cloud",
+    "/paths",
     "/source_estimates",
     "/truth/targets/echo_",
     "/truth/emissions/a",
@@ -106,6 +107,10 @@ def reasoned(tree: xr.DataTree) -> CaseResult:
         unheard = bool(np.isnan(tree["image"].energy.values).any())
         wrong += ["/cloud"] if not all((p == points[0]).all() for p in points) else []
         wrong += ["/image/energy"] if unheard == clock and not (unheard and leftover) else []
+    if "paths" in tree.children:
+        there = np.arange(tree["paths"].sizes["path"]) < int(tree["paths"]["count"])
+        numbers = [v.values for v in tree["paths"].data_vars.values() if v.dims and v.dtype.kind == "f"]
+        wrong += ["/paths"] if not all((np.isfinite(column) == there).all() for column in numbers) else []
     return holds(not wrong, "every NaN has its reason" if not wrong else f"NaN without one in {', '.join(wrong)}")
 
 

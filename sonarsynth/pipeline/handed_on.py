@@ -1,0 +1,39 @@
+"""What the tasks of a frame hand on to the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from sonarsynth.conventions import Floats
+from sonarsynth.pipeline.stored_values import Values
+from sonarsynth.products import Arrivals, BeamSpectra, Echoes, EnergyImage, LinkBudget, Signals, SourceEstimates, Truth
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals.chorus.chorus_arrivals import ChorusArrivals
+from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
+
+
+@dataclass(frozen=True, eq=False)
+class TracedFrame:
+    """What the trace task gives."""
+
+    frame: Frame
+    arrivals: Arrivals
+    truth: Truth
+    budget: LinkBudget
+    echoes: Echoes
+    chorus: ChorusArrivals | None = None  # None: the scene has none
+    reverberation: ReverberationArrivals | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class BeamformedFrame:
+    """What the beamform task gives; None where no product needs it."""
+
+    signals: Signals  # as processing has them
+    estimates: SourceEstimates | None
+    image: EnergyImage | None
+    imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
+    beams: BeamSpectra | None = None  # of the echo window of these
+    isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the link budget, in signals
+    recorded: Signals | None = None  # as the converter gave them, where the sonar corrected them since
+    snr: Values = field(default_factory=dict)
