@@ -21,7 +21,29 @@ FRAMES = range(30, 35)
 TARGET, SONAR = "scene.world.targets.0.shape", "scene.sonar"
 TRACING = "scene.physics.tracing={{kind: auto, bounces: {0}}}"
 LATTICE = "{{kind: planar_lattice, columns: {0}, rows: {0}, pitch: 5 cm}}"
+SHRIMP = "{{kind: snapping_shrimp, name: s{0}, position: [{1}, {2}]}}"
+BODY = (
+    "{{name: b{0}, shape: {{kind: remus100, edge: 18 mm}}, "
+    "motion: {{kind: line, start: [20, 4.5, {1}], stop: [20, -4.5, {1}], duration: 6.3 s}}}}"
+)
+
+
+def shrimp(count: int) -> str:
+    """So many on the bottom about the one of the recipe, all of which snap in each frame."""
+    places = [(n, 14.0 - 1.5 * (n % 4), -5.0 + 2.0 * (n // 4)) for n in range(count)]
+    return f"scene.world.sources=[{', '.join(SHRIMP.format(*place) for place in places)}]"
+
+
+def bodies(count: int) -> str:
+    """So many above each other, none of which hides another from the array."""
+    depths = np.linspace(-4.5, -1.5, count) if count > 1 else [-4.5]
+    return f"scene.world.targets=[{', '.join(BODY.format(n, z) for n, z in enumerate(depths))}]"
+
+
 GROWTHS = {
+    "frames": [(f"scene.trajectory.frames={n}", f"scene.trajectory.interval={6.3 / n} s") for n in (64, 640, 6400)],
+    "snaps": [(shrimp(n),) for n in (1, 4, 8)],
+    "targets": [(bodies(n),) for n in (1, 2, 4, 8)],
     "facets": [(f"{TARGET}.edge={edge} mm",) for edge in (28, 18, 9)],
     "beams": [(f"{SONAR}.beams.azimuths={n}", f"{SONAR}.beams.elevations={n}") for n in (51, 101, 201)],
     "families of paths a way": [(TRACING.format(bounces),) for bounces in (0, 1, 2)],
@@ -46,6 +68,9 @@ def measured(sets: tuple[str, ...]) -> dict[str, Any]:
         "facets": sum(len(mesh.faces) for mesh in plan.scene.meshes),
         "beams": beams.azimuths * beams.elevations,
         "hydrophones": plan.elements.count,
+        "frames": recipe.frames,
+        "snaps": plan.sizes["emission"],
+        "targets": plan.sizes["target"],
         "families of paths a way": 1 + 2 * getattr(plan.scene.physics.tracing, "bounces", 0),
     }
     return {"sizes": sizes, "plan_seconds": planned, "stages_ms": stages, "frame_ms": sum(stages.values())}
