@@ -104,6 +104,12 @@ class CastingMesh:
 
         return facet_tree.tree(self.vertices, self.faces)
 
+    @cached_property
+    def horizon(self) -> Floats:
+        """Sine (facet,) of the elevation over which the mesh is not seen from each facet, NaN as long as nobody asked;
+        see `horizons`."""
+        return np.full(len(self.faces), np.nan)
+
     def cast(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
         """Facet (ray,) and distance of the nearest hit for rays in this mesh's frame and unit; -1 and NaN for none."""
         facet, distance = np.full(len(origin), NO_TARGET), np.full(len(origin), np.nan)
@@ -126,19 +132,9 @@ class CastingMesh:
             rays, start, heading, limit = rays[candidate], start[candidate], heading[candidate], limit[candidate]
             beyond = passed[candidate] + at[candidate]
             hit, along = np.empty(len(candidate), np.int64), np.empty(len(candidate))
-            intersections.confirm(
-                start,
-                heading,
-                np.zeros(len(candidate)),
-                np.fmin(limit, beyond + SLACK),
-                proposed[candidate],
-                self.vertices,
-                self.faces,
-                *self.around,
-                1.0,
-                hit,
-                along,
-            )
+            near, far = np.zeros(len(candidate)), np.fmin(limit, beyond + SLACK)
+            mesh = self.vertices, self.faces, *self.around
+            intersections.confirm(start, heading, near, far, proposed[candidate], *mesh, 1.0, hit, along)
             facet[rays], distance[rays] = hit, along
             again = np.flatnonzero(hit < 0)
             if not len(again):
@@ -238,8 +234,27 @@ def first_hit(
     return facet, distance * ready.size
 
 
-def occluded(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, backend: Backend = "embree") -> Bools:
-    """Whether any body stands in each straight segment from start (segment, xyz) to end (segment, xyz) in the world.
+def leave_own(bodies: tuple[PlacedTarget, ...], owner: Ints, facet: Ints, direction: Floats) -> Ints:
+    """Body (ray,) that rays from the middles of facets (owner and facet of each) in directions (ray, xyz), world, of
+    length one, come from and surely do not meet again; -1 where that is not certain."""
+    from sonarsynth.casting import horizons
+
+    own = np.full(len(owner), NO_TARGET)
+    for number, body in enumerate(bodies):
+        rows = slice(None) if len(bodies) == 1 and (owner == 0).all() else np.flatnonzero(owner == number)
+        mesh, towards = casting_mesh(body.mesh), body.pose.turn_to_body(direction[rows])
+        far = horizons.leave(
+            facet[rows], towards, body.mesh.normal, *mesh.tree, mesh.vertices, mesh.faces, mesh.horizon
+        )
+        own[rows] = np.where(far, number, NO_TARGET)
+    return own
+
+
+def occluded(
+    bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, own: Ints | None = None, backend: Backend = "embree"
+) -> Bools:
+    """Whether any body stands in each straight segment from start (segment, xyz) to end (segment, xyz) in the world;
+    own (segment,): the body that surely does not (`leave_own`), -1 for none.
 
     A segment that starts on a facet must be moved off it (`OFFSET`). Raises ValueError for ends that are not finite.
     """
@@ -251,12 +266,13 @@ def occluded(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, backe
     hidden = np.zeros(len(a), bool)
     origin, heading = np.empty((2, *a.shape))
     far, segment = np.empty(len(a)), np.empty(len(a), np.int64)
-    for body in bodies:
+    for number, body in enumerate(bodies):
         if not len(body.mesh.faces):
             continue
         ready, pose = casting_mesh(body.mesh, backend), body.pose
+        skip = hidden if own is None else hidden | (own == number)
         count = intersections.into_mesh(
-            a, b, hidden, pose.rotation, pose.position, ready.centre, ready.size, origin, heading, far, segment
+            a, b, skip, pose.rotation, pose.position, ready.centre, ready.size, origin, heading, far, segment
         )
         if not count:
             continue

@@ -218,7 +218,8 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     speed = float(medium.profile.at(depth(snap.position)))
     out = TransmitPaths.of(paths, bounced, facet, snap, speed)
     out = out.select(picked(lit & (out.spreading != 0.0)))
-    out = out.select(picked(~_hides(array, bodies, snap, out, facets.clear[out.facet])))
+    own = facets.leaving(bodies, out.facet, -out.arrival)
+    out = out.select(picked(~_hides(array, bodies, snap, out, facets.clear[out.facet], own)))
     for number, before in overlapping(bodies):
         owned = np.flatnonzero(facets.owner[out.facet] == number)
         of = out.facet[owned]
@@ -228,11 +229,13 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
 
 
 def _hides(
-    array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Emission, out: TransmitPaths, start: Floats
-) -> Bools:
-    """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz)."""
-    end = np.broadcast_to(snap.position, start.shape)
-    stand_in = partial(hidden, bounces=out.bounces, turning=out.turning)  # backwards: bodies are where a ray begins
+    array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Emission, out: TransmitPaths, start: Floats,
+    own: Ints | None = None,
+) -> Bools:  # fmt: skip
+    """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz); own as of
+    `hidden`."""
+    end = np.broadcast_to(snap.position, start.shape)  # backwards: bodies are where a ray begins
+    stand_in = partial(hidden, bounces=out.bounces, turning=out.turning, own=own)
     return stand_in(bodies, array.bending, start, end, -out.arrival, out.length)
 
 

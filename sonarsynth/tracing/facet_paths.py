@@ -10,6 +10,7 @@ import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Ints, picked
 from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.kernels.placing import in_front
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Kind
@@ -22,7 +23,6 @@ from sonarsynth.tracing.receive_paths import (
     ReceivePaths,
     concatenate,
     facets_of,
-    may_be_lit,
     may_face_receiver,
     receive_paths,
     require_in_water,
@@ -112,19 +112,27 @@ def facet_paths(
     view = Occlusion(bodies, bent, receiver, propagation, tolerances)
     columns: tuple[list[ReceivePaths], list[Facets]] = [], []
     count = 0
+    straight = propagation.layered and not propagation.bounces and medium.profile.uniform
+    lights = [snap.position for snap in (context.snaps if snaps is None else snaps) if snap.illuminates]
+
+    def chosen(number: int, rows: Ints) -> Ints:
+        if owners is not None and number not in owners:
+            return rows[:0]
+        rows = rows[rows % tolerances.every == 0] if tolerances.every > 1 else rows
+        if not straight:
+            return rows
+        of, eye = context.scattering[number], receiver.pose.position
+        seen_by = of.pose.to_body([eye, *([eye] if snaps is None else lights)])
+        return in_front(rows, of.position, of.normal, seen_by[0], slack, seen_by[1:])
+
     for block in in_blocks(sum(map(len, context.scattering))):
-        every = facets_of(context.scattering, block)
-        if tolerances.every > 1:
-            every = every.select(np.flatnonzero(every.facet % tolerances.every == 0))
-        if owners is not None and len(owners) < len(context.scattering):
-            every = every.select(np.isin(every.owner, owners))
-        if propagation.layered:
+        every = facets_of(context.scattering, block, chosen)
+        if propagation.layered and not straight:
             facing = may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack)
-            if snaps is not None and not propagation.bounces and medium.profile.uniform:
-                facing &= may_be_lit(every, snaps)
             every = every.select(picked(facing))
         leaving = receive_paths(every, medium, receiver, propagation, slack)
-        leaving = view.visible(leaving, *every.side(leaving.row, leaving.departure))
+        own = every.leaving(bodies, leaving.row, leaving.departure)
+        leaving = view.visible(leaving, *every.side(leaving.row, leaving.departure), own)
         reached, row = np.unique(leaving.row, return_inverse=True)
         columns[0].append(leaving.numbered(count + row))
         columns[1].append(every.select(reached))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import OFFSET
+from sonarsynth.casting.ray_casting import OFFSET, leave_own
 from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth, picked
+from sonarsynth.equations.kernels.placing import placed
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, TOLERANCE
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.mesh import in_blocks
@@ -17,7 +19,7 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Paths
 from sonarsynth.propagation.reflections import Reflections, reflections
 from sonarsynth.scattering import Scatterers
-from sonarsynth.state import Emission, Medium, Receiver
+from sonarsynth.state import Medium, Receiver
 from sonarsynth.tracing.occlusion.ray_cones import max_launch_deviation
 
 if TYPE_CHECKING:
@@ -90,7 +92,6 @@ class Facets:
     point: Floats  # (facet, xyz) m: centroid
     clear: Floats  # (facet, xyz) m: the centroid moved off its facet
     normal: Floats  # (facet, xyz)
-    area: Floats  # (facet,) m2
 
     def side(self, row: Ints, departure: Floats) -> tuple[Floats, Floats]:
         """Where legs (leg, xyz) start clear of facets (row of each), and the normal of the side that they leave on:
@@ -98,6 +99,10 @@ class Facets:
         normal = self.normal[row]
         sideless = self.sideless
         return self.clear[row], np.where(sideless[row, None], departure, normal) if sideless.any() else normal
+
+    def leaving(self, bodies: tuple[PlacedTarget, ...], row: Ints, direction: Floats) -> Ints:
+        """As `ray_casting.leave_own`, of straight paths to or from facets (row of each): direction (path, xyz) away."""
+        return leave_own(bodies, self.owner[row], self.facet[row], direction)
 
     def lit(self, row: Ints, arrival: Floats) -> Bools:
         """Whether paths that arrive along (path, xyz) light facets (row of each): from their side, if they have one."""
@@ -172,25 +177,20 @@ def require_in_water(bodies: tuple[PlacedTarget, ...], bottom: float) -> None:
             raise ValueError(f"target '{body.name}' reaches {where} ({highest:g} to {deepest:g} m in {bottom:g} m)")
 
 
-def facets_of(scattering: tuple[Scatterers, ...], block: slice) -> Facets:
-    """Some of the surface elements of all, one owner after the other."""
+def facets_of(
+    scattering: tuple[Scatterers, ...], block: slice, chosen: Callable[[int, Ints], Ints] = lambda _, rows: rows
+) -> Facets:
+    """Some of the surface elements of all, one owner after the other; chosen: of an owner's, by its number."""
     last = np.cumsum([0, *map(len, scattering)])
-    of = [slice(*np.clip([block.start - n, block.stop - n], 0, m - n)) for n, m in pairwise(last.tolist())]
-    owner = np.repeat(np.arange(len(scattering)), [rows.stop - rows.start for rows in of])
-    none, owned = np.empty((0, 3)), list(zip(scattering, of, strict=True))
-    point = np.concatenate([none, *(s.pose.to_world(s.position[rows]) for s, rows in owned)])
-    normal = np.concatenate([none, *(s.pose.turn_to_world(s.normal[rows]) for s, rows in owned)])
-    x, y, z = np.abs(point.T)
-    rounding = 8.0 * np.finfo(float).eps * np.maximum(np.maximum(x, y), z)  # of places in the world
-    offset = np.maximum(OFFSET * np.array([s.offset for s in scattering])[owner], rounding)
-    return Facets(
-        owner=owner,
-        facet=np.concatenate([np.empty(0, np.int64), *(np.arange(rows.start, rows.stop) for rows in of)]),
-        point=point,
-        clear=point + offset[:, None] * normal,
-        normal=normal,
-        area=np.concatenate([np.empty(0), *(s.area[rows] for s, rows in owned)]),
-    )
+    of = [np.arange(*np.clip([block.start - n, block.stop - n], 0, m - n)) for n, m in pairwise(last.tolist())]
+    of = [chosen(number, rows) for number, rows in enumerate(of)]
+    owner, none = np.repeat(np.arange(len(scattering)), [len(rows) for rows in of]), np.empty((0, 3))
+    places = [(none, none, none)] + [
+        placed(rows, s.position, s.normal, s.pose.rotation, s.pose.position, OFFSET * s.offset)
+        for s, rows in zip(scattering, of, strict=True)
+    ]
+    point, normal, clear = (np.concatenate(column) for column in zip(*places, strict=True))
+    return Facets(owner, np.concatenate([np.empty(0, np.int64), *of]), point, clear, normal)
 
 
 def receive_paths(
@@ -224,15 +224,6 @@ def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Me
     steepest = np.abs(facets.normal[:, 2]) * np.sqrt((1.0 - cosine) * (1.0 + cosine))
     margin = 1e-9 + slack / np.maximum(distance, 1e-300)
     return np.asarray((ahead >= -margin) | (ahead * cosine + steepest > -margin))
-
-
-def may_be_lit(facets: Facets, snaps: tuple[Emission, ...]) -> Bools:
-    """(facet,) which some of the snaps that light anything are on the outer side of."""
-    lit = facets.sideless
-    for snap in snaps:
-        if snap.illuminates:
-            lit |= dot(facets.normal, snap.position - facets.point) > 0.0
-    return lit
 
 
 def path_pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:

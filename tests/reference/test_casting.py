@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from sonarsynth.casting import ray_casting
-from sonarsynth.casting.ray_casting import OFFSET, Backend, first_hit, hide, occluded
+from sonarsynth.casting.ray_casting import OFFSET, Backend, first_hit, hide, leave_own, occluded
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.geometry.mesh import Mesh
@@ -110,6 +110,22 @@ def test_a_sphere_hides_what_is_in_its_shadow_and_no_more() -> None:
     before = occluded((body,), start, start + 0.9 * (4.5 - 0.0) * d)
     assert not before.any()
     assert np.array_equal(occluded((place(SPHERE, (50.0, 0.0, 0.0)), body), end, start), hidden)
+
+
+@pytest.mark.parametrize(("mesh", "least"), [(SPHERE, 0.89), (RING, 0.45)])
+def test_rays_that_leave_their_own_body_meet_it_nowhere(mesh: Mesh, least: float) -> None:
+    """Cast one by one at that body; of a convex one all leave that are over the lowest sine, 0.101."""
+    bodies = place(SPHERE, (3.0, 0.0, -10.0)), place(mesh, (0.0, 0.0, -10.0))
+    rng, count, share = np.random.default_rng(7), len(mesh.faces), []
+    for _ in range(40):
+        towards = unit(rng.normal(size=(count, 3)))
+        towards *= np.sign(np.sum(towards * mesh.normal, axis=1))[:, None]
+        own = leave_own(bodies, np.ones(count, int), np.arange(count), bodies[1].pose.turn_to_world(towards))
+        assert set(own) == {-1, 1}
+        share.append(np.mean(own == 1))
+        facet, _ = first_hit(mesh, mesh.centroid + 1e-6 * mesh.radius * mesh.normal, towards)
+        assert (facet[own == 1] < 0).all()
+    assert np.mean(share) > least
 
 
 def test_many_points_are_hidden_from_each_place_as_each_is_alone() -> None:

@@ -54,16 +54,19 @@ class Occlusion:
         """Those who look; None: the array centre looks for all."""
         return self.receiver.elements if self.tolerances.occlusion == "sensors" else None
 
-    def visible(self, legs: ReceivePaths, start: Floats, normal: Floats | None) -> ReceivePaths:
+    def visible(
+        self, legs: ReceivePaths, start: Floats, normal: Floats | None, own: Ints | None = None
+    ) -> ReceivePaths:
         """The legs that no body hides from the array centre; or, with elements, from every hydrophone, some of them
         open for `settled`.
 
         start (leg, xyz): of the legs, moved off their facets; normal (leg, xyz): of these, which legs leave on their
-        outer side; None where they have none.
+        outer side; None where they have none; own (leg,): as of `hidden`.
         """
         if self.elements is None or self.elements.count == 1 or not self.bodies:
             end = np.broadcast_to(self.receiver.pose.position, start.shape)
-            hides = self._hides(start, end, legs.departure, legs.length, bounces=legs.bounces, turning=legs.turning)
+            ray = start, end, legs.departure, legs.length
+            hides = hidden(self.bodies, self.bending, *ray, bounces=legs.bounces, turning=legs.turning, own=own)
             return legs.select(picked(~hides))
         certain = self._certain(legs, start, normal)
         in_sight, mixed = certain != CLOSED, certain == UNKNOWN
@@ -209,13 +212,11 @@ class Occlusion:
         if normal is not None:
             unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
         ray = np.flatnonzero(~unseen)
-        end, turns = self.receiver.pose.position + offset[ray], (beside.bounces[ray], beside.turning[ray])
-        unseen[ray] = self._hides(start[leg[ray]], end, ahead[ray], length[ray], bounces=turns[0], turning=turns[1])
+        away = start[leg[ray]], self.receiver.pose.position + offset[ray], ahead[ray], length[ray]
+        turns = beside.bounces[ray], beside.turning[ray]
+        unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=turns[0], turning=turns[1])
         look[row, column] = unseen
         return look
-
-    def _hides(self, *ray: Floats, bounces: Ints, turning: Ints) -> Bools:
-        return hidden(self.bodies, self.bending, *ray, bounces=bounces, turning=turning)
 
 
 def _towards(legs: ReceivePaths, offset: Floats) -> tuple[Floats, Floats]:
