@@ -49,6 +49,7 @@ from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.filtered_pulse import snap_levels
+from sonarsynth.threads import in_one_thread
 from sonarsynth.tracing.arrivals import trace
 
 if TYPE_CHECKING:
@@ -251,6 +252,7 @@ def _values(plan: Plan, index: int) -> Values:
     return range_frame(plan, index, traced, beamform_frame(plan, index, traced))
 
 
+@in_one_thread
 def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
     """Compute a frame of a recipe. Pure: the same frame is the same, bit for bit.
 

@@ -25,6 +25,7 @@ from sonarsynth.receiver import elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.recipe.sequence_checks import check_spanned, most_emissions
+from sonarsynth.threads import in_one_thread
 
 __all__ = [
     "ALL_PRODUCTS",
@@ -63,6 +64,7 @@ COSTED = 5
 """Sequences over which the predicted cost is averaged."""
 
 
+@in_one_thread
 def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | None = None) -> Plan:
     """Resolve a recipe: check the scene at every frame, make every choice, and predict sizes and cost.
 

@@ -21,6 +21,7 @@ from sonarsynth.planning import Plan, choices_from
 from sonarsynth.recipe import reading
 from sonarsynth.schedule import worker_status
 from sonarsynth.store.layout import layout_of
+from sonarsynth.threads import in_one_thread
 
 STAGES = ("trace", "beamform", "range")
 """Tasks of a block of frames, in order."""
@@ -127,6 +128,7 @@ RUN: Mapping[str, Callable[[Job, Any], list[StageResult]]] = {"trace": trace, "b
 """What each task runs: the first of a block is given the numbers of its frames, each other what the one before made."""
 
 
+@in_one_thread
 def render_frame(job: Job, frame: int) -> StageResult:
     """All stages of a frame, here and now."""
     results: Any = [frame]

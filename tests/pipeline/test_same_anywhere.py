@@ -12,7 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zarr
+from threadpoolctl import threadpool_info, threadpool_limits
 
+from sonarsynth import pipeline
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import build
 
@@ -68,3 +70,24 @@ def test_another_locale_time_zone_hash_seed_and_folder(
     command = [sys.executable, "-m", "sonarsynth", "build", "../small.yaml", "s.zarr", "--workers", "0", "--no-predict"]
     subprocess.run(command, cwd=place, env=env, check=True, capture_output=True)
     assert contents(place / "s.zarr") == reference
+
+
+def test_a_frame_has_one_thread_for_linear_algebra_and_gives_the_others_back(
+    small_plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def threads() -> list[int]:
+        return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+
+    seen: list[int] = []
+
+    def seeing(*_: object) -> None:
+        seen.extend(threads())
+        raise InterruptedError
+
+    monkeypatch.setattr(pipeline, "_values", seeing)
+    with threadpool_limits(2, user_api="blas"):
+        assert set(threads()) == {2}
+        with pytest.raises(InterruptedError):
+            pipeline.render(small_plan, 0)
+        assert set(threads()) == {2}
+    assert set(seen) == {1}

@@ -178,7 +178,7 @@ def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: floa
     if not np.isfinite(values).all():
         return None
     held_out = np.arange(len(sample)) % 4 == 3
-    coefficients = np.linalg.lstsq(at[~held_out], values[~held_out], rcond=1e-10)[0]
+    coefficients = np.linalg.pinv(at[~held_out], rcond=1e-10) @ values[~held_out]
     misfit = np.abs(at[held_out] @ coefficients - values[held_out]).max(axis=0)
     wrong = np.split(misfit, splits)
     late, turned, softer = (float(w.sum()) for w in wrong[:3])  # monomials over the aperture are at most 1
