@@ -13,13 +13,12 @@ import typer
 
 from sonarsynth.cli.accuracy_command import accuracy
 from sonarsynth.cli.running import run
+from sonarsynth.equations.rays import ray_solutions
 from sonarsynth.validation import REFERENCES, Row, ray_accuracy
-from sonarsynth.validation.rays.eigenray_checks import image_rays
-from sonarsynth.validation.rays.ray_matching import Bounds, Rays, errors, matched, miscounted, nearest
+from sonarsynth.validation.extremes.extreme_rays import circle
+from sonarsynth.validation.rays.ray_matching import Bounds, Rays, errors, miscounted, nearest, rays_of
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
-from sonarsynth.validation.references.rays.one_gradient import Gradient, gradient_rays
 from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
-from sonarsynth.validation.references.rays.slowness_fan import count_rays
 from sonarsynth.validation.report import write
 
 
@@ -29,8 +28,9 @@ def ends(bottom_depth: float, farthest: float, pairs: int = 6) -> tuple[np.ndarr
     return start, end, np.geomspace(0.01, 1.0, pairs) * farthest
 
 
-def within(got: Rays, exact: Rays, bounds: Bounds) -> bool:
-    return all(error <= bound for _, error, bound in errors(got, exact, np.ones(len(got.pair), bool), bounds).values())
+def isovelocity_rays(start: np.ndarray, end: np.ndarray, distance: np.ndarray, vertices: int) -> Rays:
+    water = ray_solutions.water(np.array([0.0]), np.array([1500.0]), 100.0)
+    return rays_of(ray_solutions.eigenrays(water, start, end, distance, vertices, vertices))
 
 
 @pytest.fixture(scope="module")
@@ -43,36 +43,26 @@ def test_the_search_is_within_every_bound(rows: list[Row]) -> None:
     assert {"isovelocity", "5 layers", "50 layers", "thermocline", "duct", "jumps", "noisy cast"} <= {
         row.case for row in rows
     }
-    assert {"count", "family", "time", "angle", "amplitude", "caustics"} <= {row.quantity for row in rows}
+    assert {"count", "family", "time", "angle", "amplitude"} <= {row.quantity for row in rows}
     assert all(row.counts["rays"] > 0 and row.cost > 0 and row.cost_unit == "us a ray" for row in rows)
 
 
 @pytest.mark.parametrize(
-    ("slope", "bottom_depth", "farthest"), [(0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4)]
+    ("slope", "bottom_depth", "farthest"),
+    [(0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4), (0.0, 1e2, 1e4)],
 )
-def test_circles_digits_and_fan_agree(slope: float, bottom_depth: float, farthest: float) -> None:
+def test_digits_have_the_closed_forms_of_circles_and_images(slope: float, bottom_depth: float, farthest: float) -> None:
+    """Every ray that is not reflected: time and amplitude of the circle (the line) through both ends."""
     start, end, distance = ends(bottom_depth, farthest)
-    circles = gradient_rays(Gradient(1500.0, slope, bottom_depth), start, end, distance, 5)
     depth, speed = np.array([0.0, bottom_depth]), np.array([1500.0, 1500.0 + slope * bottom_depth])
-    p = np.cos(circles.start_angle) / np.interp(start[circles.pair], depth, speed)
-    digits = exact_rays(Layers(depth, speed), circles, p, start, end, distance)
-    assert circles.families == digits.families
-    assert within(circles, digits, Bounds(time=1e-15, relative_time=1e-15, angle=1e-14, amplitude=1e-12))
-    one_sided = {
-        f: n for f, n in count_rays(depth, speed, start, end, distance, 5, 5).items() if f[3 if slope > 0 else 2] == 0
-    }
-    assert miscounted(circles, Counter(one_sided)) == 0
-
-
-def test_images_digits_and_fan_agree() -> None:
-    start, end, distance = ends(100.0, 1e4)
-    images = image_rays(1500.0, 100.0, start, end, distance, 4)
-    assert len(images.pair) == 9 * len(start)
-    depth, speed = np.array([0.0, 100.0]), np.full(2, 1500.0)
-    digits = exact_rays(Layers(depth, speed), images, np.cos(images.start_angle) / 1500.0, start, end, distance)
-    assert images.families == digits.families
-    assert within(images, digits, Bounds(time=1e-14, angle=1e-14, amplitude=1e-14))
-    assert miscounted(images, count_rays(depth, speed, start, end, distance, 4, 4)) == 0
+    found = ray_solutions.eigenrays(ray_solutions.water(depth, speed, bottom_depth), start, end, distance, 1, 0)
+    digits = exact_rays(Layers(depth, speed), rays_of(found), found.slowness, start, end, distance)
+    assert len(digits.pair) > 0
+    for i, pair in enumerate(digits.pair):
+        c = np.interp([start[pair], end[pair]], depth, speed)
+        exact = circle(slope, *c.tolist(), float(np.hypot(distance[pair], start[pair] - end[pair])))
+        assert digits.travel_time[i] == pytest.approx(exact[0], rel=1e-14)
+        assert digits.amplitude[i] == pytest.approx(exact[1], rel=1e-11)
 
 
 def test_shooting_in_a_smooth_profile_is_reciprocal() -> None:
@@ -83,19 +73,18 @@ def test_shooting_in_a_smooth_profile_is_reciprocal() -> None:
     np.testing.assert_allclose(there.travel_time[i], back.travel_time[j], rtol=1e-13)
     np.testing.assert_allclose(there.start_angle[i], -back.end_angle[j], rtol=1e-9)
     np.testing.assert_allclose(there.amplitude[i], back.amplitude[j], rtol=1e-8)
-    assert there.caustics[i].tolist() == back.caustics[j].tolist()
 
 
 def test_what_is_wrong_is_seen() -> None:
     start, end, distance = ends(100.0, 1e4)
-    exact = image_rays(1500.0, 100.0, start, end, distance, 3)
+    exact = isovelocity_rays(start, end, distance, 3)
     sound = np.ones(len(exact.pair), bool)
     late, loud = exact.travel_time.copy(), exact.amplitude.copy()
     late[3] += 2e-13
     loud[5] *= 1.0 + 2e-6
     wrong = errors(replace(exact, travel_time=late, amplitude=loud), exact, sound, Bounds())
     verdicts = {name: error <= bound for name, (_, error, bound) in wrong.items()}
-    assert verdicts == {"time": False, "angle": True, "amplitude": False, "caustics": True}
+    assert verdicts == {"time": False, "angle": True, "amplitude": False}
     gone = errors(replace(exact, travel_time=np.full(len(late), np.nan)), exact, sound, Bounds())
     assert not gone["time"][1] <= gone["time"][2]
     families = Counter(exact.families)
@@ -105,15 +94,12 @@ def test_what_is_wrong_is_seen() -> None:
 
 
 def test_rays_are_matched_by_family_and_time() -> None:
-    exact = image_rays(1500.0, 100.0, *ends(100.0, 1e4), 2)
+    exact = isovelocity_rays(*ends(100.0, 1e4), 2)
     order = np.random.default_rng(1).permutation(len(exact.pair))
     mixed = exact.select(order)
-    for match in (matched, nearest):
-        i, j = match(mixed, exact)
-        assert sorted(j.tolist()) == list(range(len(exact.pair)))
-        assert np.array_equal(order[i], j)
-    i, j = matched(exact.select(np.zeros(0, int)), exact)
-    assert len(i) == len(j) == 0
+    i, j = nearest(mixed, exact)
+    assert sorted(j.tolist()) == list(range(len(exact.pair)))
+    assert np.array_equal(order[i], j)
 
 
 def test_rows_and_picture_are_written(rows: list[Row], tmp_path: Path) -> None:

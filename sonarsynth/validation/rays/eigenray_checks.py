@@ -1,72 +1,33 @@
 """The eigenray search against computations that share no code with it: error against run time.
 
-Isovelocity water against image sources; one gradient against its circles; layers against arithmetic of 50 digits, with
-a dense fan that counts the rays of every family; the canonical profile of Munk, whose layers have an error of their
-own, against the ray equations of the smooth profile, integrated.
+Layers, of one speed and of one gradient among them, against arithmetic of 50 digits, with a dense fan that counts the
+rays of every family; the canonical profile of Munk, whose layers have an error of their own, against the ray equations
+of the smooth profile, integrated.
 """
 
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Bools
 from sonarsynth.equations.rays import ray_solutions
 from sonarsynth.equations.rays.ray_solutions import CAUSTIC
 from sonarsynth.validation.rays import ray_cases
 from sonarsynth.validation.rays.ray_cases import Case
-from sonarsynth.validation.rays.ray_matching import Rays, errors, matched, miscounted, nearest, rays_of, worst
+from sonarsynth.validation.rays.ray_matching import Rays, errors, miscounted, nearest, rays_of, worst
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
-from sonarsynth.validation.references.rays.one_gradient import gradient_rays
 from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
 from sonarsynth.validation.references.rays.slowness_fan import count_rays
 from sonarsynth.validation.validation_rows import Row
 
 if TYPE_CHECKING:
     from sonarsynth.equations.rays.ray_solutions import Eigenrays
-from sonarsynth.conventions import Floats
 
 
-def image_rays(speed: float, bottom_depth: float, start: Floats, end: Floats, distance: Floats, bounces: int) -> Rays:
-    """Every ray with up to `bounces` reflections between depths start and end (pair,) m at distances (pair,) m.
-
-    The receiver is mirrored in the boundaries that the ray meets, the last one first (e.g. Jensen, Kuperman, Porter and
-    Schmidt 2011, Computational Ocean Acoustics, section 2.4.4). speed in m/s, bottom in m.
-    """
-    rows = []
-    for down_first in (True, False):
-        for count in range(bounces + 1):
-            if count == 0 and not down_first:
-                continue
-            at_bottom = (np.arange(count) % 2 == 0) == down_first
-            image = np.array(end, float)
-            for bottom_hit in at_bottom[::-1]:
-                image = 2.0 * bottom_depth - image if bottom_hit else -image
-            rise = start - image
-            length = np.hypot(distance, rise)
-            angle = np.arctan2(rise, distance)
-            last = angle if count % 2 == 0 else -angle
-            rows.append(
-                [
-                    length / speed,
-                    angle,
-                    last,
-                    1.0 / length,
-                    *(np.full(len(rise), np.sum(hits)) for hits in (~at_bottom, at_bottom)),
-                ]
-            )
-    time, first, last, amplitude, surface, bottom = (np.concatenate(column) for column in zip(*rows, strict=True))
-    none = np.zeros(len(time), int)
-    pair = np.tile(np.arange(len(start)), len(rows))
-    return Rays(pair, time, first, last, amplitude, surface.astype(int), bottom.astype(int), none, none)
-
-
-IMAGES, CIRCLES = "image sources", "circles, 40 digits"
 MANY_DIGITS, FAN = "50 digits", "a dense fan"
 SMOOTH = "DOP853, smooth profile"
 REPEATS = 5
@@ -78,12 +39,7 @@ def ray_accuracy(quick: bool = False) -> list[Row]:
     """Errors and run times in every case; quick: fewer pairs. Raises ModuleNotFoundError without mpmath."""
     if find_spec("mpmath") is None:
         raise ModuleNotFoundError("the references for rays need mpmath: pip install 'sonarsynth[accuracy]'")
-    return [
-        *_isovelocity(quick),
-        *_gradients(quick),
-        *_layered(quick),
-        *_smooth(quick),
-    ]
+    return [*_layered(quick), *_smooth(quick)]
 
 
 def search(case: Case) -> tuple[Eigenrays, float]:
@@ -103,44 +59,9 @@ def search(case: Case) -> tuple[Eigenrays, float]:
     return eigenrays, 1e6 * seconds / (copies * max(1, len(eigenrays.pair)))
 
 
-def _rows(case: Case, reference: str, cost: float, computed: Rays, exact: Rays, trusted: Bools) -> Iterator[Row]:
-    """One row a quantity of matched rays."""
-    counts = _counts(case, len(computed.pair))
-    for quantity, (unit, error, bound) in errors(computed, exact, trusted, case.bounds).items():
-        yield Row(case.name, reference, quantity, unit, bound, error, cost, COST, counts)
-
-
 def _counts(case: Case, rays: int) -> dict[str, int]:
     """Pairs of ends that were searched, and rays that were compared."""
     return {"pairs": len(case.start), "rays": rays}
-
-
-def _trusted(eigenrays: Eigenrays) -> Bools:
-    return np.asarray(eigenrays.flag != CAUSTIC)
-
-
-def _complete(case: Case, reference: str, cost: float, computed: Rays, exact: Rays, trusted: Bools) -> Iterator[Row]:
-    """Rows of a reference that gives every ray."""
-    wrong = miscounted(computed, Counter(exact.families))
-    yield Row(case.name, reference, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(computed.pair)))
-    i, j = matched(computed, exact)
-    yield from _rows(case, reference, cost, computed.select(i), exact.select(j), trusted[i])
-
-
-def _isovelocity(quick: bool) -> Iterator[Row]:
-    for case in ray_cases.isovelocity(quick):
-        eigenrays, cost = search(case)
-        exact = image_rays(float(case.speed[0]), case.bottom, case.start, case.end, case.distance, case.vertices)
-        yield from _complete(case, IMAGES, cost, rays_of(eigenrays), exact, _trusted(eigenrays))
-
-
-def _gradients(quick: bool) -> Iterator[Row]:
-    for case, water in ray_cases.gradients(quick):
-        eigenrays, cost = search(case)
-        rays = rays_of(eigenrays)
-        keep = (rays.bottom if water.slope > 0 else rays.surface) == 0
-        exact = gradient_rays(water, case.start, case.end, case.distance, case.vertices)
-        yield from _complete(case, CIRCLES, cost, rays.select(keep), exact, _trusted(eigenrays)[keep])
 
 
 def _thinned(case: Case, rays: Rays) -> np.ndarray:
@@ -157,11 +78,13 @@ def _layered(quick: bool) -> Iterator[Row]:
         wrong = miscounted(rays, count_rays(case.depth, case.speed, *ends, case.vertices, case.reflections))
         yield Row(case.name, FAN, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(rays.pair)))
         keep = _thinned(case, rays)
-        selected, trusted = rays.select(keep), _trusted(eigenrays)[keep]
+        selected, trusted = rays.select(keep), np.asarray(eigenrays.flag[keep] != CAUSTIC)
         exact = exact_rays(Layers(case.depth, case.speed), selected, eigenrays.slowness[keep], *ends)
         differing = float(sum(a != b for a, b in zip(selected.families, exact.families, strict=True)))
-        yield Row(case.name, MANY_DIGITS, "family", "wrong", 0.0, differing, cost, COST, _counts(case, len(keep)))
-        yield from _rows(case, MANY_DIGITS, cost, selected, exact, trusted)
+        columns = cost, COST, _counts(case, len(keep))
+        yield Row(case.name, MANY_DIGITS, "family", "wrong", 0.0, differing, *columns)
+        for quantity, (unit, error, bound) in errors(selected, exact, trusted, case.bounds).items():
+            yield Row(case.name, MANY_DIGITS, quantity, unit, bound, error, *columns)
 
 
 def _smooth(quick: bool) -> Iterator[Row]:

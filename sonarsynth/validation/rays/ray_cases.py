@@ -11,7 +11,6 @@ from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Munk, Thermocline
 from sonarsynth.randomness import stream
 from sonarsynth.validation.rays.ray_matching import Bounds
-from sonarsynth.validation.references.rays.one_gradient import Gradient
 
 SEED = 3
 TIGHT, LOOSE = Bounds(), Bounds(time=1e-12)
@@ -65,25 +64,6 @@ def cut(nodes: tuple[Floats, Floats], bottom: float) -> tuple[Floats, Floats]:
     return np.append(nodes[0][above], bottom), speed
 
 
-def isovelocity(quick: bool) -> Iterator[Case]:
-    """One speed: in 100 m, and in 5 km out to 100 km."""
-    pairs = 12 if quick else 60
-    yield drawn(
-        "isovelocity", (np.array([0.0, 100.0]), np.full(2, 1500.0)), 1.0, 1e4, pairs, 4, reflections=4, check=10**6
-    )
-    deep = np.array([0.0, 5000.0]), np.full(2, 1500.0)
-    yield drawn("isovelocity, 100 km", deep, 1e3, 1e5, pairs, 4, reflections=4, check=10**6)
-
-
-def gradients(quick: bool) -> Iterator[tuple[Case, Gradient]]:
-    """One gradient: that of pressure and its opposite, that of a sharp thermocline, and hardly any."""
-    for slope, bottom, farthest in ((0.0163, 4e3, 6e4), (-0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4)):
-        water = Gradient(1500.0, slope, bottom)
-        nodes = np.array([0.0, bottom]), np.array([1500.0, 1500.0 + slope * bottom])
-        name = f"gradient {slope:g} /s"
-        yield drawn(name, nodes, 0.01 * farthest, farthest, 6 if quick else 30, 6, reflections=6, check=10**6), water
-
-
 def random_layers(count: int, bottom: float, spread: float) -> tuple[Floats, Floats]:
     """Layers between nodes at random depths (m), their speeds spread (m/s) about 1500 m/s."""
     rng = stream(SEED, "accuracy", "layers", count)
@@ -114,8 +94,15 @@ def munk_layers(tolerance: float, bottom: float = 5000.0) -> tuple[Floats, Float
 
 
 def layered(quick: bool) -> Iterator[Case]:
-    """Layers: few, many, a thermocline, a duct, jumps, a noisy cast."""
+    """Layers: one of one speed, one of one gradient (that of pressure and its opposite, that of a sharp thermocline,
+    and hardly any), few, many, a thermocline, a duct, jumps, a noisy cast."""
     many, few = (6, 8) if quick else (40, 120)
+    for name, bottom, farthest in (("isovelocity", 100.0, 1e4), ("isovelocity, 100 km", 5000.0, 1e5)):
+        nodes = np.array([0.0, bottom]), np.full(2, 1500.0)
+        yield drawn(name, nodes, 0.01 * farthest, farthest, many, 4, reflections=4, check=few)
+    for slope, bottom, farthest in ((0.0163, 4e3, 6e4), (-0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4)):
+        nodes = np.array([0.0, bottom]), np.array([1500.0, 1500.0 + slope * bottom])
+        yield drawn(f"gradient {slope:g} /s", nodes, 0.01 * farthest, farthest, many, 6, reflections=6, check=few)
     yield drawn("3 layers", random_layers(3, 100.0, 5.0), 10.0, 3e3, many, 4, reflections=4, check=few)
     yield drawn("5 layers", random_layers(5, 100.0, 5.0), 10.0, 3e3, many, 4, reflections=4, check=few)
     yield drawn(

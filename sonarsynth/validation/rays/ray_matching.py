@@ -29,7 +29,6 @@ class Rays:
     surface: Ints  # (ray,)
     bottom: Ints  # (ray,)
     turning: Ints  # (ray,)
-    caustics: Ints  # (ray,) -1 where the computation does not count them
 
     def select(self, keep: Bools | Ints) -> Rays:
         """The rays picked by a mask or by indices (ray,)."""
@@ -60,7 +59,6 @@ def rays_of(eigenrays: Eigenrays) -> Rays:
         surface=eigenrays.surface,
         bottom=eigenrays.bottom,
         turning=eigenrays.turning,
-        caustics=eigenrays.caustics,
     )
 
 
@@ -68,23 +66,6 @@ def miscounted(computed: Rays, exact: Counter[Family]) -> int:
     """Rays missed and rays invented, over all families."""
     families = Counter(computed.families)
     return (exact - families).total() + (families - exact).total()
-
-
-def matched(computed: Rays, exact: Rays) -> tuple[Ints, Ints]:
-    """Indices of the rays of both that belong together: of one family, in the order of their travel times there."""
-    if len(computed.pair) == 0 or len(exact.pair) == 0:
-        return np.empty(0, np.int64), np.empty(0, np.int64)
-    places: list[dict[tuple[Family, int], int]] = []
-    for rays in (computed, exact):
-        count: Counter[Family] = Counter()
-        rows: dict[tuple[Family, int], int] = {}
-        families = rays.families
-        for i in np.argsort(rays.travel_time, kind="stable").tolist():
-            rows[families[i], count[families[i]]] = i
-            count[families[i]] += 1
-        places.append(rows)
-    both = [key for key in places[0] if key in places[1]]
-    return np.array([places[0][key] for key in both], int), np.array([places[1][key] for key in both], int)
 
 
 def nearest(computed: Rays, exact: Rays) -> tuple[Ints, Ints]:
@@ -130,13 +111,8 @@ def errors(computed: Rays, exact: Rays, trusted: Bools, bounds: Bounds) -> dict[
     angle = np.maximum(np.abs(computed.start_angle - exact.start_angle), np.abs(computed.end_angle - exact.end_angle))
     amplitude = np.abs(computed.amplitude / exact.amplitude - 1.0)[trusted]
     of_time = np.maximum(bounds.time, bounds.relative_time * exact.travel_time)
-    rows = {
+    return {
         "time": ("s", *worst(time, of_time)),
         "angle": ("rad", *worst(angle, np.full(count, bounds.angle))),
         "amplitude": ("1", *worst(amplitude, np.full(len(amplitude), bounds.amplitude))),
     }
-    counted = exact.caustics >= 0
-    if counted.any():
-        wrong = int(np.sum(computed.caustics[counted] != exact.caustics[counted]))
-        rows["caustics"] = ("wrong", float(wrong), 0.0)
-    return rows

@@ -141,7 +141,7 @@ def exact_rays(water: Layers, computed: Rays, slowness: Floats, start: Floats, e
     columns = np.array(rows, float).reshape(-1, 7).T
     surface, bottom, turning = (np.nan_to_num(columns[k], nan=-1.0).astype(int) for k in (4, 5, 6))
     time, first, last, amplitude = columns[:4]
-    return Rays(computed.pair, time, first, last, amplitude, surface, bottom, turning, np.full(len(computed.pair), -1))
+    return Rays(computed.pair, time, first, last, amplitude, surface, bottom, turning)
 
 
 def _speed(course: Course, low: bool, water: Layers) -> Any:

@@ -4,8 +4,8 @@ Over the horizontal distance x, with the grazing angle t down positive and c = c
     dz/dx = tan t,  dt/dx = -c'/c,  dT/dx = 1/(c cos t)
 (e.g. Jensen, Kuperman, Porter and Schmidt 2011, Computational Ocean Acoustics, section 3.2) and, for their change with
 the launch angle a,
-    d(dz/da)/dx = (dt/da)/cos^2 t,  d(dt/da)/dx = -(c''/c - (c'/c)^2) dz/da:
-the zeros of dz/da are the caustics. Only rays that meet neither surface nor bottom are followed.
+    d(dz/da)/dx = (dt/da)/cos^2 t,  d(dt/da)/dx = -(c''/c - (c'/c)^2) dz/da.
+Only rays that meet neither surface nor bottom are followed.
 """
 
 from __future__ import annotations
@@ -59,7 +59,6 @@ class Flight:
     time: Floats  # (ray,) s
     stretch: Floats  # (ray,) m/rad: dz/da
     turning: Floats  # (ray,) turning points
-    caustics: Floats  # (ray,)
 
 
 def fly(water: Smooth, start: float, launch: Floats, distance: float, tolerance: float) -> Flight:
@@ -83,8 +82,7 @@ def fly(water: Smooth, start: float, launch: Floats, distance: float, tolerance:
     z, t, time, stretch, _ = solution.y.reshape(5, count, -1)
     lost = (z <= 0.0).any(axis=1) | (z >= water.bottom_depth).any(axis=1)
     turning = np.sum(np.signbit(t[:, 1:]) != np.signbit(t[:, :-1]), axis=1)
-    caustics = np.sum(np.signbit(stretch[:, 2:]) != np.signbit(stretch[:, 1:-1]), axis=1)
-    ends = (z[:, -1], t[:, -1], time[:, -1], stretch[:, -1], turning, caustics)
+    ends = (z[:, -1], t[:, -1], time[:, -1], stretch[:, -1], turning)
     return Flight(*(np.where(lost, np.nan, value) for value in ends))
 
 
@@ -133,5 +131,4 @@ def _rays(
         none,
         none,
         flight.turning[keep].astype(int),
-        flight.caustics[keep].astype(int),
     )
