@@ -28,18 +28,19 @@ class Direct:
     direction: Floats  # (path, xyz) unit vector towards where it comes from, sonar frame
 
 
-def direct_paths(arrivals: Arrivals, envelope: Callable[[int, float], float]) -> Direct:
+def direct_paths(arrivals: Arrivals, envelope: Callable[[int, float, float], float]) -> Direct:
     """The direct paths of a frame.
 
-    envelope: of the index of a snap, and the absorption on its way (dB at the centre of the band): when the envelope of
-    its pulse peaks in the band, s after its collapse.
+    envelope: of the index of a snap, the absorption on its way (dB at the centre of the band) and its Doppler: when the
+    envelope of its pulse peaks in the band, s after its collapse.
     """
     chosen = arrivals.seen_from_centre
     direct = chosen.direct & (chosen.surface == 0) & (chosen.bottom == 0)
     paths = chosen.select(direct)
     order = np.lexsort((paths.delay, paths.snap))
     snap = paths.snap[order]
-    late = [envelope(int(n), float(loss)) for n, loss in zip(snap, paths.absorption[order], strict=True)]
+    heard = zip(snap.tolist(), paths.absorption[order].tolist(), paths.doppler[order].tolist(), strict=True)
+    late = [envelope(*path) for path in heard]
     return Direct(snap, paths.delay[order] + np.array(late), paths.direction[order])
 
 

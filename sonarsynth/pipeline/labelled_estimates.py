@@ -20,11 +20,11 @@ def heard_directly(plan: Plan, arrivals: Arrivals, snaps: tuple[Emission, ...]) 
     """The direct paths of a frame, with the time at which the envelope of each pulse peaks in the band."""
     sonar = plan.scene.sonar
 
-    def envelope(snap: int, absorption: float) -> float:
+    def envelope(snap: int, absorption: float, doppler: float) -> float:
         def loss(f: Floats) -> Floats:
             return absorption * (1 + relative_absorption(plan.absorption, f, sonar.band.centre)) - absorption
 
-        return envelope_delay(snaps[snap].waveform, sonar, loss)
+        return envelope_delay(snaps[snap].waveform, sonar, loss, doppler)
 
     return direct_paths(arrivals, envelope)
 

@@ -282,11 +282,14 @@ def snap_gains(emissions: tuple[Emission, ...]) -> Floats:
     )
 
 
-def envelope_delay(waveform: Waveform, sonar: Sonar, loss: Callable[[Floats], Floats] | None = None) -> float:
-    """When the envelope of a pulse peaks in the band of the sonar, s after its time 0; loss: dB at frequencies (Hz)."""
+def envelope_delay(
+    waveform: Waveform, sonar: Sonar, loss: Callable[[Floats], Floats] | None = None, doppler: float = 0.0
+) -> float:
+    """When the envelope of a pulse peaks in the band of the sonar, s after its time 0; loss: dB at frequencies (Hz); it
+    lasts 1 + `doppler` times as long."""
     band, rate = sonar.band, sonar.sampling_frequency
     samples = 1 << int(np.ceil(np.log2(max(2048.0, 32 * rate / (band.high - band.low)))))
-    f, wave = pulse_spectrum(waveform, sonar.antialias, rate, min(samples, LONGEST_ENVELOPE))
+    f, wave = pulse_spectrum(waveform, sonar.antialias, rate, min(samples, LONGEST_ENVELOPE), doppler)
     in_band = (f >= band.low) & (f <= band.high)
     f, wave = f[in_band], wave[in_band]
     if loss is not None:

@@ -72,16 +72,18 @@ def test_moving_and_turning_everything_changes_nothing():
 
 
 def test_an_array_that_moves_locates_as_one_at_rest():
-    """Sensors come towards the wave while it passes them: for rest, directions would be off by v/c times a tangent."""
+    """Sensors come towards the wave while it passes them: for rest, directions would be off by v/c times a tangent, and
+    times by what faces hear differently there, 2 ns."""
     source, velocity, late = np.array([9.0, -5.0, -6.0]), np.array([8.0, -5.0, 1.0]), np.zeros(SMALL.count)
     for _ in range(4):
         moved = SMALL.position + np.outer(late, velocity)
         late = (np.linalg.norm(source - moved, axis=1) - np.linalg.norm(source)) / C
-    signals = hear_direct(replace(SMALL, position=moved), source)
+    signals, arrival = hear_direct(replace(SMALL, position=moved), source), np.linalg.norm(source) / C + envelope_late()
     track, survey = Track(AHEAD, AHEAD.turn_to_world(velocity)), Survey(-float(AHEAD.to_world(source)[2]), WATER)
     receivers = (Receiver(AHEAD, SMALL, Sonar(assumed_sound_speed=C), known) for known in (track, None))
     known, taken_for_still = (SensorDelays().locate(signals, receiver, survey, 1) for receiver in receivers)
     assert np.linalg.norm(known.position[0] - source) < 1e-3
+    assert abs(known.time[0] - arrival) < 5e-10
     assert np.linalg.norm(taken_for_still.position[0] - source) > 2e-2
 
 

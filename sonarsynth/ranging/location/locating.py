@@ -129,17 +129,13 @@ def _loudest(track: Floats, candidates: Candidates, signals: Signals, snaps: int
 def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: float, bend: Bend | None) -> SourceFix:
     """The loudest pulse about `centre` (s) by itself; refused where its data do not support a place."""
     elements, sonar = knowledge.elements, knowledge.sonar
-    fitted = fit_pulse(signals, elements, sonar, centre, half)
+    fitted = fit_pulse(signals, elements, sonar, centre, half, knowledge.velocity)
     if isinstance(fitted, int):
         return refused(fitted)
-    wave, pulse = fitted
+    wave, pulse, elements = fitted
     if pulse.share > SHARED and pulse.noise > AUDIBLE * knowledge.quiet:
         return refused(UNRESOLVED)
     c = sonar.assumed_sound_speed
-    if knowledge.velocity.any():  # each sensor hears the wave where it is by then
-        late = wavefront_delays(elements.position, wave.direction, wave.curvature, c) + wave.residual
-        elements = replace(elements, position=elements.position + np.outer(late, knowledge.velocity))
-        wave = fit_wave(wave.time + late, elements.position, c, pulse.weight, wave) or wave
     if bend is None:
         return place(wave, pulse, knowledge)
     bent = _refit(pulse, wave, elements, bend.sound_speed, 0.0, c)
@@ -153,22 +149,30 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
 
 
 def fit_pulse(
-    signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float
-) -> tuple[Wavefront, Pulse] | int:
-    """Wavefront of the pulse about `centre` (s), and the pulse as measured last; or why it is refused, of REASONS.
+    signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats
+) -> tuple[Wavefront, Pulse, Elements] | int:
+    """Wavefront of the pulse about `centre` (s), the pulse as measured last, and the sensors where they hear it; or why
+    it is refused, of REASONS. velocity (xyz): of the array, m/s, sonar frame.
 
     Envelope peaks of the sensors give eq. 6 in closed form, then the sphere, robustly; then the sensors are aligned
     and their lags measured coherently, until these settle.
     """
-    c, q = sonar.assumed_sound_speed, elements.position
+    c, q, still = sonar.assumed_sound_speed, elements.position, not velocity.any()
     cut, start = pulse_times.excerpt(signals, centre, half)
     delay, height = pulse_times.envelope_peaks(cut, signals.sampling_frequency, sonar.band)
     wave = _robust_wave(start + delay, height * (elements.gain != 0), q, c)
+    if wave is not None and not still:
+        times = _times(wave, q, c)
+        q = q + np.outer(times - wave.time, velocity)
+        wave = fit_wave(times, q, c, height**2 * (elements.gain != 0), wave)
     if wave is None:
         return UNFIT
-    expected = _times(wave, q, c)
+    expected, rest = _times(wave, q, c), elements
     aligned = pulse_times.align(signals, elements, sonar.band, expected)
     for _ in range(ROUNDS):
+        if not still:
+            q = rest.position + np.outer(_times(wave, q, c) - wave.time, velocity)
+            elements = replace(rest, position=q)
         pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
         better = fit_wave(_times(wave, q, c) + pulse.lag, q, c, pulse.weight, wave, 1)
         if better is None:
@@ -184,7 +188,7 @@ def fit_pulse(
         deaf = pulse.noise_to_signal
         longer = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time, deaf)
         pulse = replace(pulse, longer=longer)
-    return wave, pulse
+    return wave, pulse, elements
 
 
 def fit_wave(
