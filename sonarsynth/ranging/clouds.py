@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, direction
+from sonarsynth.conventions import Floats, azimuth_elevation, direction
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose, unit
 from sonarsynth.geometry.motion import Track
@@ -15,6 +16,7 @@ from sonarsynth.ranging.picking.picked_echoes import PickedEchoes
 from sonarsynth.ranging.placing.solution import Solution
 from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.receiver import Sonar
+from sonarsynth.receiver.mirror_images import plane_normal
 
 if TYPE_CHECKING:
     from sonarsynth.ranging.picking import PickingMethod
@@ -31,12 +33,14 @@ def point_cloud(
     if not window.located:
         return no_points()
     echoes = picking.picks(window)
-    beam, source = direction(echoes.azimuth, echoes.elevation), window.estimates.position[0]
-    solution = placing.place(echoes.delay, beam, source, window.sonar, sonar_pose, profile)
+    source, velocity, spin = window.estimates.position[0], np.zeros(3), np.zeros(3)
     if track is not None and not track.still:
-        turn = track.pose.turn_to_body
-        drift = -turn(track.velocity) - np.cross(turn(track.spin), source)
-        solution = solution.as_array_moves(source, echoes.delay[:, None] * drift)
+        velocity, spin = track.pose.turn_to_body(track.velocity), track.pose.turn_to_body(track.spin)
+        echoes = _from_ahead(echoes, velocity, window)
+    beam = direction(echoes.azimuth, echoes.elevation)
+    solution = placing.place(echoes.delay, beam, source, window.sonar, sonar_pose, profile)
+    if velocity.any() or spin.any():
+        solution = solution.as_array_moves(source, -echoes.delay[:, None] * (velocity + np.cross(spin, source)))
     error = range_error(solution, echoes, window.estimates, window.sonar)
     cloud = PointCloud(
         position=solution.position.astype(np.float32),
@@ -52,6 +56,33 @@ def point_cloud(
         overflow=echoes.overflow,
     )
     return cloud.select(np.flatnonzero(np.isfinite(solution.range) & (solution.range > 0) & np.isfinite(error)))
+
+
+def _from_ahead(echoes: PickedEchoes, velocity: Floats, window: ReceivedWindow) -> PickedEchoes:
+    """Echoes where they come from, of beams that an array at rest would hear them in; velocity (xyz): m/s."""
+    live, c = window.elements.position[window.elements.gain != 0], window.sonar.assumed_sound_speed
+    heard = direction(echoes.azimuth, echoes.elevation)
+    azimuth, elevation = azimuth_elevation(
+        ahead_of_beams(heard, velocity / c, plane_normal(live, c / window.sonar.band.centre))
+    )
+    return replace(echoes, azimuth=azimuth, elevation=elevation)
+
+
+def ahead_of_beams(beam: Floats, mach: Floats, normal: Floats | None) -> Floats:
+    """Where (echo, xyz) waves come from that an array which moves by `mach` (xyz) m per m of sound hears in beams
+    (echo, xyz) that are steered for one at rest.
+
+    A sensor q meets a plane wave from u at -q.u/(c (1 + u.mach)): in the plane of the array, to which there is a
+    `normal`, the beam is u/(1 + u.mach). An array with depth (None) hears it in the beam u.
+    """
+    if normal is None:
+        return beam
+    along, u = beam @ normal, beam
+    for _ in range(3):
+        within = (beam - along[:, None] * normal) * (1.0 + u @ mach)[:, None]
+        rest = np.sqrt(np.maximum(1.0 - np.sum(within**2, axis=1), 0.0))
+        u = within + np.copysign(rest, along)[:, None] * normal
+    return unit(u)
 
 
 def range_error(solution: Solution, echoes: PickedEchoes, estimates: SourceEstimates, sonar: Sonar) -> Floats:

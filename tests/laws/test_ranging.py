@@ -12,6 +12,7 @@ from sonarsynth.environment.sea import Profile, Tabulated
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.ranging import BeamAxis, IsovelocityPlacing, RefractedPlacing, SensorDelays
+from sonarsynth.ranging.clouds import ahead_of_beams
 from sonarsynth.ranging.location.refraction import first_rays, refracted_solution
 from sonarsynth.ranging.placing.solution import isovelocity_solution
 from sonarsynth.receiver import Romanis, Sonar, elements
@@ -265,6 +266,24 @@ def test_ranges_are_from_where_a_moving_array_hears_the_echo(speed: float) -> No
     assert np.abs(found.range - r).max() < 1e-9 + 1e-5 * speed**2
     assert np.allclose(found.position, found.range[:, None] * unit(away), atol=1e-12)
     assert speed == 0.0 or np.abs(plain.range - r).max() > 0.005 * speed
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_beams_of_a_moving_array_look_where_sound_comes_from(turn: float) -> None:
+    """By when each sensor meets the wave of a far source; as for rest, beams are up to v/c of their slant beside it."""
+    velocity, far = np.array([9.0, -4.0, 1.0]), 1e5
+    lean = np.array([[np.cos(turn), -np.sin(turn), 0.0], [np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]])
+    u, q = direction(np.linspace(-0.5, 0.6, 7), np.linspace(0.4, -0.3, 7)), ARRAY.position @ lean.T
+    heard = []
+    for source in far * u:
+        late = np.zeros(len(q))
+        for _ in range(6):
+            late = (np.linalg.norm(source - q - np.outer(late, velocity), axis=1) - far) / C
+        within = np.linalg.lstsq(q, -C * late, rcond=1e-6)[0]
+        heard.append(within + np.sqrt(1.0 - within @ within) * lean[:, 0])
+    found = ahead_of_beams(np.array(heard), velocity / C, lean[:, 0])
+    assert np.abs(found - u).max() < 2e-5  # the square of v/c is 4e-5, the aperture over the distance 5e-6
+    assert np.abs(heard - u).max() > 2e-3
 
 
 def test_the_description_of_the_water_overrides_the_water():
