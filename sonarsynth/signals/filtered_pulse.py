@@ -285,15 +285,12 @@ def snap_gains(emissions: tuple[Emission, ...]) -> Floats:
 def envelope_delay(
     waveform: Waveform, sonar: Sonar, loss: Callable[[Floats], Floats] | None = None, doppler: float = 0.0
 ) -> float:
-    """When the envelope of a pulse peaks in the band of the sonar, s after its time 0; loss: dB at frequencies (Hz); it
-    lasts 1 + `doppler` times as long."""
+    """When (s after its time 0) a pulse, 1 + doppler times as long, is loudest in the band; loss (Hz): dB it loses."""
     band, rate = sonar.band, sonar.sampling_frequency
     samples = 1 << int(np.ceil(np.log2(max(2048.0, 32 * rate / (band.high - band.low)))))
     f, wave = pulse_spectrum(waveform, sonar.antialias, rate, min(samples, LONGEST_ENVELOPE), doppler)
-    in_band = (f >= band.low) & (f <= band.high)
-    f, wave = f[in_band], wave[in_band]
-    if loss is not None:
-        wave = wave * 10.0 ** (-loss(f) / 20)
+    bins = slice(*np.searchsorted(f, [band.low, np.nextafter(band.high, np.inf)]))
+    f, wave = f[bins], wave[bins] if loss is None else wave[bins] * 10.0 ** (-loss(f[bins]) / 20)
     return _loudest(f.tobytes(), wave.astype(complex).tobytes(), band.low, band.high)
 
 
