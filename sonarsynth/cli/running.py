@@ -8,9 +8,8 @@ import signal
 import sys
 import tempfile
 import traceback
-import warnings
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import typer
@@ -32,10 +31,7 @@ def run(app: typer.Typer, arguments: list[str] | None = None) -> int:
         os.environ.setdefault(name, "1")
     before = signal.signal(signal.SIGTERM, _interrupt)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("default", FutureWarning)
-            warnings.showwarning = _show_note
-            status = app(arguments, prog_name="sonarsynth", standalone_mode=False)
+        status = app(arguments, prog_name="sonarsynth", standalone_mode=False)
         return _interrupted() if status == INTERRUPTED else status if isinstance(status, int) else 0
     except KeyboardInterrupt:
         return _interrupted()
@@ -48,17 +44,6 @@ def run(app: typer.Typer, arguments: list[str] | None = None) -> int:
         return _explain(error, "--debug" in arguments)
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-def _show_note(message: Warning | str, category: type[Warning], *location: Any, **more: Any) -> None:
-    """A warning about a recipe as one line; those of libraries as Python shows them."""
-    if category.__name__ == "RenamedKey":
-        _say(f"note: {message}", 0)
-    else:
-        _SHOW(message, category, *location, **more)
-
-
-_SHOW = warnings.showwarning
 
 
 def _interrupted() -> int:

@@ -143,6 +143,16 @@ def test_a_recipe_without_a_grid_is_its_scene() -> None:
     assert made.frame(2)[1].key == 0
 
 
+def test_a_path_that_was_renamed_draws_the_numbers_of_its_first_name() -> None:
+    across, height = ("scene.world.sources.0.position.1", "scene.world.sources.0.height")
+    along = Uniform(name="x", path=(SHRIMP + ".0",), low="4 m", high="9 m")
+    up = Sobol(name="h", path=(height,), low="0 m", high="1 m")
+    spanned = recipe(seed=4, grid=(Axis(path=(across,), values=(-5, -6)),), variations=(along, up)).spanned
+    values = [float(str(s.value.value).removesuffix(" m")) for n in range(2) for s in spanned.drawn(n)]
+    first = [6.286896010179364, 0.19604593887925148, 8.067603436455116, 0.6183403013274074]  # by version 0.1
+    np.testing.assert_allclose(values, first, rtol=1e-9)
+
+
 def drawn(variation: Any, count: int = 4000) -> np.ndarray:
     made = recipe(variations=(variation,), repeats=count)
     values = [made.spanned.drawn(n)[0].value.value for n in range(count)]

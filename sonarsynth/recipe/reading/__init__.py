@@ -10,10 +10,8 @@ from __future__ import annotations
 import io
 import json
 import re
-import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,13 +23,11 @@ from sonarsynth.recipe import FILE_KINDS, Recipe
 from sonarsynth.recipe.reading.json_schema import schema, schema_text
 from sonarsynth.recipe.reading.messages import explain
 from sonarsynth.recipe.reading.model_tables import with_models
-from sonarsynth.recipe.reading.old_keys import new_setting, with_new_keys
 from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, override, read_file, read_text
 from sonarsynth.recipe.variation.values import Where
 
 __all__ = [
     "RecipeError",
-    "RenamedKey",
     "Source",
     "dump",
     "load",
@@ -44,10 +40,6 @@ __all__ = [
 ]
 
 _ADAPTER: Final[TypeAdapter[Recipe]] = TypeAdapter(Recipe)
-
-
-class RenamedKey(FutureWarning):
-    """A key of a recipe has another name now; the old one is read for one version."""
 
 
 def load(path: Path | str, sets: Sequence[str] = ()) -> Recipe:
@@ -87,26 +79,19 @@ def loads(text: str, name: str = "recipe", folder: Path | str = ".", *, resolved
     ------
     RecipeError, one line that names text, line and field.
     """
-    source = with_new_keys(read_text(text, name, Path(folder).absolute()))
-    return recipe_of(source, check_files=False, resolved=resolved)
+    return recipe_of(read_text(text, name, Path(folder).absolute()), check_files=False, resolved=resolved)
 
 
 def read(path: Path | str, sets: Sequence[str] = ()) -> Source:
     """A recipe file as plain values with their lines, and settings over it. Raises RecipeError."""
-    source = with_new_keys(read_file(path))
+    source = read_file(path)
     for setting in sets:
-        renamed, notes = new_setting(setting)
-        source = with_new_keys(replace(override(source, renamed), notes=(*source.notes, *notes)))
+        source = override(source, setting)
     return source
 
 
 def recipe_of(source: Source, *, check_files: bool = True, resolved: bool = False) -> Recipe:
-    """The recipe that a source describes, files resolved to absolute paths. Raises RecipeError.
-
-    Warns (RenamedKey) of each old key that has another name now.
-    """
-    for note in source.notes:
-        warnings.warn(f"{source.name}: {note}", RenamedKey, stacklevel=2)
+    """The recipe that a source describes, files resolved to absolute paths. Raises RecipeError."""
     source = source if resolved else with_models(source)
     data = _resolved(source, source.data, (), check_files)
     try:

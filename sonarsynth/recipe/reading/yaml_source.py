@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -57,8 +57,6 @@ class Source:
     """The text as written."""
     settings: tuple[str, ...] = ()
     """What `--set` set over it, in order."""
-    notes: tuple[str, ...] = ()
-    """What is to be said of it: keys that are called otherwise now."""
 
     def place(self, keys: Where) -> str:
         """Line of a value, or of the nearest one that holds it; `--set` where that set a part of the value."""
@@ -120,14 +118,11 @@ def override(source: Source, setting: str) -> Source:
     node = _compose(text, source.name, SET, path.strip())
     value = None if node is None else reader.value(node, keys)
     places = {w: p for w, p in source.places.items() if w[: len(keys)] != keys}
-    return Source(
-        source.name,
-        source.folder,
-        _replaced(source, source.data, keys, 0, value),
-        places | reader.places | {keys: SET},
-        source.text,
-        (*source.settings, setting),
-        source.notes,
+    return replace(
+        source,
+        data=_replaced(source, source.data, keys, 0, value),
+        places=places | reader.places | {keys: SET},
+        settings=(*source.settings, setting),
     )
 
 

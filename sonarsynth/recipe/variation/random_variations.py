@@ -11,7 +11,6 @@ from pydantic import model_validator
 from sonarsynth.conventions import Number
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.randomness import share
-from sonarsynth.recipe.renamed_keys import as_drawn
 from sonarsynth.recipe.variation.sobol_points import sobol_shares
 from sonarsynth.recipe.variation.values import (
     Name,
@@ -19,6 +18,7 @@ from sonarsynth.recipe.variation.values import (
     Plain,
     PlainValue,
     Quantity,
+    as_drawn,
     number_and_unit,
     same_unit,
     with_unit,

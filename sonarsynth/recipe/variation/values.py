@@ -155,6 +155,12 @@ def where(path: str) -> Where:
     return tuple(int(key) if key.isdecimal() else key for key in path.split("."))
 
 
+def as_drawn(path: str) -> str:
+    """The path of what varies in the words that its random draws are keyed by: those of the first version."""
+    path = re.sub(r"^scene\.world\.sources\b", "scene.world.shrimp", path)
+    return re.sub(r"^scene\.world\.environment\.bottom\b", "scene.world.environment.bed", path)
+
+
 def _name(value: Any) -> str:
     if not isinstance(value, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,63}", value):
         raise ValueError("must be a word of letters, digits and _")
