@@ -117,7 +117,7 @@ def test_zarr_2_in_a_store_is_not_read(path: Path) -> None:
         zarr.open_group(store.files.place.opens(path / "image"), mode="r")
 
 
-BESIDE = ("lock", "writers", "log.jsonl", "times.jsonl", "failed.jsonl")
+BESIDE = ("lock", "log.jsonl", "times.jsonl", "failed.jsonl")
 
 
 @pytest.mark.parametrize("suffix", BESIDE)
@@ -127,7 +127,7 @@ def test_links_beside_a_store_are_not_opened(path: Path, outside: Path, made: Pl
     before = state(outside)
     with pytest.raises(store.Mismatch, match=rf"s\.zarr\.{suffix}: is a "):
         build(made, path, workers=0)
-    if suffix in ("lock", "writers"):
+    if suffix == "lock":
         with pytest.raises(store.Mismatch, match="is a "):
             repair(path, workers=0)
     assert state(outside) == before

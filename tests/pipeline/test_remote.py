@@ -17,8 +17,8 @@ from sonarsynth import schedule, store
 from sonarsynth.cli import main
 from sonarsynth.planning import Plan
 from sonarsynth.schedule.repairing import repair
-from sonarsynth.store import Remote, creating
-from sonarsynth.store.files import lease
+from sonarsynth.store import Folder, Remote, creating
+from sonarsynth.store.files import lock
 from tests.places import contents, web_server
 from tests.waiting import HANGING, wait_until
 
@@ -157,51 +157,69 @@ def test_failed_frames_are_known_the_next_time(
 
 
 def test_a_second_build_is_refused_while_the_first_runs(small_plan: Plan, place: Remote) -> None:
-    file = store.beside(place, "lock")
-    assert isinstance(file, Remote)
-    with lease.leased(file, renewed=0.05), pytest.raises(store.StoreLocked, match=r"is being built by process \d+ on"):
+    with store.lock(place), pytest.raises(store.StoreLocked, match=r"is being built by process \d+ on"):
         schedule.build(small_plan, place, frames=FRAMES, workers=0)
     assert not place.exists()
-    assert not file.exists()
+    assert not store.beside(place, "lock").exists()
 
 
-def lock_of(file: Remote, **facts: object) -> None:
-    found = {"build": "other", "process": 1, "host": "there", "machine": "there", "started": "1", "renewed": 0}
-    file.write_bytes(json.dumps(found | facts).encode())
+@pytest.fixture(params=["disk", "url"])
+def anywhere(request: pytest.FixtureRequest, place: Remote, tmp_path: Path) -> Folder:
+    return place if request.param == "url" else tmp_path / "s.zarr"
 
 
-def test_the_lock_of_a_process_that_is_gone_is_taken_at_once(place: Remote) -> None:
-    with lease.leased(place):
-        mine = json.loads(place.read_bytes())
-    lock_of(place, machine=mine["machine"], process=mine["process"], started="1")
-    with lease.leased(place, lease=1e9) as name:  # else this would wait for ever
-        assert lease.holder(place) == name
+def claim_of(place: Folder, **facts: object) -> None:
+    """Another's claim of a store."""
+    claim = {"build": "other", "process": 1, "host": "there", "machine": "there", "started": "1", "renewed": 0}
+    store.beside(place, "lock").write_bytes(json.dumps(claim | facts).encode())
 
 
-def test_a_lock_that_nobody_renews_is_taken_in_the_end(place: Remote) -> None:
-    lock_of(place)
+def test_the_claim_of_a_process_that_is_gone_is_taken_at_once(anywhere: Folder) -> None:
+    with store.lock(anywhere):
+        mine = json.loads(store.beside(anywhere, "lock").read_bytes())
+    claim_of(anywhere, machine=mine["machine"], process=mine["process"], started="1")
+    with store.lock(anywhere, lease=1e9) as name:  # else this would wait for ever
+        assert lock.holder(anywhere) == name
+
+
+def test_a_claim_that_nobody_renews_is_taken_in_the_end(anywhere: Folder) -> None:
+    claim_of(anywhere)
     began = time.monotonic()
-    with lease.leased(place, lease=0.5) as name:
+    with store.lock(anywhere, lease=0.5) as name:
         assert time.monotonic() - began >= 0.5
-        assert lease.holder(place) == name
+        assert lock.holder(anywhere) == name
 
 
-def test_a_lock_that_is_renewed_is_not_taken(place: Remote) -> None:
-    lock_of(place)
-    renewing = threading.Timer(0.3, lambda: lock_of(place, renewed=1))
+def test_a_claim_that_is_renewed_is_not_taken(anywhere: Folder) -> None:
+    claim_of(anywhere)
+    renewing = threading.Timer(0.3, lambda: claim_of(anywhere, renewed=1))
     renewing.start()
-    with pytest.raises(lease.LeaseHeld, match="process 1 on there"), lease.leased(place, lease=HANGING):
+    with pytest.raises(store.StoreLocked, match="process 1 on there"), store.lock(anywhere, lease=HANGING):
         pass
     renewing.join()
-    assert lease.holder(place) == "other"
+    assert lock.holder(anywhere) == "other"
 
 
-def test_a_holder_renews_its_lock_and_leaves_that_of_another(place: Remote) -> None:
-    with lease.leased(place, renewed=0.05) as name:
-        wait_until(lambda: json.loads(place.read_bytes())["renewed"] >= 2)
-        assert lease.holder(place) == name
-        lock_of(place)
-    assert lease.holder(place) == "other"
+def test_a_holder_renews_its_claim_and_leaves_that_of_another(anywhere: Folder) -> None:
+    def written() -> object:
+        file = store.beside(anywhere, "lock")
+        return file.stat().st_mtime_ns if isinstance(file, Path) else file.read_bytes()
+
+    with store.lock(anywhere, renewed=0.05) as name:
+        for _ in range(2):
+            before = written()
+            wait_until(lambda before=before: written() != before)  # type: ignore[misc]
+        assert lock.holder(anywhere) == name
+        claim_of(anywhere)
+    assert lock.holder(anywhere) == "other"
+
+
+@pytest.mark.parametrize("content", [b"", b"[1]", b"{}", b"process 7"])
+def test_what_is_no_claim_keeps_nobody_out(anywhere: Folder, content: bytes) -> None:
+    store.beside(anywhere, "lock").write_bytes(content)
+    with store.lock(anywhere) as name:
+        assert lock.holder(anywhere) == name
+    assert not store.beside(anywhere, "lock").exists()
 
 
 def test_verify_says_that_it_is_being_built_and_by_whom(copy: Remote) -> None:
@@ -209,12 +227,11 @@ def test_verify_says_that_it_is_being_built_and_by_whom(copy: Remote) -> None:
     assert store.verify(copy, quick=True).building == ""
     with store.lock(copy):
         report = store.verify(copy, quick=True)
+        mine = json.loads(store.beside(copy, "lock").read_bytes())
     assert report.ok
     assert re.fullmatch(r"process \d+ on .+", report.building)
     assert report.complete == tuple(range(8))
-    with lease.leased(Remote(f"{copy}.other")):
-        mine = json.loads(Remote(f"{copy}.other").read_bytes())
-    lock_of(Remote(f"{copy}.lock"), machine=mine["machine"], process=mine["process"])
+    claim_of(copy, machine=mine["machine"], process=mine["process"])
     report = store.verify(copy, quick=True)
     assert report.building == "", "that process is gone"
     assert not report.ok
@@ -244,7 +261,7 @@ def test_a_writer_that_outlived_its_build_writes_no_mark(
     with pytest.raises(store.BuildEnded), store.shared_lock(place, "gone"):
         raise AssertionError
     with store.lock(place) as build, store.shared_lock(place, build) as still:
-        lock_of(Remote(f"{place}.lock"))
+        claim_of(place)
         with pytest.raises(store.BuildEnded):
             store.write_shard(place, small_plan, 0, frames, still)  # type: ignore[arg-type]
     assert store.frames_there(place) == []

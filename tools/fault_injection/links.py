@@ -15,7 +15,6 @@ from .ground import FRAMES, Ground, on_ground
 
 BESIDE = (
     "lock",
-    "writers",
     "log.jsonl",
     "times.jsonl",
     "failed.jsonl",
