@@ -23,13 +23,13 @@ from sonarsynth.cli.detectors.detect_command import detect
 from sonarsynth.cli.detectors.evaluate_command import evaluate
 from sonarsynth.cli.detectors.report_command import report
 from sonarsynth.cli.export_command import export
+from sonarsynth.cli.options import Insecure, Json, RecipeFile, Scheduler, Settings, Store, Workers, worker_bounds
 from sonarsynth.cli.rays_command import rays
 from sonarsynth.cli.repair_command import repair
-from sonarsynth.cli.running import BadOption, run
+from sonarsynth.cli.running import run
 from sonarsynth.cli.selecting import chosen_frames, product_names
 from sonarsynth.cli.soundscape_command import soundscape
 from sonarsynth.cli.target_strength_command import target_strength
-from sonarsynth.cli.worker_options import worker_bounds
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -44,22 +44,11 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-RecipeFile = Annotated[Path, typer.Argument(help="The recipe, a YAML file.", show_default=False)]
-Store = Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)]
-Settings = Annotated[
-    list[str],
-    typer.Option(
-        "--set",
-        metavar="PATH=VALUE",
-        help="Override a field of the recipe, such as scene.trajectory.frames=8. Repeatable.",
-    ),
-]
 Products = Annotated[
     str,
     typer.Option(metavar="LIST", help="Stored besides truth: signals, image, cloud, beams, paths; 'truth': no more."),
 ]
 Scale = Literal["common", "frame"]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 ALL_PRODUCTS = "signals,image,cloud"
 
 
@@ -100,12 +89,8 @@ def build(
         typer.Option(metavar="A:B", help="Only these sequences, such as 0:10; with --frames, their overlap."),
     ] = None,
     products: Products = ALL_PRODUCTS,
-    workers: Annotated[
-        int | None, typer.Option(min=0, help="Worker processes (default: one per core; 0 runs in this process).")
-    ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A running Dask scheduler, such as tcp://127.0.0.1:8786.")
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     restart: Annotated[
         bool, typer.Option("--restart", help="Overwrite a store built from a different recipe.")
     ] = False,
@@ -122,9 +107,7 @@ def build(
     agreed: Annotated[
         bool, typer.Option("--yes", help="Build even if it needs more than is free (disk, memory), or over 1 TB.")
     ] = False,
-    insecure: Annotated[
-        bool, typer.Option("--insecure", help="Allow an unencrypted connection to a remote scheduler.")
-    ] = False,
+    insecure: Insecure = False,
     mixed_versions: Annotated[
         bool,
         typer.Option("--mixed-versions", help="Resume with other versions of numeric libraries; mark those frames."),
@@ -144,8 +127,6 @@ def build(
     from sonarsynth.cli import printing
     from sonarsynth.recipe import reading
 
-    if scheduler is not None and workers is not None:
-        raise BadOption("--workers starts processes on this machine, --scheduler uses a running cluster: give only one")
     bounds = worker_bounds(workers, scheduler, frame_timeout, worker_memory, insecure)
     chosen = product_names(products)
     source = reading.read(recipe, settings)
@@ -187,9 +168,7 @@ def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_P
     from sonarsynth.recipe import reading
 
     chosen = product_names(products)
-    source = reading.read(recipe, settings)
-    made_from = reading.recipe_of(source)
-    with reading.locating(source), printing.planning():
+    with reading.opened(recipe, settings) as made_from, printing.planning():
         planned = planning.plan(made_from, chosen)
     with printing.planning("timing frames"):
         prediction = schedule.predict(planned, prepared=time.process_time())
@@ -280,9 +259,8 @@ def snap(
     from sonarsynth.pictures import snap_pictures
     from sonarsynth.recipe import reading
 
-    source = reading.read(recipe, settings)
-    with reading.locating(source):
-        file, comparison = snap_pictures.draw_snap(reading.recipe_of(source), out, compare)
+    with reading.opened(recipe, settings) as made_from:
+        file, comparison = snap_pictures.draw_snap(made_from, out, compare)
     if comparison is not None:
         typer.echo(comparison.summary())
     typer.echo(str(file))

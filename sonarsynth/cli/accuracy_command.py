@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
+from sonarsynth.cli.options import Json, Settings
 from sonarsynth.cli.running import BadOption
 
 if TYPE_CHECKING:
@@ -32,9 +33,7 @@ def accuracy(
     extremes: Annotated[
         bool, typer.Option("--extremes", help="Run stiff and extreme cases of every stage instead.")
     ] = False,
-    settings: Annotated[
-        list[str], typer.Option("--set", metavar="PATH=VALUE", help="Override a field of the recipe. Repeatable.")
-    ] = [],  # noqa: B006 - typer copies it
+    settings: Settings = [],  # noqa: B006 - typer copies it
     frames: Annotated[
         str | None,
         typer.Option(
@@ -49,12 +48,12 @@ def accuracy(
         int | None, typer.Option(min=0, help="Redraw the random frames with this seed; keep the planner's choices.")
     ] = None,
     peers: Annotated[
-        bool, typer.Option(help="Also run other programs for comparison: the thesis's loop, FINUFFT, Acoular.")
+        bool, typer.Option(help="Also run other programs for comparison: the thesis's loop, Acoular.")
     ] = True,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the table and the picture.")] = Path(
         "accuracy"
     ),
-    as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Measure errors against slow, exact computations, and run times; exits 1 if any error exceeds its bound.
 

@@ -6,9 +6,11 @@ from typing import Annotated
 
 import typer
 
+from sonarsynth.cli.options import Store
+
 
 def card(
-    store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
+    store: Store,
     out: Annotated[
         str | None, typer.Option(metavar="FOLDER", help="Where to write the two files. Default: beside the store.")
     ] = None,

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from sonarsynth.cli.options import Settings
 from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import frame_numbers
 
@@ -46,10 +47,7 @@ def export(
             metavar="AXES", help="sonar, world, or the name of a target: its points fall together. Default: sonar."
         ),
     ] = None,
-    settings: Annotated[
-        list[str],
-        typer.Option("--set", metavar="PATH=VALUE", help="Override a field of the recipe (bellhop). Repeatable."),
-    ] = [],  # noqa: B006 - typer copies it
+    settings: Settings = [],  # noqa: B006 - typer copies it
 ) -> None:
     """Write what other programs read: of a store its points as one cloud, images and boxes for COCO, or signals and
     beams in the convention SONAR-netCDF4; of a recipe the water for Bellhop. Says what is lost.
@@ -133,10 +131,9 @@ def _bellhop(recipe: Path, out: Path | None, frames: str | None, settings: list[
     from sonarsynth.export import write_bellhop
     from sonarsynth.recipe import reading
 
-    source = reading.read(recipe, settings)
-    made_from = reading.recipe_of(source)
-    folder, notes = _new(out or Path(f"{recipe.stem}.bellhop")), dict[str, None]()
-    with reading.locating(source):
+    notes = dict[str, None]()
+    with reading.opened(recipe, settings) as made_from:
+        folder = _new(out or Path(f"{recipe.stem}.bellhop"))
         numbers = frame_numbers(frames or "0:1", made_from.frames) or ()
         plan = planning.plan(made_from)
         for index in numbers:

@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
+from sonarsynth.cli.options import RecipeFile, Settings
 from sonarsynth.cli.running import BadOption
 
 
 def rays(
-    recipe: Annotated[Path, typer.Argument(help="The recipe, a YAML file.", show_default=False)],
+    recipe: RecipeFile,
     out: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Where to write the pictures. Default: <recipe>.rays.")
     ] = None,
@@ -20,23 +21,14 @@ def rays(
         Path | None,
         typer.Option(metavar="FILE", help="Arrivals (.arr) that Bellhop made of what `export --to bellhop` wrote."),
     ] = None,
-    settings: Annotated[
-        list[str],
-        typer.Option(
-            "--set",
-            metavar="PATH=VALUE",
-            help="Override a field of the recipe, such as scene.trajectory.frames=8. Repeatable.",
-        ),
-    ] = [],  # noqa: B006 - typer copies it
+    settings: Settings = [],  # noqa: B006 - typer copies it
 ) -> None:
     """Draw eigenrays, or what the recipe's `rays:` asks for: a section, a 3-D view, and an interactive HTML page."""
     from sonarsynth import planning
     from sonarsynth.pictures.ray_pictures import show_rays
     from sonarsynth.recipe import reading
 
-    source = reading.read(recipe, settings)
-    made_from = reading.recipe_of(source)
-    with reading.locating(source):
+    with reading.opened(recipe, settings) as made_from:
         if frame >= made_from.frames:
             raise BadOption(f"--frame {frame} is outside 0..{made_from.frames - 1}")
         plan = planning.plan(made_from)

@@ -8,21 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sonarsynth.cli.running import BadOption
-from sonarsynth.cli.worker_options import worker_bounds
+from sonarsynth.cli.options import Insecure, Json, Scheduler, Store, Workers, worker_bounds
 
 if TYPE_CHECKING:
     from sonarsynth.schedule.repairing import RepairReport
 
 
 def repair(
-    store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
-    workers: Annotated[
-        int | None, typer.Option(min=0, help="Worker processes (default: one per core; 0 runs in this process).")
-    ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A running Dask scheduler, such as tcp://127.0.0.1:8786.")
-    ] = None,
+    store: Store,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     force: Annotated[
         bool, typer.Option("--force", help="Repair even if another version built it; reports differences.")
     ] = False,
@@ -31,17 +26,13 @@ def repair(
         typer.Option(metavar="FOLDER", help="Folder of the files that the recipe names; no file outside it is opened."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Only compare files with their digests.")] = False,
-    insecure: Annotated[
-        bool, typer.Option("--insecure", help="Allow an unencrypted connection to a remote scheduler.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    insecure: Insecure = False,
+    as_json: Json = False,
 ) -> None:
     """Rebuild damaged parts of a store from the recipe in it. Files that do not belong there are moved out."""
     from sonarsynth.cli import printing
     from sonarsynth.schedule.repairing import repair as run
 
-    if scheduler is not None and workers is not None:
-        raise BadOption("--workers starts processes on this machine, --scheduler uses a running cluster: give only one")
     worker_bounds(workers, scheduler, None, None, insecure)
     with printing.progress() as progress:
         report = run(

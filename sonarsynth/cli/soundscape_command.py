@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from sonarsynth.cli.options import Json, Settings
 from sonarsynth.cli.running import BadOption
 
 SHORTEST, LONGEST = 0.05, 120.0
@@ -40,10 +41,8 @@ def soundscape(
     files: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Where the files are that a store's recipe names.")
     ] = None,
-    settings: Annotated[
-        list[str], typer.Option("--set", metavar="PATH=VALUE", help="Override a field of the recipe. Repeatable.")
-    ] = [],  # noqa: B006 - typer copies it
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON.")] = False,
+    settings: Settings = [],  # noqa: B006 - typer copies it
+    as_json: Json = False,
 ) -> None:
     """Draw what the hydrophones hear of the sea, beside its models: spectrum, loud arrivals, amplitudes, directions,
     coherence, gaps. A recording can be put beside it."""
@@ -65,9 +64,8 @@ def soundscape(
         pascals = _pascals(full_scale, sensitivity)
         beside = SeaRecording(compare, pascals, channel, dataset, sampling_frequency)
     if Path(source).is_file():
-        read = reading.read(Path(source), settings)
-        with reading.locating(read), printing.planning("making sound"):
-            drawn = pictures.soundscape_of_recipe(reading.recipe_of(read), seconds, beside)
+        with reading.opened(Path(source), settings) as made_from, printing.planning("making sound"):
+            drawn = pictures.soundscape_of_recipe(made_from, seconds, beside)
     elif Path(source).suffix.lower() in {".yaml", ".yml"}:
         raise BadOption(f"{source}: no such file")
     elif settings:

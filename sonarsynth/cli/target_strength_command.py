@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from sonarsynth.cli.options import Json
 from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import described
 
@@ -46,7 +47,7 @@ def target_strength(
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the table and the picture.")] = Path(
         "target_strength"
     ),
-    as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Monostatic target strength over aspect and frequency, in dB re 1 m2: a table (CSV) and a polar plot."""
     import numpy as np

@@ -10,7 +10,7 @@ from typing import Any
 from sonarsynth.frontiers.exact_frame import ExactFrame, exact_frame, synthesis_check
 from sonarsynth.frontiers.full_frame import FullFrame, whole_points
 from sonarsynth.frontiers.image_knobs import image_points, range_points
-from sonarsynth.frontiers.peer_rows import image_peers, synthesis_peers
+from sonarsynth.frontiers.peers import image_peers
 from sonarsynth.frontiers.picking_knobs import picking_points
 from sonarsynth.frontiers.rows import Point, Verdict, finite, merged
 from sonarsynth.frontiers.signal_knobs import speckle_points, synthesis_points
@@ -132,8 +132,7 @@ def _frame(base: Plan, index: int, hydrophones: int | None, say: Say, *, peers: 
     points += picking_points(plan, frame, arrivals, full.beamformed)
     if peers:
         say(f"frame {index}: peers")
-        points += synthesis_peers(plan, frame, arrivals.seen_from_centre)  # peers know no shade
-        points += image_peers(plan, frame, arrivals.seen_from_centre, full.beamformed)
+        points += image_peers(plan, frame, arrivals.seen_from_centre, full.beamformed)  # peers know no shade
     say(f"frame {index}: everything exact")
     spent = full.seconds + sum(
         p.seconds for p in points if p.chosen and p.stage not in ("synthesis", "reverberation", "picking")

@@ -13,11 +13,10 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
-from sonarsynth.products import Arrivals
-from sonarsynth.receiver import Elements
+from sonarsynth.planning.choosing import pressures
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.signals import DirectSum, GriddedSynthesis, Synthesis
+from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.auto_synthesis import deposit_for
 from sonarsynth.validation.references.frames.frame_pressure import FramePressure
 
@@ -172,18 +171,6 @@ def spread(live: Ints, count: int) -> Ints:
     """So many of the live hydrophones, spread by golden ratio, ascending; not those that a planner measures at."""
     turns = np.mod((np.arange(count) + 0.23) * 0.6180339887498949, 1.0)
     return np.unique(live[np.floor(turns * len(live)).astype(int)])
-
-
-def pressures(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: Synthesis) -> Pressures:
-    """Echoes and direct arrivals (element, sample) in Pa, each by itself."""
-    start, samples = frame_start(plan, frame), plan.windows.samples
-    sonar, snaps = plan.scene.sonar, frame.moment.snaps
-    received = []
-    for kind in (~arrivals.direct, arrivals.direct):
-        arguments = arrivals.select(kind), snaps, elements, sonar, plan.absorption, start, samples
-        unrounded = getattr(method, "pressure", None)
-        received.append(unrounded(*arguments)[0] if unrounded is not None else method.signals(*arguments).pressure)
-    return np.asarray(received[0], float), np.asarray(received[1], float)
 
 
 def differences(measured: Sequence[Floats], exact: Sequence[Floats]) -> tuple[float, float]:

@@ -24,10 +24,10 @@ from sonarsynth.frontiers.exact_frame import (
     each_hydrophone,
     exact_plan,
     golden,
-    pressures,
 )
 from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.planning import Plan, arrivals_of, frame_start
+from sonarsynth.planning.choosing import pressures
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Straight
 from sonarsynth.receiver.subarrays import Subarray, subarrays

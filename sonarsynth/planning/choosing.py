@@ -27,6 +27,7 @@ from sonarsynth.receiver import Elements
 from sonarsynth.receiver.subarrays import subarray, subarrays
 from sonarsynth.recipe import Accuracy
 from sonarsynth.recipe.scene import Frame, Scene
+from sonarsynth.signals import Synthesis
 from sonarsynth.signals.auto_synthesis import deposit_for
 from sonarsynth.state import OcclusionPoint
 
@@ -235,7 +236,8 @@ class PerSensorReference:
         rows = []
         for channel in sensor:
             single = subarray(plan.elements, np.array([channel]))
-            rows.append(_pressures(plan, frame, sampled_arrivals(every, frame, single), single.elements))
+            arrivals = sampled_arrivals(every, frame, single)
+            rows.append(pressures(plan, frame, arrivals, single.elements, _measuring(plan)))
         return PerSensorReference(
             plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows]))
         )
@@ -247,17 +249,17 @@ class PerSensorReference:
         negligible = faint * chosen.negligible
         choices = replace(chosen, subarrays=count, occlusion=occlusion, negligible=negligible)
         plan = replace(self.plan, choices=choices)
-        pressures = tuple(np.zeros_like(x) for x in self.exact)
+        received = tuple(np.zeros_like(x) for x in self.exact)
         for part in subarrays(self.plan.elements, count):
             rows = np.flatnonzero(np.isin(self.sensor, part.sensor))
             if len(rows):
                 own = np.searchsorted(part.sensor, self.sensor[rows])
                 arrivals = sampled_arrivals(plan, self.frame, part).for_sensors(own, part.elements.count)
-                heard = _pressures(plan, self.frame, arrivals, part.elements.select(own))
-                for out, pressure in zip(pressures, heard, strict=True):
+                of_part = pressures(plan, self.frame, arrivals, part.elements.select(own), _measuring(plan))
+                for out, pressure in zip(received, of_part, strict=True):
                     out[rows] = pressure
         sizes = [float(np.linalg.norm(x)) for x in self.exact]
-        errors = [float(np.linalg.norm(a - b)) for a, b in zip(pressures, self.exact, strict=True)]
+        errors = [float(np.linalg.norm(a - b)) for a, b in zip(received, self.exact, strict=True)]
         return max((e / size for e, size in zip(errors, sizes, strict=True) if size > 0.0), default=0.0)
 
 
@@ -268,13 +270,20 @@ def heard_at(elements: Elements) -> Ints:
     return np.unique(live[np.floor(np.mod((np.arange(count) + 0.5) * 0.6180339887498949, 1.0) * len(live)).astype(int)])
 
 
-def _pressures(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements) -> tuple[Floats, Floats]:
+def _measuring(plan: Plan) -> Synthesis:
+    """The synthesis that measures."""
+    return deposit_for(DEGREE_TOLERANCE * plan.recipe.accuracy.cheap)
+
+
+def pressures(
+    plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: Synthesis
+) -> tuple[Floats, Floats]:
     """Echoes and direct arrivals (sensor, sample) in Pa, each by itself, of given arrivals."""
-    method = deposit_for(DEGREE_TOLERANCE * plan.recipe.accuracy.cheap)
     start, samples = frame_start(plan, frame), plan.windows.samples
     sonar, snaps = plan.scene.sonar, frame.moment.snaps
-    echoes, direct = (
-        method.pressure(arrivals.select(mask), snaps, elements, sonar, plan.absorption, start, samples)[0]
-        for mask in (~arrivals.direct, arrivals.direct)
-    )
-    return echoes, direct
+    received = []
+    for mask in (~arrivals.direct, arrivals.direct):
+        arguments = arrivals.select(mask), snaps, elements, sonar, plan.absorption, start, samples
+        unrounded = getattr(method, "pressure", None)
+        received.append(unrounded(*arguments)[0] if unrounded is not None else method.signals(*arguments).pressure)
+    return np.asarray(received[0], float), np.asarray(received[1], float)

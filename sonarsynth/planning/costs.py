@@ -1,7 +1,7 @@
 """What a plan costs: rows that `sonarsynth plan` prints.
 
 Each method says what it costs (`Method.cost`): counts of work times seconds per unit of work, measured on one core of a
-2-core AVX-512 machine (`tools/bench frame`), here scaled by how fast this machine does a fixed set of transforms. What
+2-core AVX-512 machine (`tools/bench build`), here scaled by how fast this machine does a fixed set of transforms. What
 no method owns is counted here. No frame is made: `schedule.predicting` makes some, and knows better.
 """
 

@@ -1,4 +1,4 @@
-"""Benchmarks against peers and against the slow exact way, as JSON or a table: `tools/bench frame` and others."""
+"""Benchmarks against peers and against the slow exact way, as JSON or a table: `tools/bench build` and others."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import sys
 from importlib import import_module
 
 BENCHMARKS = (
-    "frame",
     "build",
     "scheduling",
     "reading",

@@ -51,9 +51,7 @@ def recipe_table(
     """Walk the knobs of a recipe, write <out>/<recipe>.json and .png, print the table; raises typer.Exit(1) where a
     verdict is not good."""
     count = _hydrophones(hydrophones)
-    source = reading.read(recipe, settings)
-    made_from = reading.recipe_of(source)
-    with reading.locating(source):
+    with reading.opened(recipe, settings) as made_from:
         chosen = frame_numbers(frames, made_from.frames)
         measured = measure(made_from, chosen, hydrophones=count, seed=seed, peers=peers, say=_say)
     _say("")

@@ -8,17 +8,17 @@ from typing import Annotated
 
 import typer
 
+from sonarsynth.cli.options import Json, RecipeFile, Settings
+
 
 def preview(
-    recipe: Annotated[Path, typer.Argument(help="The recipe, a YAML file.", show_default=False)],
+    recipe: RecipeFile,
     out: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Where to write the pictures. Default: <recipe>.preview.")
     ] = None,
     sequences: Annotated[int, typer.Option(min=1, metavar="N", help="Look at so many sequences at most.")] = 1000,
-    settings: Annotated[
-        list[str], typer.Option("--set", metavar="PATH=VALUE", help="Override a field of the recipe. Repeatable.")
-    ] = [],  # noqa: B006 - typer copies it
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON.")] = False,
+    settings: Settings = [],  # noqa: B006 - typer copies it
+    as_json: Json = False,
 ) -> None:
     """Draw what a recipe would make, without sound: its scenes, and distributions of ranges, angles and views.
 
@@ -28,11 +28,8 @@ def preview(
     from sonarsynth.pictures.preview_figures.preview_pictures import draw_preview
     from sonarsynth.recipe import reading
 
-    source = reading.read(recipe, settings)
-    with reading.locating(source), printing.progress("reading files") as progress:
-        files, numbers = draw_preview(
-            reading.recipe_of(source), out or Path(f"{recipe.stem}.preview"), sequences, progress
-        )
+    with reading.opened(recipe, settings) as made_from, printing.progress("reading files") as progress:
+        files, numbers = draw_preview(made_from, out or Path(f"{recipe.stem}.preview"), sequences, progress)
     if as_json:
         typer.echo(json.dumps(numbers, indent=2, allow_nan=False))
         return

@@ -7,18 +7,17 @@ from typing import Annotated
 
 import typer
 
+from sonarsynth.cli.options import Split, Store
 from sonarsynth.cli.selecting import described
 
 
 def detect(
-    store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
+    store: Store,
     method: Annotated[
         str,
         typer.Option(metavar="METHOD", help="peaks, cfar, or one with settings: '{kind: peaks, threshold: 6 dB}'."),
     ] = "peaks",
-    split: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Only these frames: train, validation or test.")
-    ] = None,
+    split: Split = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Where to write. Default: <store>.<method>.json.", show_default=False),

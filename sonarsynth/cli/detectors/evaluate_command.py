@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sonarsynth.cli.options import Json, Split, Store
 from sonarsynth.cli.running import BadOption
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def evaluate(
-    store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
+    store: Store,
     predictions: Annotated[
         str | None,
         typer.Argument(
@@ -26,10 +27,8 @@ def evaluate(
     also: Annotated[
         str | None, typer.Option("--predictions", metavar="FILE|truth", help="The same, as an option.")
     ] = None,
-    split: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Only these frames: train, validation or test.")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
+    split: Split = None,
+    as_json: Json = False,
 ) -> None:
     """Judge detections by the truth of a store: average precision, detection against false alarms, errors."""
     from sonarsynth import evaluation

@@ -7,9 +7,11 @@ from typing import Annotated
 
 import typer
 
+from sonarsynth.cli.options import Store
+
 
 def report(
-    store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
+    store: Store,
     out: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Where to write: a file or a folder. Default: <store>.report.html."),

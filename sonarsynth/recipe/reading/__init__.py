@@ -33,6 +33,7 @@ __all__ = [
     "load",
     "loads",
     "locating",
+    "opened",
     "read",
     "recipe_of",
     "schema",
@@ -109,6 +110,15 @@ def locating(source: Source) -> Iterator[None]:
         raise source.error(error.path, error.message) from None
     except MemoryError:
         raise RecipeError(source.name, "", "", "needs more memory than there is") from None
+
+
+@contextmanager
+def opened(path: Path | str, sets: Sequence[str] = ()) -> Iterator[Recipe]:
+    """A recipe of a file, and settings over it; a FieldError meanwhile names file, line and field, as `locating` has
+    it. Raises RecipeError."""
+    source = read(path, sets)
+    with locating(source):
+        yield recipe_of(source)
 
 
 def dump(recipe: Recipe) -> str:

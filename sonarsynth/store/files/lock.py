@@ -65,7 +65,7 @@ def lock(store: Folder | str, *, wait: float = WAIT, lease: float = LEASE, renew
     finally:
         ended.set()
         keeper.join(timeout=renewed)
-        with suppress(Unreachable, OSError, Mismatch, StoreLocked):
+        with suppress(Unreachable, OSError, Mismatch):
             if holder(store) == name:
                 _give_back(store, file)
 
@@ -103,9 +103,13 @@ def shared_lock(store: Folder | str, build: str) -> Iterator[Callable[[], None]]
             raise BuildEnded(f"{store}: the build that this shard is for has ended")
 
     still()
-    with nullcontext() if isinstance(file, Remote) else _locked(store, file, fcntl.LOCK_SH):
-        still()
-        yield still
+    try:
+        with nullcontext() if isinstance(file, Remote) else _locked(store, file, fcntl.LOCK_SH):
+            still()
+            yield still
+    finally:
+        if isinstance(file, Path) and _read(file)[0] == b"":
+            _remove(store, file)
 
 
 def _take(store: Folder, file: Folder, name: str, wait: float, lease: float) -> None:
@@ -148,8 +152,13 @@ def _give_back(store: Folder, file: Folder) -> None:
         file.unlink(missing_ok=True)
         return
     os.truncate(file, 0)
-    with _locked(store, file, fcntl.LOCK_EX) as handle:
-        if not os.pread(handle, 1, 0):  # nobody has taken it since
+    _remove(store, file)
+
+
+def _remove(store: Folder, file: Path) -> None:
+    """Remove a file without a claim, unless somebody shares it, or takes it just then."""
+    with suppress(StoreLocked), _locked(store, file, fcntl.LOCK_EX) as handle:
+        if not os.pread(handle, 1, 0):
             file.unlink()
 
 

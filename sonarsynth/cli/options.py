@@ -1,11 +1,34 @@
-"""Options of `build` about workers: what they may take, and where their scheduler may be."""
+"""Arguments and options that several commands have, and what cannot be of those about workers."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
 
 from sonarsynth.cli.running import BadOption
+
+RecipeFile = Annotated[Path, typer.Argument(help="The recipe, a YAML file.", show_default=False)]
+Store = Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)]
+Settings = Annotated[
+    list[str],
+    typer.Option(
+        "--set",
+        metavar="PATH=VALUE",
+        help="Override a field of the recipe, such as scene.trajectory.frames=8. Repeatable.",
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Split = Annotated[str | None, typer.Option(metavar="NAME", help="Only these frames: train, validation or test.")]
+Workers = Annotated[
+    int | None, typer.Option(min=0, help="Worker processes (default: one per core; 0 runs in this process).")
+]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="A running Dask scheduler, such as tcp://127.0.0.1:8786.")
+]
+Insecure = Annotated[bool, typer.Option("--insecure", help="Allow an unencrypted connection to a remote scheduler.")]
 
 LEAST_GB, MOST_GB = 0.3, 1e6
 
@@ -14,6 +37,8 @@ def worker_bounds(
     workers: int | None, scheduler: str | None, timeout: float | None, memory_gb: float | None, insecure: bool
 ) -> dict[str, Any]:
     """Arguments of schedule.build. Raises BadOption for what cannot be."""
+    if scheduler is not None and workers is not None:
+        raise BadOption("--workers starts processes on this machine, --scheduler uses a running cluster: give only one")
     if timeout is not None:
         if not math.isfinite(timeout):
             raise BadOption(f"--frame-timeout {timeout} is not a number of seconds")
