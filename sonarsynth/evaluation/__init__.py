@@ -8,7 +8,7 @@ import xarray as xr
 
 from sonarsynth.detection import beam_width
 from sonarsynth.evaluation.brightest_beams import brightest_beam_on_target
-from sonarsynth.evaluation.checks import Check, every, numbered
+from sonarsynth.evaluation.checks import every, numbered
 from sonarsynth.evaluation.cloud_scores import cloud_scores
 from sonarsynth.evaluation.detectors import TRUTH, DetectorReport, evaluate
 from sonarsynth.evaluation.error_bounds import bounds, signals_whole, warnings
@@ -22,6 +22,7 @@ from sonarsynth.evaluation.point_checks import kinds, points, range_errors
 from sonarsynth.evaluation.snr_checks import signal_to_noise
 from sonarsynth.evaluation.source_estimates import snap_located
 from sonarsynth.evaluation.target_checks import labels_of_targets
+from sonarsynth.store.checking.check_rows import Check
 
 __all__ = [
     "EXPANSION_AMPLITUDE",

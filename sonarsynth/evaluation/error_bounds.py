@@ -9,10 +9,11 @@ import numpy as np
 import xarray as xr
 
 from sonarsynth.detection import beam_width
-from sonarsynth.evaluation.checks import Check, every, numbered
+from sonarsynth.evaluation.checks import every, numbered
 from sonarsynth.evaluation.point_checks import has_labels, points, range_errors
 from sonarsynth.evaluation.source_estimates import snap_located
 from sonarsynth.store import Folder, Remote, folder_of
+from sonarsynth.store.checking.check_rows import Check
 from sonarsynth.store.files.place import opens
 
 FRAMES, FRAMES_REMOTE, ROWS = 200, 24, 20_000_000

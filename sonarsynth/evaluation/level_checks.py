@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from sonarsynth.evaluation.checks import Check, SmallVariables, every, numbered
+from sonarsynth.evaluation.checks import SmallVariables, every, numbered
 from sonarsynth.products import LINK_BUDGET
+from sonarsynth.store.checking.check_rows import Check
 
 LINK_BUDGET_TOLERANCE = 0.1  # dB
 

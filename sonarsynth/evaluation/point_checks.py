@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from sonarsynth.evaluation.checks import Check, numbered, other_sounds
+from sonarsynth.evaluation.checks import numbered, other_sounds
 from sonarsynth.evaluation.source_estimates import STRANGERS
 from sonarsynth.products import FAMILIES, ORIGINS
+from sonarsynth.store.checking.check_rows import Check
 
 OUTLIERS = 0.01
 """Share of the points that may be further off than three predicted errors; one may be whatever their number."""

@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 
 from sonarsynth.conventions import Floats
-from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, numbered, of_frame
+from sonarsynth.evaluation.checks import SmallVariables, blocks, numbered, of_frame
+from sonarsynth.store.checking.check_rows import Check
 
 PARTS = ("chorus", "reverberation", "noise", "electronics")
 ROUNDING = 0.01

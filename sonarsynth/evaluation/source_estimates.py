@@ -11,11 +11,12 @@ import xarray as xr
 from sonarsynth.conventions import azimuth_elevation
 from sonarsynth.conventions import direction as towards
 from sonarsynth.detection import beam_width
-from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, every, numbered, other_sounds
+from sonarsynth.evaluation.checks import SmallVariables, blocks, every, numbered, other_sounds
 from sonarsynth.evaluation.level_checks import snaps_heard
 from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS
 from sonarsynth.receiver.mirror_images import mirror_image, plane_normal
+from sonarsynth.store.checking.check_rows import Check
 
 NAME, EXPECTED = "snap located", "within 3 predicted errors in 95 %"
 NEAR = 14.16

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from sonarsynth.evaluation.checks import Check, blocks, numbered
+from sonarsynth.evaluation.checks import blocks, numbered
 from sonarsynth.geometry import Pose
+from sonarsynth.store.checking.check_rows import Check
 
 ROUNDING = 1e-9
 """m of corners, degrees of boxes, and pixels."""

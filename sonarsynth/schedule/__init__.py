@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, fields, replace
 from typing import Final
 
@@ -13,7 +12,6 @@ from sonarsynth.description.memory import free_bytes
 from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.reading import Source
-from sonarsynth.schedule.build_log import append_lines, read_lines, write_lines
 from sonarsynth.schedule.build_report import BuildProgress, BuildReport, Progress
 from sonarsynth.schedule.disk_space import DiskRoom, TooLarge, check_space, told_when_full
 from sonarsynth.schedule.making import brief, job_of, make_shards, reachable_by_workers, usable_cores, with_shards_of
@@ -21,6 +19,7 @@ from sonarsynth.schedule.predicting import Prediction, predict
 from sonarsynth.schedule.tasks import Failure
 from sonarsynth.store import Damage, Folder, Mismatch, cards, provenance
 from sonarsynth.store.creating import plain_recipe, spelled
+from sonarsynth.store.files.json_lines import append_lines, read_lines, write_lines
 
 __all__ = ["BuildReport", "Failure", "Prediction", "Progress", "TooLarge", "brief", "build", "predict", "usable_cores"]
 
@@ -116,10 +115,10 @@ def build(
         report.failures = [earlier[frame] for frame in sorted(skipped)]
         _tidy(path, lacking, earlier, restart)
         course = BuildProgress(path, report, len(lacking), progress, announce)
-        with course.logged(plan), _dashboard(dashboard):
+        with course.logged(plan):
             job = job_of(path, plan, name, frame_timeout)
             make_shards(
-                job, plan, todo, course.done, scheduler=scheduler, memory=worker_memory,
+                job, plan, todo, course.done, scheduler=scheduler, memory=worker_memory, dashboard=dashboard,
                 workers=_processes(workers, plan, todo, frame_timeout or worker_memory or dashboard),
                 started=course.started, lost=course.lost,
             )  # fmt: skip
@@ -161,14 +160,6 @@ def _processes(workers: int | None, plan: Plan, todo: Mapping[int, tuple[int, ..
     """Worker processes: none for one brief shard, unless something is asked that only they do."""
     alone = workers is None and not asked and len(todo) == 1 and brief(plan, *todo.values())
     return 0 if alone else workers
-
-
-def _dashboard(shown: bool) -> AbstractContextManager[None]:
-    if not shown:
-        return nullcontext()
-    from sonarsynth.schedule import connecting
-
-    return connecting.dashboard_shown()
 
 
 def _as_begun(path: Folder, plan: Plan) -> Plan:

@@ -8,17 +8,23 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
 
 from sonarsynth import store
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import tasks
-from sonarsynth.schedule.build_log import Log, append_lines
 from sonarsynth.schedule.tasks import Failure, WrittenShard
 from sonarsynth.store import Folder
+from sonarsynth.store.files.json_lines import append_lines
 
 Progress = Callable[[int, int, int], None]
 """Called with the frames done, the frames to do, and the frames that failed, as shards are written."""
+
+
+PROGRESS_EVERY: Final = 10.0
+"""Seconds between two events `progress` of the log."""
 
 
 @dataclass
@@ -67,6 +73,28 @@ class BuildReport:
     def as_json(self) -> dict[str, Any]:
         """The report for a program."""
         return {**asdict(self), "ok": self.ok}
+
+
+class Log:
+    """The log of a build: JSON lines beside the store, one an event, each with the time (UTC)."""
+
+    def __init__(self, file: Path) -> None:
+        self.file, self.began = file, time.monotonic()
+        self.said = self.began
+
+    def event(self, event: str, **facts: Any) -> None:
+        """Add an event."""
+        now = datetime.now(UTC).isoformat(timespec="milliseconds")
+        append_lines(self.file, [{"time": now, "event": event, **facts}])
+
+    def progress(self, done: int, total: int, failed: int) -> None:
+        """Say how far it is, now and then."""
+        now = time.monotonic()
+        if now - self.said >= PROGRESS_EVERY:
+            self.said = now
+            rate = (done + failed) / (now - self.began)
+            eta = (total - done - failed) / rate if rate else None
+            self.event("progress", done=done, of=total, failed=failed, frames_per_second=rate, seconds_left=eta)
 
 
 class BuildProgress:

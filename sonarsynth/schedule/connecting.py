@@ -16,7 +16,6 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from contextvars import ContextVar
 from multiprocessing import forkserver, resource_tracker
 from typing import Any, Final
 from urllib.parse import urlsplit
@@ -65,18 +64,6 @@ HEAP: Final = 0.9
 
 NO_PAGES: Final[dict[str, Any]] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
 """Settings of a cluster without a dashboard."""
-
-_dashboard: ContextVar[bool] = ContextVar("dashboard", default=False)
-
-
-@contextmanager
-def dashboard_shown() -> Iterator[None]:
-    """Clusters that are started meanwhile have Dask's dashboard: HTTP on 127.0.0.1, for every user of the machine."""
-    before = _dashboard.set(True)
-    try:
-        yield
-    finally:
-        _dashboard.reset(before)
 
 
 class NoPages(WorkerPlugin):
@@ -144,10 +131,13 @@ def _loopback(host: str) -> bool:
 
 
 @contextmanager
-def connected(workers: int, scheduler: str | None = None, memory: int | None = None) -> Iterator[Client]:
+def connected(
+    workers: int, scheduler: str | None = None, memory: int | None = None, dashboard: bool = False
+) -> Iterator[Client]:
     """A client of the scheduler at an address, or of `workers` fresh processes on this machine (loopback only, TLS).
 
-    Each of these may take `memory` bytes (None: its share of the machine's). Raises NoScheduler.
+    Each of these may take `memory` bytes (None: its share of the machine's); with `dashboard`, Dask's is shown, HTTP on
+    127.0.0.1 for every user of the machine. Raises NoScheduler.
     """
     logging.getLogger("asyncio").addFilter(waited_for)
     if scheduler is not None:
@@ -155,14 +145,13 @@ def connected(workers: int, scheduler: str | None = None, memory: int | None = N
             yield client
         return
     limit = memory or MEMORY_LIMIT // max(workers, 1)
-    shown = _dashboard.get()
-    with dask.config.set(_SETTINGS | ({} if shown else NO_PAGES)):
+    with dask.config.set(_SETTINGS | ({} if dashboard else NO_PAGES)):
         with _interrupts_put_off() as interrupted:
             try:
-                cluster = _local_cluster(workers, limit, shown)
+                cluster = _local_cluster(workers, limit, dashboard)
             except RuntimeError:  # a worker was killed while it started; or none can, and the second says so
-                cluster = _local_cluster(workers, limit, shown)
-            kind: Any = Client if shown else _Client
+                cluster = _local_cluster(workers, limit, dashboard)
+            kind: Any = Client if dashboard else _Client
             client = kind(cluster, set_as_default=False)
         patience = CLOSING_IN_HASTE
         try:

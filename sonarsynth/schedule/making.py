@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Callable, Collection, Mapping
@@ -14,7 +13,7 @@ from sonarsynth.planning import MANY_FRAMES, Plan
 from sonarsynth.schedule import tasks, worker_status
 from sonarsynth.schedule.tasks import Job, WrittenShard
 from sonarsynth.store import Folder, Remote, Unreachable
-from sonarsynth.store.files.place import read
+from sonarsynth.store.files.place import read_json
 
 PATIENCE: Final = 600.0
 """Seconds that a stage of a frame may always take (a first one compiles), and a worker to start again."""
@@ -44,9 +43,9 @@ def with_shards_of(path: Folder, plan: Plan, attributes: Mapping[str, Any]) -> P
     if type(frames) is not int or not 0 < frames <= MANY_FRAMES:
         return plan
     try:
-        metadata: Any = json.loads(read(path, f"{store.layout_of(plan).arrays[0].path}/zarr.json"))
+        metadata = read_json(path, f"{store.layout_of(plan).arrays[0].path}/zarr.json")
         laid: Any = metadata["chunk_grid"]["configuration"]["chunk_shape"][0]
-    except (OSError, ValueError, KeyError, TypeError, IndexError, RecursionError):
+    except (KeyError, TypeError, IndexError):
         return plan
     return replace(plan, shard_frames=frames) if laid == frames else plan
 
@@ -73,6 +72,7 @@ def make_shards(
     workers: int | None = None,
     scheduler: str | None = None,
     memory: int | None = None,
+    dashboard: bool = False,
     started: Callable[[int, str], None] = lambda workers, dashboard: None,
     lost: Callable[[str, str], None] = lambda worker, why: None,
 ) -> None:
@@ -91,7 +91,7 @@ def make_shards(
     from sonarsynth.schedule import cluster, connecting
 
     count = min(usable_cores() if workers is None else workers, len(todo))
-    with connecting.connected(count, scheduler, memory) as client:
+    with connecting.connected(count, scheduler, memory, dashboard) as client:
         started(len(client.nthreads()), client.dashboard_link or "")
         cluster.run(client, job, todo, done, lost, math.inf if scheduler else PATIENCE)
 

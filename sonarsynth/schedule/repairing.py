@@ -10,7 +10,6 @@ from typing import Any
 from sonarsynth import planning, store
 from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, choices_from
-from sonarsynth.schedule.build_log import append_lines
 from sonarsynth.schedule.build_report import Progress
 from sonarsynth.schedule.making import job_of, make_shards, reachable_by_workers, with_shards_of
 from sonarsynth.schedule.tasks import Failure, WrittenShard
@@ -21,6 +20,7 @@ from sonarsynth.store.checking.recipe_files import files_of, recipe_with
 from sonarsynth.store.checking.restoring import drop_empty_folders, frames_written, move_out, obstacles, restore
 from sonarsynth.store.creating import identity, plain_recipe, spelled
 from sonarsynth.store.files import scratch
+from sonarsynth.store.files.json_lines import append_lines
 from sonarsynth.store.files.place import there
 from sonarsynth.store.layout import layout_of
 from sonarsynth.store.marks import MARKS, Damage, Mark, all_files, load_layout, load_mark

@@ -6,7 +6,6 @@ the root last. What has the mark and neither metadata nor marks of shards was ne
 
 from __future__ import annotations
 
-import json
 import os
 import tempfile
 import warnings
@@ -24,7 +23,7 @@ from sonarsynth.pipeline import attributes, coordinates
 from sonarsynth.recipe.reading import RecipeError, dump
 from sonarsynth.recipe.reading.yaml_source import read_text
 from sonarsynth.store.array_metadata import fixed_array, framed_array
-from sonarsynth.store.files.place import Folder, Opened, absolute, read, record, records, upload
+from sonarsynth.store.files.place import Folder, Opened, absolute, read_json, record, records, upload
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.scratch import clear, hidden, made, sweep
 from sonarsynth.store.files.within import Mismatch
@@ -150,10 +149,7 @@ def root_attributes(path: Folder | str) -> dict[str, Any]:
 
 def attributes_in(store: Opened) -> dict[str, Any]:
     """The same of a store that is open."""
-    try:
-        attributes = json.loads(read(store, "zarr.json"))["attributes"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return {}
+    attributes = read_json(store, "zarr.json").get("attributes")
     return attributes if isinstance(attributes, dict) else {}
 
 

@@ -20,7 +20,17 @@ import google_crc32c
 import numpy as np
 
 from sonarsynth.store.files import place
-from sonarsynth.store.files.place import FileRecord, Folder, Opened, entries, read, read_each, remove, write_in
+from sonarsynth.store.files.place import (
+    FileRecord,
+    Folder,
+    Opened,
+    entries,
+    read,
+    read_each,
+    read_json,
+    remove,
+    write_in,
+)
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import parts_of
 
@@ -129,11 +139,11 @@ def marked(store: Folder) -> list[int]:
 
 def _marks_asked_for(store: Remote) -> list[int]:
     """The same where nothing can be listed: every shard that there may be is asked for."""
+    root = read_json(store, "zarr.json")
     try:
-        root = json.loads(read(store, "zarr.json"))
         frames = root["consolidated_metadata"]["metadata"]["frame"]["shape"][0]
         shards = -(-int(frames) // int(root["attributes"]["shard_frames"]))
-    except (OSError, ValueError, KeyError, TypeError, IndexError, ZeroDivisionError):
+    except (ValueError, KeyError, TypeError, IndexError, ZeroDivisionError):
         return []
     return [number for number, mark in load_marks(store, range(shards)) if mark is not None]
 

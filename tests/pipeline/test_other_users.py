@@ -76,7 +76,7 @@ def ports() -> set[int]:
 
 
 def test_a_dashboard_is_there_where_it_is_asked_for() -> None:
-    with connecting.dashboard_shown(), connecting.connected(1) as connected:
+    with connecting.connected(1, dashboard=True) as connected:
         page = connected.dashboard_link.replace("/status", "/health")
         assert urllib.request.urlopen(page).read() == b"ok"
 

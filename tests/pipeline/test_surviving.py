@@ -26,7 +26,7 @@ from sonarsynth import store
 from sonarsynth.planning import Plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule import TooLarge, build, connecting, disk_space
-from sonarsynth.schedule.build_log import read_lines
+from sonarsynth.store.files.json_lines import read_lines
 from tests.waiting import wait_until
 
 FAULTS = """\

@@ -19,7 +19,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from sonarsynth.recipe.variation.values import Where
+from sonarsynth.recipe.variation.values import Where, put
 
 MAX_BYTES: Final = 2_000_000
 MAX_VALUES: Final = 50_000
@@ -118,28 +118,16 @@ def override(source: Source, setting: str) -> Source:
     node = _compose(text, source.name, SET, path.strip())
     value = None if node is None else reader.value(node, keys)
     places = {w: p for w, p in source.places.items() if w[: len(keys)] != keys}
+    try:
+        data = put(source.data, keys, value)
+    except LookupError as error:
+        raise RecipeError(source.name, SET, dotted(keys), error.args[0]) from None
     return replace(
         source,
-        data=_replaced(source, source.data, keys, 0, value),
+        data=data,
         places=places | reader.places | {keys: SET},
         settings=(*source.settings, setting),
     )
-
-
-def _replaced(source: Source, data: Any, keys: Where, depth: int, value: Any) -> Any:
-    """`data` with the value at keys[depth:] replaced; missing mappings on the way are added."""
-    if depth == len(keys):
-        return value
-    key = keys[depth]
-    if isinstance(data, list):
-        if not isinstance(key, int) or key >= len(data):
-            raise RecipeError(source.name, SET, dotted(keys), f"'{key}' is not one of the {len(data)} entries from 0")
-        return [_replaced(source, v, keys, depth + 1, value) if i == key else v for i, v in enumerate(data)]
-    if data is None or isinstance(data, dict):
-        data = data or {}
-        text = str(key)
-        return data | {text: _replaced(source, data.get(text), keys, depth + 1, value)}
-    raise RecipeError(source.name, SET, dotted(keys), f"'{dotted(keys[:depth])}' has no fields")
 
 
 @lru_cache(maxsize=16)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 import types
@@ -12,19 +11,17 @@ from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import TypeAdapter, ValidationError
-from pydantic_core import ErrorDetails
 
 from sonarsynth.conventions import Unit
 from sonarsynth.description import FieldError, named_files
 from sonarsynth.receiver import Sonar
+from sonarsynth.recipe.field_messages import error_message, error_path, members, unknown
 from sonarsynth.recipe.scene import Scene, Trajectory, World
-from sonarsynth.recipe.variation.values import Plain, Where, where
+from sonarsynth.recipe.variation.values import Plain, Where, put, where
 
 _SCENE: TypeAdapter[Scene] = TypeAdapter(Scene)
-_PARTS: dict[str, TypeAdapter[Any]] = {
-    "world": TypeAdapter(World),
-    "trajectory": TypeAdapter(Trajectory),
-    "sonar": TypeAdapter(Sonar),
+_PARTS: dict[str, tuple[type, TypeAdapter[Any]]] = {
+    name: (kind, TypeAdapter(kind)) for name, kind in (("world", World), ("trajectory", Trajectory), ("sonar", Sonar))
 }
 
 
@@ -75,78 +72,32 @@ def with_settings(scene: Scene, plain: dict[str, Any], settings: Sequence[Settin
     by_path = [(where(path), setting) for setting in settings for path in setting.paths]
     for path, setting in sorted(by_path, key=lambda item: len(item[0])):
         try:
-            data = put(data, path, setting.value.value)
+            data = put(data, path, setting.value.value, unknown)
         except LookupError as error:
             at = setting.source[:-2] if "values" in setting.source else setting.source
             raise FieldError((*at, "path"), f"{'.'.join(map(str, path))}: {error.args[0]}") from None
     changed = {}
-    for name in {path[1] for path, _ in by_path}:
+    for name in {str(path[1]) for path, _ in by_path}:
         try:
-            changed[str(name)] = _PARTS[str(name)].validate_json(json.dumps(data["scene"][name]), strict=True)
+            changed[name] = _PARTS[name][1].validate_json(json.dumps(data["scene"][name]), strict=True)
         except ValidationError as error:
-            raise _explained(error, data, ("scene", name), by_path) from None
+            raise _explained(error, name, data["scene"][name], by_path) from None
     return replace(scene, **changed)
 
 
-def put(data: Any, path: Where, value: Any, depth: int = 0) -> Any:
-    """`data` with the value at path[depth:] replaced. Raises LookupError where the path leads nowhere."""
-    if depth == len(path):
-        return value
-    key = path[depth]
-    if isinstance(data, list):
-        if not isinstance(key, int) or key >= len(data):
-            raise LookupError(f"'{key}' is not one of the {len(data)} entries from 0")
-        return [put(v, path, value, depth + 1) if i == key else v for i, v in enumerate(data)]
-    if data is None or isinstance(data, dict):
-        name, data = str(key), data or {}
-        if data and name not in data and not (depth == len(path) - 1 or data.get("kind")):
-            raise LookupError(_unknown(name, data))
-        return data | {name: put(data.get(name), path, value, depth + 1)}
-    raise LookupError(f"'{'.'.join(map(str, path[:depth]))}' has no fields")
-
-
-def _unknown(name: str, fields: dict[str, Any]) -> str:
-    close = difflib.get_close_matches(name, fields, n=1, cutoff=0.5)
-    return f"'{name}' is not a field here; " + (
-        f"did you mean '{close[0]}'?" if close else f"known: {', '.join(fields)}"
-    )
-
-
-def _explained(error: ValidationError, data: Any, top: Where, by_path: Sequence[tuple[Where, Setting]]) -> FieldError:
-    """The first error of a validation, with the setting that is to blame: the one that sets most of its path."""
+def _explained(error: ValidationError, part: str, data: Any, by_path: Sequence[tuple[Where, Setting]]) -> FieldError:
+    """The first error of the validation of a part of a scene, with the setting that is to blame: the one that sets most
+    of its path."""
     errors = error.errors(include_url=False)  # a misspelt field explains a missing one
     details = next((d for d in errors if d["type"] == "unexpected_keyword_argument"), errors[0])
-    path, node = list(top), data[top[0]][top[1]]
-    for n, key in enumerate(details["loc"]):
-        named = isinstance(node, dict) and key in node and node.get("kind") != key
-        last = n == len(details["loc"]) - 1
-        if named or (isinstance(node, list) and isinstance(key, int) and key < len(node)):
-            node = node[key]
-        elif not (last and details["type"] in ("missing", "unexpected_keyword_argument")):
-            continue
-        path.append(key)
-    field = tuple(path)
+    keys, message = error_message(details, error_path(details, data), _PARTS[part][0], data)
+    field = ("scene", part, *keys)
 
     def shared(item: tuple[Where, Setting]) -> int:
         return next((n for n, (a, b) in enumerate(zip(item[0], field, strict=False)) if a != b), len(item[0]))
 
     setting = max(by_path, key=lambda item: (shared(item) == len(item[0]), shared(item)))[1]
-    return FieldError(setting.source, f"{'.'.join(map(str, field))}: {_text(details, data, field)} ({setting.shown})")
-
-
-def _text(details: ErrorDetails, data: Any, path: Where) -> str:
-    match details["type"]:
-        case "value_error":
-            return str(details.get("ctx", {})["error"])
-        case "missing":
-            return "is required"
-        case "unexpected_keyword_argument":
-            for key in path[:-1]:
-                data = data[key]
-            return _unknown(str(path[-1]), {name: None for name in data if name != path[-1]})
-    text = details["msg"].replace("Input should be", "must be").replace("String should", "must")
-    shown = Plain.of(details["input"]).shown if details["type"] != "union_tag_not_found" else "a value without kind"
-    return f"{text[0].lower()}{text[1:]}, not {shown}"
+    return FieldError(setting.source, f"{'.'.join(map(str, field))}: {message} ({setting.shown})")
 
 
 def value_at(scene: Scene, path: str) -> Any:
@@ -177,22 +128,14 @@ def _with(annotation: Any, metadata: list[Any]) -> Any:
 
 def _member(kind: Any, index: int, size: int) -> Any:
     """The annotation of a member of a tuple of this size."""
-    for option in _options(kind):
-        members = get_args(option)
-        if get_origin(option) is tuple and members:
-            if members[-1] is Ellipsis:
-                return members[0]
-            if len(members) == size:
-                return members[index]
+    for option in members(kind):
+        inner = get_args(option)
+        if get_origin(option) is tuple and inner:
+            if inner[-1] is Ellipsis:
+                return inner[0]
+            if len(inner) == size:
+                return inner[index]
     return None
-
-
-def _options(kind: Any) -> list[Any]:
-    if get_origin(kind) is Annotated:
-        return _options(get_args(kind)[0])
-    if get_origin(kind) in (Union, types.UnionType):
-        return [option for member in get_args(kind) for option in _options(member)]
-    return [kind]
 
 
 def _unit(kind: Any) -> Unit | None:

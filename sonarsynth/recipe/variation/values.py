@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, is_dataclass
 from typing import Annotated, Any
 
@@ -159,6 +160,29 @@ def as_drawn(path: str) -> str:
     """The path of what varies in the words that its random draws are keyed by: those of the first version."""
     path = re.sub(r"^scene\.world\.sources\b", "scene.world.shrimp", path)
     return re.sub(r"^scene\.world\.environment\.bottom\b", "scene.world.environment.bed", path)
+
+
+def put(
+    data: Any, path: Where, value: Any, unknown: Callable[[str, Iterable[str]], str] | None = None, depth: int = 0
+) -> Any:
+    """`data` with the value at path[depth:] replaced; mappings that are missing on the way are added.
+
+    unknown: says that a name is not among others, of the last but one at most, where no mapping may be added. Raises
+    LookupError where the path leads nowhere.
+    """
+    if depth == len(path):
+        return value
+    key = path[depth]
+    if isinstance(data, list):
+        if not isinstance(key, int) or key >= len(data):
+            raise LookupError(f"'{key}' is not one of the {len(data)} entries from 0")
+        return [put(v, path, value, unknown, depth + 1) if i == key else v for i, v in enumerate(data)]
+    if data is None or isinstance(data, dict):
+        name, data = str(key), data or {}
+        if unknown and data and name not in data and not (depth == len(path) - 1 or data.get("kind")):
+            raise LookupError(unknown(name, data))
+        return data | {name: put(data.get(name), path, value, unknown, depth + 1)}
+    raise LookupError(f"'{'.'.join(map(str, path[:depth]))}' has no fields")
 
 
 def _name(value: Any) -> str:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from sonarsynth.store import Folder, Remote, beside, must_be_store, root_attributes
-from sonarsynth.store.files.place import FileRecord, read, read_beside
+from sonarsynth.store.files.json_lines import read_lines
+from sonarsynth.store.files.place import FileRecord, read_json
 from sonarsynth.store.marks import Damage, Mark, load_layout, load_marks, marked
 
 
@@ -158,7 +159,7 @@ def facts_of(store: Folder) -> Facts:
 
 def _arrays(store: Folder) -> tuple[Array, ...]:
     try:
-        members = json.loads(read(store, "zarr.json"))["consolidated_metadata"]["metadata"]
+        members = read_json(store, "zarr.json")["consolidated_metadata"]["metadata"]
         arrays = [
             Array(
                 path, tuple(m.get("dimension_names") or ()), tuple(m["shape"]), _type(m["data_type"]), m["attributes"]
@@ -166,7 +167,7 @@ def _arrays(store: Folder) -> tuple[Array, ...]:
             for path, m in members.items()
             if m["node_type"] == "array"
         ]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (KeyError, TypeError, AttributeError):
         raise Damage(f"{store}: zarr.json is missing or damaged: 'sonarsynth repair' restores it") from None
     return tuple(sorted(arrays, key=lambda a: (a.group, a.path)))
 
@@ -178,16 +179,9 @@ def _type(name: Any) -> str:
 def _failed(store: Folder) -> dict[str, int]:
     """Frames that failed, counted by the kind of what went wrong."""
     last: dict[int, str] = {}
-    try:
-        lines = read_beside(beside(store, "failed.jsonl")).decode("utf-8", errors="replace").splitlines()
-    except OSError:
-        return {}
-    for line in lines:
-        try:
-            row = json.loads(line)
+    for row in read_lines(beside(store, "failed.jsonl")):
+        with suppress(ValueError, KeyError, TypeError):
             last[int(row["frame"])] = f"{row['stage']}: {str(row['error']).partition(':')[0]}"
-        except (ValueError, KeyError, TypeError):
-            continue
     return dict(Counter(last.values()))
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 from sonarsynth.store.creating import root_attributes
-from sonarsynth.store.files.place import FileRecord, Folder, entries, is_folder, read, records, there
+from sonarsynth.store.files.place import FileRecord, Folder, entries, is_folder, read_json, records, there
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.marks import (
@@ -124,11 +123,11 @@ def frame_count(path: Folder) -> int:
     """Frames of the dataset, by the metadata of the array `frame` or the copy in the root's; 0 where both are lost."""
     for file, inside in (("frame/zarr.json", ()), ("zarr.json", ("consolidated_metadata", "metadata", "frame"))):
         try:
-            metadata: Any = json.loads(read(path, file))
+            metadata: Any = read_json(path, file)
             for name in inside:
                 metadata = metadata[name]
             return int(metadata["shape"][0])
-        except (OSError, ValueError, KeyError, TypeError, IndexError, RecursionError):
+        except (ValueError, KeyError, TypeError, IndexError):
             continue
     return 0
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
+from sonarsynth.store.checking.check_rows import Check
 from sonarsynth.store.checking.examining import Findings, Problem, Progress, by_shard, examine, frame_count, ranges
 from sonarsynth.store.checking.reading_back import read_back, structure
 from sonarsynth.store.files.lock import held_by
@@ -16,39 +17,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class CheckRow(Protocol):
-    """One line of a check of truth against data; `ok` is None where there was nothing to check."""
-
-    @property
-    def name(self) -> str:
-        """What is checked."""
-
-    @property
-    def expected(self) -> str:
-        """What should be."""
-
-    @property
-    def got(self) -> str:
-        """What is."""
-
-    @property
-    def ok(self) -> bool | None:
-        """Whether it is as it should be."""
-
-    @property
-    def numbers(self) -> Mapping[str, float]:
-        """The numbers behind it."""
-
-    @property
-    def frames(self) -> tuple[int, ...]:
-        """Frames that are not as they should be, where that can be said of a frame."""
-
-    @property
-    def warning(self) -> str:
-        """One line where data are of no use though they are what they claim; else empty."""
-
-
-Check = Callable[["xr.DataTree"], Sequence[CheckRow]]
+Checking = Callable[["xr.DataTree"], Sequence[Check]]
+"""A check of what a store says twice."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +31,7 @@ class Report:
     files: int  # that were compared
     bytes: int
     problems: tuple[Problem, ...]
-    checks: tuple[CheckRow, ...]
+    checks: tuple[Check, ...]
     quick: bool = False  # True where only files were compared
     building: str = ""  # who built it meanwhile; then what is not complete yet is no damage, and no check was run
 
@@ -112,7 +82,7 @@ class Report:
 
 
 def verify(
-    path: Folder | str, checks: Sequence[Check] = (), *, quick: bool = False, progress: Progress | None = None
+    path: Folder | str, checks: Sequence[Checking] = (), *, quick: bool = False, progress: Progress | None = None
 ) -> Report:
     """Compare marks, digests and files of a store, read every number back, and run checks on what it says.
 
@@ -179,7 +149,7 @@ def _lasting(problem: Problem, findings: Findings, changed: set[str]) -> bool:
     return bool(name) and name not in changed
 
 
-def _run(path: Folder, checks: Sequence[Check]) -> list[CheckRow]:
+def _run(path: Folder, checks: Sequence[Checking]) -> list[Check]:
     import xarray as xr
 
     if not checks:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import json
 import os
 import re
 import stat
@@ -125,6 +126,15 @@ def read(folder: Opened, name: str) -> bytes:
     if len(content) > MOST_METADATA:
         raise OSError(errno.EFBIG, f"is larger than {MOST_METADATA >> 20} MiB", f"{folder}/{name}")
     return content
+
+
+def read_json(folder: Opened, name: str) -> dict[str, Any]:
+    """A file of metadata that holds a mapping; {} where there is none that can be read."""
+    try:
+        document = json.loads(read(folder, name))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return document if isinstance(document, dict) else {}
 
 
 def read_each(folder: Folder, names: Iterable[str]) -> Iterator[tuple[str, bytes | OSError]]:

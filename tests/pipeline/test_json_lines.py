@@ -1,10 +1,10 @@
-"""The log of a build and the lists beside the store."""
+"""The lists beside a store."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from sonarsynth.schedule.build_log import append_lines, read_lines
+from sonarsynth.store.files.json_lines import append_lines, read_lines
 
 
 def test_lines_cut_off_by_a_crash_are_left_out(tmp_path: Path) -> None:
