@@ -26,18 +26,9 @@ from sonarsynth.recipe.rising_bottom import with_relief
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import Splits, assign
 from sonarsynth.recipe.variation.grid import Axis, Zip, axes
-from sonarsynth.recipe.variation.random_variations import Choice, Sobol, Variation
+from sonarsynth.recipe.variation.random_variations import Choice, Sobol, Variation, as_drawn
 from sonarsynth.recipe.variation.setting import Setting, Stamps, file_stamps, mesh_files, plain_scene, with_settings
-from sonarsynth.recipe.variation.values import (
-    FRAMES,
-    MOST_FRAMES,
-    Plain,
-    Where,
-    as_drawn,
-    default_name,
-    leads_through,
-    where,
-)
+from sonarsynth.recipe.variation.values import FRAMES, MOST_FRAMES, Plain, Where, default_name, leads_through, where
 
 MOST_SEQUENCES = 1_000_000
 NOTHING = Plain.of(None)

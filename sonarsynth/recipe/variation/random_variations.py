@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Literal
 
 import numpy as np
@@ -18,7 +19,6 @@ from sonarsynth.recipe.variation.values import (
     Plain,
     PlainValue,
     Quantity,
-    as_drawn,
     number_and_unit,
     same_unit,
     with_unit,
@@ -28,6 +28,12 @@ LEAST_SHARE = 1e-12
 """A normal distribution must have so much of itself between its bounds."""
 FAR = 4.0
 """Standard deviations that stand for the end of a normal distribution without a bound."""
+
+
+def as_drawn(path: str) -> str:
+    """The path of what varies in the words that its random draws are keyed by: those of the first version."""
+    path = re.sub(r"^scene\.world\.sources\b", "scene.world.shrimp", path)
+    return re.sub(r"^scene\.world\.environment\.bottom\b", "scene.world.environment.bed", path)
 
 
 @description

@@ -156,12 +156,6 @@ def where(path: str) -> Where:
     return tuple(int(key) if key.isdecimal() else key for key in path.split("."))
 
 
-def as_drawn(path: str) -> str:
-    """The path of what varies in the words that its random draws are keyed by: those of the first version."""
-    path = re.sub(r"^scene\.world\.sources\b", "scene.world.shrimp", path)
-    return re.sub(r"^scene\.world\.environment\.bottom\b", "scene.world.environment.bed", path)
-
-
 def put(
     data: Any, path: Where, value: Any, unknown: Callable[[str, Iterable[str]], str] | None = None, depth: int = 0
 ) -> Any:
