@@ -206,6 +206,11 @@ def picked(mask: Bools) -> Ints | slice:
     return slice(None) if len(rows) == len(mask) else rows
 
 
+def evenly(count: int, limit: int) -> list[int]:
+    """At most `limit` of the numbers 0 to count - 1, evenly spread, both ends among them."""
+    return sorted({int(n) for n in np.linspace(0, count - 1, min(limit, count)).round()})
+
+
 def counted(number: int, noun: str) -> str:
     """A number of things: "1 frame", "2 frames"."""
     return f"{number} {noun}" + ("" if number == 1 else "s")

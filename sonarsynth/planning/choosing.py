@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Floats, Ints, evenly
 from sonarsynth.description.method import Demand
 from sonarsynth.planning.choices import OF_BEAMS, OWN_VIEW, Choices
 from sonarsynth.planning.listening_windows import frame_start
@@ -121,11 +121,10 @@ def _facets(scene: Scene) -> int:
 def _measured_in(looks: Sequence[SampledScene], count: int) -> list[SampledScene]:
     """Frames of the dataset to measure in, one a look: of different sequences, and along them."""
     real = [look for look in looks if look.real]
-    chosen = [real[n] for n in np.unique(np.linspace(0, len(real) - 1, count).round().astype(int))]
+    chosen = [real[n] for n in evenly(len(real), count)]
     if len(chosen) < count or count == 1:
         frames = chosen[0].frames
-        wanted = np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))
-        return [replace(chosen[0], frames=(frames[n],)) for n in wanted]
+        return [replace(chosen[0], frames=(frames[n],)) for n in evenly(len(frames), count)]
     return [replace(look, frames=(look.frames[n * (len(look.frames) - 1) // 2],)) for n, look in enumerate(chosen)]
 
 

@@ -16,7 +16,6 @@ from sonarsynth.equations.rays.ray_solutions import mean_slowness, water
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.planning.measured.ray_bending import unlike_straight
 from sonarsynth.planning.measured.sampled_frames import SampledScene
-from sonarsynth.planning.notes.scene_checks import CORNERS
 from sonarsynth.planning.plans import Plan, PulseDurations, Windows
 from sonarsynth.planning.pulse_durations import blur_of, supports_of
 from sonarsynth.products import Paths
@@ -229,9 +228,7 @@ def _reflected(frame: Frame, profile: Profile, bottom_depth: float, bounces: int
     The length of a path by image sources is convex in the point that it meets, so a corner of the box is the farthest.
     """
     straight, array = Straight(bounces=bounces), frame.sonar_pose.position
-    low_high = [(b.pose, b.mesh.box) for b in frame.moment.bodies]
-    corners = [p.to_world(low + CORNERS * (high - low)) for p, (low, high) in low_high]
-    points = np.concatenate([np.empty((0, 3)), *corners])
+    points = np.concatenate([np.empty((0, 3)), *(body.box for body in frame.moment.bodies)])
     points[:, 2] = np.clip(points[:, 2], -bottom_depth, 0.0)
     back = straight.connect(profile, bottom_depth, points, np.broadcast_to(array, points.shape))
     direct, echoes = [], []

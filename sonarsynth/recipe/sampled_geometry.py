@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, azimuth_elevation, counted
+from sonarsynth.conventions import Bools, Floats, Ints, azimuth_elevation, counted, evenly
 from sonarsynth.description import FieldError
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -128,7 +128,7 @@ def sample_geometry(
     drawn = [p.category(n) for p in world.populations for n in range(len(p.models))]
     groups = list(dict.fromkeys([*(group_of(target) for target in world.targets), *drawn]))
     rows: list[tuple[float, ...]] = []
-    frames = [(int(n), step) for n in chosen for step in _even(recipe.steps(n), count)]
+    frames = [(int(n), step) for n in chosen for step in evenly(recipe.steps(n), count)]
     for number, frame in enumerate(frames):
         scene = recipe.scene_of(frame[0])
         for name, values in _targets_of(scene, frame_of(recipe, scene, *frame)):
@@ -146,11 +146,6 @@ def sample_geometry(
         groups=tuple(groups),
         columns=dict(zip(QUANTITIES, table[:, 2:].T, strict=True)),
     )
-
-
-def _even(count: int, limit: int) -> list[int]:
-    """At most `limit` of 0 to count - 1, evenly spaced, both ends among them."""
-    return [int(n) for n in np.unique(np.linspace(0, count - 1, min(count, limit)).astype(int))]
 
 
 def spread(count: int, limit: int) -> Ints:
@@ -193,7 +188,7 @@ def _targets_of(scene: Scene, frame: Frame) -> list[tuple[str, tuple[float, ...]
 def _visible(body: PlacedTarget, others: list[PlacedTarget], sonar: Pose, beams: BeamGrid) -> float:
     """Share of the facing area in the spans of the beams and not behind the boxes of others, by some facets."""
     mesh = body.mesh
-    facets = np.unique(np.linspace(0, len(mesh.faces) - 1, FACETS).astype(int))
+    facets = evenly(len(mesh.faces), FACETS)
     points = body.pose.to_world(mesh.centroid[facets])
     facing = np.einsum("ij,ij->i", sonar.position - points, body.pose.turn_to_world(mesh.normal[facets])) > 0.0
     area = np.where(facing, mesh.area[facets], 0.0)

@@ -16,7 +16,6 @@ from sonarsynth.ranging.placing.solution import isovelocity_solution
 from sonarsynth.receiver import elements
 from sonarsynth.recipe.scene import Frame, Scene
 
-CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 SHARE = 0.3
 """Of the error allowed to signals that straight rays may take."""
 
@@ -89,11 +88,8 @@ def unlike_straight(model: Propagation, frame: Frame, profile: Profile, bottom: 
 
 def around(frame: Frame, bottom: float) -> Floats:
     """Corners and middles (point, xyz) of the boxes round the bodies of a frame, in the water."""
-    blocks = [np.empty((0, 3))]
-    for body in frame.moment.bodies:
-        low, high = body.mesh.box
-        blocks += [body.pose.to_world(low + np.vstack([CORNERS, [0.5, 0.5, 0.5]]) * (high - low))]
-    points = np.concatenate(blocks)
+    boxes = [body.box for body in frame.moment.bodies]
+    points = np.concatenate([np.empty((0, 3)), *(np.vstack([box, box.mean(axis=0)]) for box in boxes)])
     points[:, 2] = np.clip(points[:, 2], -bottom, 0.0)
     return points
 

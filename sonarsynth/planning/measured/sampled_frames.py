@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 
-import numpy as np
-
+from sonarsynth.conventions import evenly
 from sonarsynth.description import FieldError
 from sonarsynth.environment.sea import Profile
 from sonarsynth.planning.notes.scene_checks import check_frame, check_shrimp, read_inputs
@@ -60,22 +59,17 @@ def sampled_frames(recipe: Recipe) -> dict[int, list[int]]:
     if recipe.frames <= MAX_SAMPLED_FRAMES:
         return {sequence: list(range(recipe.steps(sequence))) for sequence in range(count)}
     frames_each = min(max(MAX_SAMPLED_FRAMES // count, 2), int(recipe.spanned.steps.max()))
-    sequences = _spread(count, MAX_SAMPLED_FRAMES // frames_each)
-    return {sequence: _spread(recipe.steps(sequence), frames_each) for sequence in sequences}
-
-
-def _spread(count: int, limit: int) -> list[int]:
-    """At most so many of 0 to count - 1, evenly spread, both ends among them."""
-    return sorted({int(n) for n in np.linspace(0, count - 1, min(limit, count)).round()})
+    sequences = evenly(count, MAX_SAMPLED_FRAMES // frames_each)
+    return {sequence: evenly(recipe.steps(sequence), frames_each) for sequence in sequences}
 
 
 def _ends(recipe: Recipe) -> Iterator[SampledScene]:
     """Scenes with each variation at its ends: they bound the windows, and need not be good."""
-    for sequence in _spread(recipe.sequences, SEQUENCE_SAMPLES):
+    for sequence in evenly(recipe.sequences, SEQUENCE_SAMPLES):
         for scene in recipe.spanned.extremes(sequence):
             try:
                 profile = read_inputs(scene)
-                frames = tuple(scene.frame(step) for step in _spread(scene.trajectory.frames, 3))
+                frames = tuple(scene.frame(step) for step in evenly(scene.trajectory.frames, 3))
                 for frame in frames:
                     check_frame(scene, frame)
             except FieldError:

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats
+from sonarsynth.conventions import Bools, Floats, evenly
 from sonarsynth.environment.profiles import nearest
 from sonarsynth.environment.sea import Profile
 from sonarsynth.planning.measured.ray_bending import difference_of_paths, ways
@@ -65,8 +65,7 @@ def thinned(model: Propagation, recipe: Recipe, sequence: int, profile: Profile)
 
 def sampled(recipe: Recipe, sequence: int) -> list[Frame]:
     """Frames along a sequence, its first and last among them."""
-    steps = np.unique(np.linspace(0, recipe.steps(sequence) - 1, SAMPLED).round().astype(int))
-    return [recipe.frame(recipe.first_frame(sequence) + int(step))[1] for step in steps]
+    return [recipe.frame(recipe.first_frame(sequence) + n)[1] for n in evenly(recipe.steps(sequence), SAMPLED)]
 
 
 def _passed(frames: tuple[Frame, ...], bottom: float) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sonarsynth.conventions import counted
+from sonarsynth.conventions import counted, evenly
 from sonarsynth.recipe import Recipe
 
 LOOKED_AT = 1000
@@ -21,9 +21,8 @@ def population_notes(recipe: Recipe) -> list[str]:
     """
     if not recipe.described.world.populations:
         return []
-    sequences = np.unique(np.linspace(0, recipe.sequences - 1, min(recipe.sequences, LOOKED_AT)).round().astype(int))
     numbers, draws = [], 0
-    for sequence in sequences.tolist():
+    for sequence in evenly(recipe.sequences, LOOKED_AT):
         with recipe.spanned.naming(sequence):
             drawn = recipe.spanned.bodies(sequence)
         numbers.append(len(drawn.targets))

@@ -28,7 +28,6 @@ from sonarsynth.sources.sound_source import SoundSource
 from sonarsynth.state import meeting_times
 from sonarsynth.targets.meshes import mesh_of
 
-CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 FARTHEST = 1e6
 """m from the origin: beyond, travel times lose their microseconds."""
 CLOSEST = 1e-3
@@ -235,8 +234,7 @@ def check_methods(scene: Scene, products: frozenset[str]) -> None:
 
 def _box_in_water(body: PlacedTarget, bottom_depth: float) -> bool:
     """Whether the box round a body is in the water: then all of the body is."""
-    low, high = body.mesh.box
-    corners = body.pose.to_world(low + CORNERS * (high - low))
+    corners = body.box
     down = depth(corners)
     return bool(down.min() >= 0.0 and down.max() <= bottom_depth and np.abs(corners).max() <= FARTHEST)
 

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
-from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.conventions import Floats, evenly
 from sonarsynth.labels.views import box_in_view
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.products import View
@@ -21,13 +20,13 @@ from sonarsynth.targets.shapes import Box
 
 FRAMES = 64
 """Frames of a sequence that bodies are compared in, at most; first and last among them."""
-UNIT_BOX = mesh_of(Box(size=(1.0, 1.0, 1.0)))
+BOX_FACES = mesh_of(Box(size=(1.0, 1.0, 1.0))).faces
+"""Of the corners of `PlacedTarget.box`."""
 
 
 def chosen(look: SampledScene) -> tuple[Frame, ...]:
     """So many of the frames of a look, evenly spread."""
-    count = len(look.frames)
-    return tuple(look.frames[n] for n in sorted({int(n) for n in np.linspace(0, count - 1, min(count, FRAMES))}))
+    return tuple(look.frames[n] for n in evenly(len(look.frames), FRAMES))
 
 
 def law_notes(look: SampledScene) -> list[str]:
@@ -128,16 +127,10 @@ def view_notes(looks: Sequence[SampledScene]) -> list[str]:
 def _in_view(look: SampledScene, frame: Frame) -> bool:
     """Whether the box of a target is in the view of the beams, in part at least."""
     for body in frame.moment.bodies:
-        corners = frame.sonar_pose.to_body(body.pose.to_world(_corners(body)))
-        if box_in_view(corners, UNIT_BOX.faces, look.scene.sonar.beams).view <= View.PARTLY_IN_VIEW:
+        corners = frame.sonar_pose.to_body(body.box)
+        if box_in_view(corners, BOX_FACES, look.scene.sonar.beams).view <= View.PARTLY_IN_VIEW:
             return True
     return False
-
-
-def _corners(body: PlacedTarget) -> Floats:
-    """Corners (8, xyz) of the box of a body, in its own frame."""
-    low, high = body.mesh.box
-    return np.asarray(0.5 * (low + high) + UNIT_BOX.vertices * (high - low))
 
 
 def mirror_notes(look: SampledScene) -> list[str]:
@@ -154,10 +147,10 @@ def mirror_notes(look: SampledScene) -> list[str]:
         if any(float(frame.sonar_pose.to_body(snap.position) @ normal) < 0.0 for snap in frame.moment.snaps):
             snaps.append(frame.index)
         for target, body in zip(look.scene.world.targets, frame.moment.bodies, strict=True):
-            corners = frame.sonar_pose.to_body(body.pose.to_world(_corners(body)))
+            corners = frame.sonar_pose.to_body(body.box)
             if (corners @ normal >= 0.0).all():
                 continue
-            behind = UNIT_BOX.faces[(corners @ normal)[UNIT_BOX.faces].min(axis=1) < 0.0]
+            behind = BOX_FACES[(corners @ normal)[BOX_FACES].min(axis=1) < 0.0]
             if box_in_view(mirror_image(corners, normal), behind, sonar.beams).view <= View.PARTLY_IN_VIEW:
                 when.setdefault(target.name, []).append(frame.index)
     plane = "a planar array cannot tell its two sides apart"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, evenly
 from sonarsynth.description import FieldError
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh
@@ -162,7 +162,7 @@ class _Sea:
     def of(cls, scene: Scene, seed: int, key: int | str) -> _Sea:
         """The targets of the recipe, the array, and the snaps."""
         trajectory, bottom = scene.trajectory, scene.world.environment.depth
-        steps = sorted({int(n) for n in np.linspace(0, trajectory.frames - 1, min(trajectory.frames, TIMES)).round()})
+        steps = evenly(trajectory.frames, TIMES)
         times = np.array([trajectory.time(step) for step in steps])
         sonar = np.array([pose(trajectory.sonar, t).position for t in times])
         others: list[_Ball | _MovingBox] = [_Ball(sonar, 0.5 * elements(scene.sonar.array).aperture)]
