@@ -226,7 +226,11 @@ WRONG = [
     ("count: 2", "count: 3", "19: grid.1.zip: the entries have 3, 2 values; they must have equally many"),
     ("kind: sphere, radius", "kind: sphere, radios", f"23: grid.1.zip.1.values.1: {SHAPE}.radios: 'radios' is not a "),
     ("40 cm, edge", "-40 cm, edge", f"23: grid.1.zip.1.values.1: {SHAPE}.radius: must be greater than 0"),
-    ("kind: sphere, radius: 40 cm", "kind: ball", f"23: grid.1.zip.1.values.1: {SHAPE}: input tag 'ball'"),
+    (
+        "kind: sphere, radius: 40 cm",
+        "kind: ball",
+        f"23: grid.1.zip.1.values.1: {SHAPE}.kind: 'ball' is not a kind here; known: ",
+    ),
     ("low: 20 m", "low: 31 m", "25: variations.0: low must be less than high: 31 m to 30 m"),
     ("low: 20 m", "low: 20", "25: variations.0: must all have the same unit"),
     (

@@ -15,15 +15,21 @@ _YES = (("flag_values", [0, 1]), ("flag_meanings", "no yes"))
 TARGETS = group_of(
     "/truth/targets",
     "truth",
-    row("present", TARGET, "int8", "1", "whether the target is in the sequence", attributes=_YES),
-    row("category", TARGET, "int16", "1", "what a detector is to call the target"),
-    row("clutter", TARGET, "int8", "1", "whether it is there to be taken for a target, and is none", attributes=_YES),
-    row("scale", TARGET, "float64", "1", "size of the target over that of its mesh"),
-    row("mesh", TARGET, "int32", "1", "which mesh of its group it has, where there are several"),
+    row("present", TARGET, "1", "whether the target is in the sequence", dtype="int8", attributes=_YES),
+    row("category", TARGET, "1", "what a detector is to call the target", dtype="int16"),
+    row(
+        "clutter",
+        TARGET,
+        "1",
+        "whether it is there to be taken for a target, and is none",
+        dtype="int8",
+        attributes=_YES,
+    ),
+    row("scale", TARGET, "1", "size of the target over that of its mesh"),
+    row("mesh", TARGET, "1", "which mesh of its group it has, where there are several", dtype="int32"),
     row(
         "position",
         (*TARGET, "xyz"),
-        "float64",
         "m",
         "position of the target's origin in the world at the instant of the frame",
         attributes=INSTANT,
@@ -31,7 +37,6 @@ TARGETS = group_of(
     row(
         "position_at_echo",
         (*EMISSION, "target", "xyz"),
-        "float64",
         "m",
         "position of the target's origin in the world when the sound of the snap, by the direct path, met it",
         attributes=_MEETING,
@@ -39,7 +44,6 @@ TARGETS = group_of(
     row(
         "meeting_time",
         (*EMISSION, "target"),
-        "float64",
         "s",
         "time after the instant of the frame when the sound of the snap, by the direct path, met the target's origin",
         attributes=_MEETING,
@@ -47,40 +51,31 @@ TARGETS = group_of(
     row(
         "orientation",
         (*TARGET, "wxyz"),
-        "float64",
         "1",
         "unit quaternion from the target's frame to the world",
         attributes=INSTANT,
     ),
-    row("velocity", (*TARGET, "xyz"), "float64", "m s-1", "velocity of the target in the world"),
+    row("velocity", (*TARGET, "xyz"), "m s-1", "velocity of the target in the world"),
     row(
-        "box",
-        (*TARGET, "corner", "xyz"),
-        "float64",
-        "m",
-        "corners of the oriented bounding box, sonar frame",
-        attributes=INSTANT,
+        "box", (*TARGET, "corner", "xyz"), "m", "corners of the oriented bounding box, sonar frame", attributes=INSTANT
     ),
     row(
         "box_centre",
         (*TARGET, "xyz"),
-        "float64",
         "m",
         "centre of the oriented bounding box, sonar frame",
         attributes=comment("corners of box, first to last: centre + R (+-size/2), R of box_orientation, z fastest"),
     ),
-    row("box_size", (*TARGET, "xyz"), "float64", "m", "size of the oriented bounding box along the target's axes"),
+    row("box_size", (*TARGET, "xyz"), "m", "size of the oriented bounding box along the target's axes"),
     row(
         "box_orientation",
         (*TARGET, "wxyz"),
-        "float64",
         "1",
         "unit quaternion from the target's frame to the sonar frame, w not negative",
     ),
     row(
         "yaw",
         TARGET,
-        "float64",
         "degree",
         "azimuth that the target's bow points to, sonar frame, port positive",
         attributes=comment("0: away from the array; NaN where the bow points straight up or down in the sonar frame"),
@@ -88,7 +83,6 @@ TARGETS = group_of(
     row(
         "image_box",
         (*TARGET, "bound"),
-        "float64",
         "degree",
         "bounds in azimuth and elevation of the visible part in view, at the instant of the frame",
         attributes=comment(
@@ -99,7 +93,6 @@ TARGETS = group_of(
     row(
         "true_image_box",
         (*TARGET, "bound"),
-        "float64",
         "degree",
         "the same bounds by straight lines from the array centre: where the target is, not where it appears",
         attributes=comment("image_box where rays are straight"),
@@ -107,7 +100,6 @@ TARGETS = group_of(
     row(
         "full_box",
         (*TARGET, "bound"),
-        "float64",
         "degree",
         "bounds in azimuth and elevation of the whole target, hidden or not, in the view of the beams or not",
         attributes=comment("where the array would see it; of the part at x > 0 alone; NaN where none is there"),
@@ -115,7 +107,6 @@ TARGETS = group_of(
     row(
         "pixel_box",
         (*TARGET, "side"),
-        "float64",
         "1",
         "image_box in beams of the grid: beam (row i, column j) is at y = i + 0.5, x = j + 0.5",
         attributes=comment("x with azimuth, to port; y with elevation, up. NaN where nothing is in view, see view"),
@@ -123,23 +114,22 @@ TARGETS = group_of(
     row(
         "view",
         TARGET,
-        "int8",
         "1",
         "how much of the visible part is in the view of the beams",
+        dtype="int8",
         attributes=(("flag_values", [int(v) for v in View]), ("flag_meanings", VIEWS)),
     ),
     row(
         "in_view",
         TARGET,
-        "int8",
         "1",
         "whether any part of the target, hidden or not, is in the view of the beams",
+        dtype="int8",
         attributes=(("flag_values", [-1, 0, 1]), ("flag_meanings", "not_there no yes")),
     ),
     row(
         "truncation",
         TARGET,
-        "float64",
         "1",
         "share of the solid angle of the visible part that is outside the view of the beams",
         attributes=comment("0 in view, 1 outside it or behind; NaN where the target is hidden"),
@@ -147,7 +137,6 @@ TARGETS = group_of(
     row(
         "visible_fraction",
         TARGET,
-        "float64",
         "1",
         "share of the area facing the array that the array sees",
         attributes=comment("whether it is in the view of the beams or not"),
@@ -155,7 +144,6 @@ TARGETS = group_of(
     row(
         "lit_fraction",
         (*EMISSION, "target"),
-        "float64",
         "1",
         "share of the area that the array sees that the direct sound of the emission meets",
         attributes=comment(
@@ -166,15 +154,14 @@ TARGETS = group_of(
     row(
         "points",
         TARGET,
-        "int32",
         "1",
         "points of the cloud that are echoes of the target, by any way",
+        dtype="int32",
         product="cloud",
     ),
     row(
         "echo_azimuth",
         ECHO,
-        "float64",
         "degree",
         "azimuth that the target's echoes come from, weighted by power",
         product="levels",
@@ -182,18 +169,12 @@ TARGETS = group_of(
     row(
         "echo_elevation",
         ECHO,
-        "float64",
         "degree",
         "elevation that they come from: ghosts by surface and bottom",
         product="levels",
     ),
     row(
-        "echo_level",
-        ECHO,
-        "float64",
-        "dB",
-        "level of the target's echoes re 1 uPa, of their energy in the band",
-        product="levels",
+        "echo_level", ECHO, "dB", "level of the target's echoes re 1 uPa, of their energy in the band", product="levels"
     ),
 )
 """Poses, boxes, and what the array sees and hears of each target."""
@@ -214,16 +195,21 @@ SIGNAL_TO_NOISE = group_of(
     row(
         "snr",
         TARGET,
-        "float64",
         "dB",
         "energy of the target's echoes in its beams over that of chorus, reverberation, noise and electronics there",
         attributes=comment("echoes of other targets and the direct pulse are left out; silence counts as -200 dB"),
     ),
-    row("echo_energy", TARGET, "float64", "dB", "energy in the target's beams of its echoes", attributes=_BROUGHT),
+    row("echo_energy", TARGET, "dB", "energy in the target's beams of its echoes", attributes=_BROUGHT),
     *(
-        row(f"{name}_energy", TARGET, "float64", "dB", f"energy in the target's beams of {what}",
-            attributes=_BROUGHT, product=f"snr {name}")
+        row(
+            f"{name}_energy",
+            TARGET,
+            "dB",
+            f"energy in the target's beams of {what}",
+            attributes=_BROUGHT,
+            product=f"snr {name}",
+        )
         for name, what in _PARTS.items()
     ),
-)  # fmt: skip
+)
 """What the array hears of each target, and what else in its beams, where a scene has anything else."""

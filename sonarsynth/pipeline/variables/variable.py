@@ -50,7 +50,9 @@ def flags(meanings: tuple[str, ...]) -> tuple[tuple[str, Any], ...]:
     return (("flag_values", list(range(len(meanings)))), ("flag_meanings", words))
 
 
-def row(name: str, dims: tuple[str, ...], dtype: str, units: str, long_name: str, **more: Any) -> Variable:
+def row(
+    name: str, dims: tuple[str, ...], units: str, long_name: str, *, dtype: str = "float64", **more: Any
+) -> Variable:
     """A row of a group; whole numbers that are not written read as -1."""
     if dtype[0] in "iu" and "fill" not in more:
         more["fill"] = -1
