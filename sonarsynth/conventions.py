@@ -15,6 +15,8 @@ Instrument       the sample grid, the beam grid and the assumed sound speed belo
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
@@ -214,6 +216,15 @@ def evenly(count: int, limit: int) -> list[int]:
 def counted(number: int, noun: str) -> str:
     """A number of things: "1 frame", "2 frames"."""
     return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
+def finite_json(value: Any) -> Any:
+    """Plain JSON values: a number that is not finite, which JSON does not have, becomes null."""
+    if isinstance(value, Mapping):
+        return {str(name): finite_json(inner) for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite_json(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def format_bytes(count: float) -> str:

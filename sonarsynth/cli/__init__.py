@@ -18,10 +18,6 @@ from sonarsynth.cli.accuracy_command import accuracy
 from sonarsynth.cli.authoring.init_command import init
 from sonarsynth.cli.authoring.notebooks_command import notebooks
 from sonarsynth.cli.authoring.preview_command import preview
-from sonarsynth.cli.card_command import card
-from sonarsynth.cli.detectors.detect_command import detect
-from sonarsynth.cli.detectors.evaluate_command import evaluate
-from sonarsynth.cli.detectors.report_command import report
 from sonarsynth.cli.export_command import export
 from sonarsynth.cli.options import Insecure, Json, RecipeFile, Scheduler, Settings, Store, Workers, worker_bounds
 from sonarsynth.cli.rays_command import rays
@@ -29,6 +25,7 @@ from sonarsynth.cli.repair_command import repair
 from sonarsynth.cli.running import run
 from sonarsynth.cli.selecting import chosen_frames, product_names
 from sonarsynth.cli.soundscape_command import soundscape
+from sonarsynth.cli.store_commands import card, detect, evaluate, report
 from sonarsynth.cli.target_strength_command import target_strength
 
 if TYPE_CHECKING:

@@ -7,12 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from sonarsynth.conventions import finite_json
 from sonarsynth.frontiers.exact_frame import ExactFrame, exact_frame, synthesis_check
 from sonarsynth.frontiers.full_frame import FullFrame, whole_points
 from sonarsynth.frontiers.image_knobs import image_points, range_points
 from sonarsynth.frontiers.peers import image_peers
 from sonarsynth.frontiers.picking_knobs import picking_points
-from sonarsynth.frontiers.rows import Point, Verdict, finite, merged
+from sonarsynth.frontiers.rows import Point, Verdict, merged
 from sonarsynth.frontiers.signal_knobs import speckle_points, synthesis_points
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor, trace_points
 from sonarsynth.frontiers.verdicts import set_by_recipe, verdicts
@@ -49,7 +50,7 @@ class AccuracyReport:
         """A list of rows, for programs: points, peers and checks, then verdicts."""
         common = {"frames": list(self.frames), "recipe": self.title}
         rows = [p.as_json() for p in self.points] + [v.as_json() for v in self.verdicts]
-        return [finite(row | common) for row in rows]
+        return [finite_json(row | common) for row in rows]
 
 
 def usual_frames(frames: int) -> tuple[int, ...]:

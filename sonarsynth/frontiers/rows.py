@@ -46,9 +46,9 @@ class Point:
         return self.error <= self.allowed
 
     def as_json(self) -> dict[str, Any]:
-        """The row for programs; numbers that are none are None."""
+        """The row for programs."""
         rows = {"row": self.role} | asdict(self) | dict(self.also) | {"meets": self.meets}
-        return finite({k: v for k, v in rows.items() if k not in ("role", "also")})
+        return {k: v for k, v in rows.items() if k not in ("role", "also")}
 
 
 @dataclass(frozen=True)
@@ -74,12 +74,7 @@ class Verdict:
 
     def as_json(self) -> dict[str, Any]:
         """The row for programs."""
-        return finite({"row": "verdict"} | asdict(self) | {"ratio": self.ratio})
-
-
-def finite(row: dict[str, Any]) -> dict[str, Any]:
-    """A row with None for numbers that are not finite: JSON has none."""
-    return {k: None if isinstance(v, float) and not isfinite(v) else v for k, v in row.items()}
+        return {"row": "verdict"} | asdict(self) | {"ratio": self.ratio}
 
 
 def timed(function: Callable[[], T]) -> tuple[T, float]:

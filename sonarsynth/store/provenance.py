@@ -7,7 +7,6 @@ store was begun, is written once, and is no part of what the store is of.
 
 from __future__ import annotations
 
-import math
 import os
 import platform
 import re
@@ -20,6 +19,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from sonarsynth.conventions import finite_json
 from sonarsynth.description.named_files import digest
 from sonarsynth.environment.readers import files_of
 from sonarsynth.recipe import FILE_KINDS
@@ -72,7 +72,7 @@ def planned(plan: Plan) -> dict[str, Any]:
     for name in ("predicted_seconds", "choices", "shard_frames"):  # attributes of their own, but the first
         record.pop(name)
     record["stages"] = [{name: value for name, value in row.items() if name != "seconds"} for row in record["stages"]]
-    finite: dict[str, Any] = _finite(record)
+    finite: dict[str, Any] = finite_json(record)
     return finite
 
 
@@ -220,15 +220,6 @@ def _leading_number(text: str) -> str:
     """A version without what a builder of kernels may have added, such as a name of a company or a host."""
     match = re.match(r"[\d.]+", text)
     return match[0].rstrip(".") if match else ""
-
-
-def _finite(value: Any) -> Any:
-    """Plain JSON values: numbers that JSON does not have become null."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, Mapping):
-        return {str(name): _finite(inner) for name, inner in value.items()}
-    return [_finite(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 APART: Final = (

@@ -1,4 +1,4 @@
-"""The command `evaluate`."""
+"""Commands on a store: to describe it (`card`, `report`), to detect in it and judge what was detected."""
 
 from __future__ import annotations
 
@@ -11,9 +11,75 @@ import typer
 
 from sonarsynth.cli.options import Json, Split, Store
 from sonarsynth.cli.running import BadOption
+from sonarsynth.cli.selecting import described
+from sonarsynth.conventions import finite_json
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+
+def card(
+    store: Store,
+    out: Annotated[
+        str | None, typer.Option(metavar="FOLDER", help="Where to write the two files. Default: beside the store.")
+    ] = None,
+) -> None:
+    """Describe a store: a dataset card to read (Markdown), and Croissant metadata for programs; where there are images,
+    say what a threshold finds in 200 of them at most."""
+    from sonarsynth.evaluation.detectors.threshold_baseline import threshold_lines
+    from sonarsynth.store import built_frames, cards, folder_of, open_store
+
+    files = cards.write(store, out)
+    tree = open_store(folder_of(store))
+    for line in (*map(str, files), *threshold_lines(tree, built_frames(tree))):
+        typer.echo(line)
+
+
+def report(
+    store: Store,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where to write: a file or a folder. Default: <store>.report.html."),
+    ] = None,
+) -> None:
+    """Write a page about a store: film, contents by split, leaks between splits, errors, baselines, hardest frames."""
+    from sonarsynth.cli import printing
+    from sonarsynth.pictures.report_figures import report as write
+
+    with printing.progress("reading") as progress:
+        file, numbers = write(store, out, progress=progress)
+    for warning in numbers["warnings"]:
+        typer.echo(f"warning: {warning}")
+    typer.echo(str(file))
+
+
+def detect(
+    store: Store,
+    method: Annotated[
+        str,
+        typer.Option(metavar="METHOD", help="peaks, cfar, or one with settings: '{kind: peaks, threshold: 6 dB}'."),
+    ] = "peaks",
+    split: Split = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where to write. Default: <store>.<method>.json.", show_default=False),
+    ] = None,
+) -> None:
+    """Run a baseline detector on the images of a store: boxes, scores, ranges as JSON, the results format of COCO."""
+    from sonarsynth import detection
+    from sonarsynth.cli import printing
+    from sonarsynth.store import named_after
+
+    chosen: detection.DetectionMethod = (
+        described(method, "--method", detection.Detector)
+        if method.lstrip().startswith("{")
+        else detection.by_kind(method)
+    )
+    with printing.progress("reading") as progress:
+        detections = detection.detect(store, chosen, split=split, progress=progress)
+    beside = named_after(store)
+    file = detections.write(out or beside.with_name(f"{beside.name}.{chosen.kind}.json"))
+    typer.echo(f"{file}: {len(detections)} detections")
 
 
 def evaluate(
@@ -42,18 +108,9 @@ def evaluate(
     with printing.planning("reading"):
         figures = evaluation.evaluate(store, chosen, split=split).as_json()
     if as_json:
-        typer.echo(json.dumps(without_nan(figures), indent=2))
+        typer.echo(json.dumps(finite_json(figures), indent=2))
     else:
         _print(figures, printing.console())
-
-
-def without_nan(value: Any) -> Any:
-    """Figures with null where there is no number: JSON has no NaN."""
-    if isinstance(value, dict):
-        return {name: without_nan(item) for name, item in value.items()}
-    if isinstance(value, list):
-        return [without_nan(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _print(score: dict[str, Any], console: Console) -> None:
