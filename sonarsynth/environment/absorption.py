@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -41,6 +42,12 @@ class DepthAbsorption:
         depth = np.linspace(0.0, bottom, NODES)
         return DepthAbsorption(depth, absorption_db_per_m(absorption, frequency, depth))
 
+    @cached_property
+    def integral(self) -> Floats:
+        """(node,) dB: of the value, from the surface down."""
+        value = self.value
+        return np.append(0.0, np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(self.depth)))
+
     def along(self, profile: Profile, start: Floats, end: Floats, climb: Floats, vertices: Ints) -> Floats:
         """Mean (path,) in dB/m along rays from depths start to end (path,) m.
 
@@ -48,7 +55,7 @@ class DepthAbsorption:
         which each leaves; vertices (path,): reflections and turning points.
         """
         out = np.empty(len(start))
-        water, table = (profile.depth, profile.speed), (self.depth, self.value)
+        water, table = (profile.depth, profile.speed), (self.depth, self.value, self.integral)
         bent = not profile.uniform
         path_means.means(start, end, climb, vertices, bent, float(self.depth[-1]), water, table, out)
         return out

@@ -54,6 +54,8 @@ def at_boundaries(
 
 def as_sign(phase: Floats) -> tuple[Floats, Floats]:
     """Sign (path,) and rest of phases (path,): 0 for whole multiples of pi, else the phase between -pi and pi."""
+    if not phase.any():
+        return np.ones(phase.shape), phase
     half = np.rint(phase / np.pi)
     multiple = np.abs(phase - np.pi * half) < 1e-9
     sign = np.where(multiple & (np.mod(half, 2) == 1), -1.0, 1.0)

@@ -50,35 +50,36 @@ class Straight(PathModel):
 
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
         """One path a pair and family, 1/r; arguments and errors as in `PathModel`. Coincident ends are flagged."""
+        from sonarsynth.equations.kernels.unit_vectors import straight_rays
+
         layers = water(profile.depth, profile.speed, environment_depth)
         z1, z2 = within(layers, depth(start), "start"), within(layers, depth(end), "end")
         level = np.asarray(end, float)[:, :2] - np.asarray(start, float)[:, :2]
         if not np.isfinite(level).all():
             raise ValueError("paths need finite ends")
         speed = profile.speed[0]
-        slowness = [np.full(len(z1), 1.0 / speed)] * 3
         if not profile.uniform:
             top, bottom = np.minimum(z1, z2), np.maximum(z1, z2)
             ends = ((0.0 * top, top), (top, bottom), (bottom, 0.0 * bottom + environment_depth))
             slowness = [mean_slowness(layers, a, b) for a, b in ends]
         columns = []
         for image in images(z1, z2, environment_depth, self.bounces):
-            height = np.abs(image.climb)
-            length = np.sqrt(level[:, 0] ** 2 + level[:, 1] ** 2 + height**2)
-            heights = (image.above, image.between, image.below)
-            crossed = sum(h * s for h, s in zip(heights, slowness, strict=True))
-            mean = np.divide(crossed, height, out=slowness[1].copy(), where=height > 0)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                departure = np.column_stack([level, image.climb]) / length[:, None]
-                spreading, grazing = 1.0 / length, np.arcsin(height / length)
-            none = np.zeros(len(length), int)
+            length, departure, spreading = straight_rays(level, image.climb)
+            mean, height, none = 1.0 / speed, np.abs(image.climb), np.zeros(len(length), int)
+            if not profile.uniform:
+                heights = (image.above, image.between, image.below)
+                crossed = sum(h * s for h, s in zip(heights, slowness, strict=True))
+                mean = np.divide(crossed, height, out=slowness[1].copy(), where=height > 0)
+            grazing = np.full(len(length), np.nan)
+            if image.surface or image.bottom:
+                grazing = np.arcsin(np.divide(height, length, out=grazing, where=length > 0))
             columns.append(
                 {
                     "pair": np.arange(len(length)),
-                    "travel_time": length * (1.0 / speed if profile.uniform else mean),
+                    "travel_time": length * mean,
                     "length": length,
                     "departure": departure,
-                    "arrival": departure * [1.0, 1.0, image.turns],
+                    "arrival": departure if image.turns > 0 else departure * [1.0, 1.0, -1.0],
                     "spreading": spreading,
                     "surface": none + image.surface,
                     "bottom": none + image.bottom,

@@ -8,13 +8,13 @@ m and h those of the poses that rays were traced between,
 
     m + tau_1 = t_s + T_out + (v.a/c) tau_1,    h + tau_2 = m + tau_1 + T_in - (v.d/c) tau_1 + (u.b/c) tau_2
 
-and each leg is longer by its curvature, as a straight one of its length is (`path_elongation`), so that times are exact
-in uniform water. Directions at facet and array, and spreading, are those of the lengthened leg, exact there as well. v
-is the velocity of the facet: its body may turn, by omega tau_1 till then, and with it all that its law asks for. The
-pulse is longer by dt_2/dt_s; of a source that moves at w by 1 - w.n/c times as much, n the direction in which the ray
-leaves it. Of direct sound the source is the facet. Each sensor meets the wavefront when it is there (`_over_aperture`).
-Left out in bent water: how much more or less than straight rays the rays turn and spread for the remainder v tau_1; and
-of the pulse's length, not of its delay, that what moves is seen from another side at each sensor, v/c of the angle that
+and each leg is longer by its curvature, as a straight one of its length is (`moving_ends`), so that times are exact in
+uniform water. Directions at facet and array, and spreading, are those of the lengthened leg, exact there as well. v is
+the velocity of the facet: its body may turn, by omega tau_1 till then, and with it all that its law asks for. The pulse
+is longer by dt_2/dt_s; of a source that moves at w by 1 - w.n/c times as much, n the direction in which the ray leaves
+it. Of direct sound the source is the facet. Each sensor meets the wavefront when it is there (`_over_aperture`). Left
+out in bent water: how much more or less than straight rays the rays turn and spread for the remainder v tau_1; and of
+the pulse's length, not of its delay, that what moves is seen from another side at each sensor, v/c of the angle that
 the array takes up there: parts of the array see it from their own.
 """
 
@@ -28,6 +28,7 @@ from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.kernels.row_products import row_products
 from sonarsynth.equations.kernels.unit_vectors import moved
+from sonarsynth.equations.rays import moving_ends
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import ArrayExpansion, Arrivals
@@ -37,9 +38,6 @@ from sonarsynth.state import Emission
 from sonarsynth.tracing.expansion.probe_sensors import probes, sphere
 from sonarsynth.tracing.receive_paths import ReceivePaths
 from sonarsynth.tracing.transmit_paths import TransmitPaths
-
-ROUNDS = 3
-"""Of solving for times that depend on themselves: each leaves v/c of the error, or v t/r of that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,25 +87,14 @@ class MotionTerms:
 
 def velocities(scattering: tuple[Scatterers, ...], owner: Ints, point: Floats) -> tuple[Floats, Floats]:
     """Velocity (point, xyz) m/s of surface elements (owner of each), world, and the spin of their owner rad/s."""
-    motion, spins = np.zeros((2, len(point), 3))
-    for number, surface in enumerate(scattering):
-        owned, track = owner == number, surface.track
-        spin, velocity = track.spin, track.velocity
-        motion[owned] = velocity + np.cross(spin, point[owned] - track.pose.position) if spin.any() else velocity
-        spins[owned] = spin
+    tracks = [surface.track for surface in scattering]
+    motion, spins = (
+        np.array([getattr(t, name) for t in tracks]).reshape(-1, 3)[owner] for name in ("velocity", "spin")
+    )
+    if spins.any():
+        middle = np.array([track.pose.position for track in tracks])[owner]
+        motion += np.cross(spins, point - middle)
     return motion, spins
-
-
-def path_elongation(length: Floats, along: Floats, moved: Floats) -> Floats:
-    """How much longer (path,) in m straight legs get when their ends come apart, more than by what is along them.
-
-    |r a + d| - r - a.d of legs r (path,) m along unit vectors a (path, xyz), by d (path, xyz) m; never negative, and
-    without cancellation.
-    """
-    forward = length + dot(along, moved)
-    across = moved - dot(along, moved)[:, None] * along
-    square = dot(across, across)
-    return np.asarray(square / np.maximum(np.sqrt(forward**2 + square) + forward, 1e-300))
 
 
 def meets(
@@ -116,17 +103,9 @@ def meets(
     """Ways to facets that move, when and where the sound of a snap at `time` (s) meets them, and by how much after
     `met` (way,) s, where ways lead to where they are then; velocity (way, xyz) of the facets, speed (way,) of sound
     there, m/s."""
-    rate, gone = dot(velocity, out.arrival) / speed, time + out.travel_time - met
-    late = gone
-    for _ in range(ROUNDS):
-        late = (gone + path_elongation(out.length, out.arrival, velocity * late[:, None]) / speed) / (1.0 - rate)
-    ray = out.length[:, None] * out.arrival + velocity * late[:, None]
-    length = np.sqrt(dot(ray, ray))
-    lengthened = replace(
-        out, arrival=ray / length[:, None], length=length, travel_time=(met - time) + late,
-        spreading=out.spreading * (out.length / length),
-    )  # fmt: skip
-    return lengthened, late
+    late, arrival, length = moving_ends.meet(out.length, out.arrival, time + out.travel_time - met, speed, velocity)
+    spreading, travel_time = out.spreading * (out.length / length), (met - time) + late
+    return replace(out, arrival=arrival, length=length, travel_time=travel_time, spreading=spreading), late
 
 
 def mirrored(velocity: Floats, bounces: Ints) -> Floats:
@@ -151,25 +130,20 @@ def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, profile: Pro
     """Legs from facets that move to an array that does: from where they are met to where they are heard."""
     pose, u = meeting.sonar.pose, meeting.sonar.velocity
     c_facet, c_array = profile.at(depth(legs.point)), float(profile.at(depth(pose.position)))
-    moved, of_array = of.velocity * of.late[:, None], dot(legs.arrival, u) / c_array
-    begun = of.met + of.late
+    moved, begun = of.velocity * of.late[:, None], of.met + of.late
     gone = begun - meeting.arrival_time + legs.travel_time - dot(moved, legs.departure) / c_facet
-    image = mirrored(moved, legs.bounces)
-    arrival_time = gone
-    for _ in range(ROUNDS):
-        arrival_time = (
-            gone + path_elongation(legs.length, legs.arrival, u * arrival_time[:, None] - image) / c_array
-        ) / (1.0 - of_array)
-    apparent = legs.radius[:, None] * legs.direction + pose.turn_to_body(image - u * arrival_time[:, None])
+    source = pose.turn_to_world(legs.radius[:, None] * legs.direction)
+    late, apparent = moving_ends.hear(legs.length, legs.arrival, source, gone, u, c_array, moved, legs.bounces)
     radius = np.sqrt(dot(apparent, apparent))
-    arrival = -pose.turn_to_world(apparent) / radius[:, None]
+    arrival = -apparent / radius[:, None]
+    direction = -pose.turn_to_body(arrival)
     if meeting.sonar.spin.any():
-        apparent = apparent - np.cross(pose.turn_to_body(meeting.sonar.spin), apparent) * arrival_time[:, None]
+        direction = direction - np.cross(pose.turn_to_body(meeting.sonar.spin), direction) * late[:, None]
+        direction /= np.sqrt(dot(direction, direction))[:, None]
     return replace(
         legs, point=legs.point + moved, departure=of.departure(legs.length, legs.departure), arrival=arrival,
-        direction=apparent / np.sqrt(dot(apparent, apparent))[:, None], radius=radius,
-        length=legs.length + (radius - legs.radius), spreading=legs.spreading * (legs.radius / radius),
-        travel_time=meeting.arrival_time - begun + arrival_time,
+        direction=direction, radius=radius, length=legs.length + (radius - legs.radius),
+        spreading=legs.spreading * (legs.radius / radius), travel_time=meeting.arrival_time - begun + late,
     )  # fmt: skip
 
 

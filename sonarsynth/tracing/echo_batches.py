@@ -125,6 +125,8 @@ def echo_batches(
 
 def in_band(pulses: PulseResponse, band: tuple[float, float]) -> Floats:
     """What roughness leaves of each pulse (path,) at most, at any frequency of the band (Hz)."""
+    if not (pulses.delay_std.any() or pulses.coherent_fraction.any()):
+        return np.ones(len(pulses.delay_std))
     low, high = (2.0 * np.pi * f for f in band)
     rough = np.sqrt(1.0 - pulses.coherent_fraction * np.exp(-((high * pulses.height_delay_std) ** 2)))
     return np.asarray(np.exp(-0.5 * (low * pulses.delay_std) ** 2) * rough)

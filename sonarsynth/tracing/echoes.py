@@ -93,10 +93,13 @@ class _EchoBlock:
         row, amplitude = _columns(self.groups, "row", "amplitude")
         strongest = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
         owner = self.array.facets.owner[self.out.facet[row]]
-        number = np.repeat(np.arange(len(self.groups)), [len(g.row) for g in self.groups])
-        return EchoLevels(
-            strongest * in_band(self.pulses, self.array.context.receiver.band), self.pulses.coherent, owner, number
-        )
+        strength = strongest * in_band(self.pulses, self.array.context.receiver.band)
+        return EchoLevels(strength, self.pulses.coherent, owner, self.group)
+
+    @property
+    def group(self) -> Ints:
+        """(echo,) which group it is in."""
+        return np.repeat(np.arange(len(self.groups)), [len(g.row) for g in self.groups])
 
 
 def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...], ...], kind: Kind) -> Arrivals:
@@ -111,7 +114,7 @@ def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...
     blocks = _loudest(array, snap, components)
     terms, error = variations(blocks)
     strongest = max(float(np.abs(block.strength).max(initial=0.0)) for block in blocks)
-    group, arrivals = [block.seen().group for block in blocks], []
+    group, arrivals = [block.group for block in blocks], []
     blocks.reverse()
     for variation in terms:
         block = blocks.pop()

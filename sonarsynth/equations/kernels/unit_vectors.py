@@ -1,4 +1,4 @@
-"""Directions to the places of an array from many points, compiled: unit vectors of sums of two ways."""
+"""Directions from place to place, compiled: of straight rays, and to the places of an array from many points."""
 
 from __future__ import annotations
 
@@ -8,6 +8,19 @@ import numpy as np
 
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Bools, Floats
+
+
+@compiled
+def straight_rays(level: Floats, climb: Floats) -> tuple[Floats, Floats, Floats]:
+    """Lengths (ray,) m of ways so far over ground (ray, xy) m and up (ray,) m, unit vectors (ray, xyz) along them, NaN
+    of none, and one over the lengths."""
+    length, towards, inverse = np.empty(len(climb)), np.empty((len(climb), 3)), np.empty(len(climb))
+    for i in range(len(climb)):
+        x, y, z = level[i, 0], level[i, 1], climb[i]
+        length[i] = math.sqrt(x * x + y * y + z * z)
+        inverse[i] = 1.0 / length[i]
+        towards[i, 0], towards[i, 1], towards[i, 2] = x / length[i], y / length[i], z / length[i]
+    return length, towards, inverse
 
 
 @compiled

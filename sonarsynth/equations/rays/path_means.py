@@ -10,9 +10,8 @@ from sonarsynth.conventions import Floats, Ints
 _X, _W = np.polynomial.legendre.leggauss(24)
 NODE, WEIGHT = 0.5 - 0.5 * np.cos(0.5 * np.pi * (1.0 + _X)), 0.25 * np.pi * _W * np.sin(0.5 * np.pi * (1.0 + _X))
 """Where of a leg (0 to 1) a bent ray is looked at, closest at its ends, where it may turn; and the weights of depth."""
-_X, _W = np.polynomial.legendre.leggauss(4)
-EVEN_NODE, EVEN_WEIGHT = 0.5 + 0.5 * _X, 0.5 * _W
-"""The same of a straight ray."""
+LEVEL = 1e-4
+"""m: a straight leg over less depth has the value at its middle."""
 LEAST_SINE = 1e-6
 """rad: of a ray that turns."""
 
@@ -29,6 +28,15 @@ def at(x: float, xs: Floats, ys: Floats) -> float:
     if not xs[i - 1] < x <= xs[i]:  # the places are not even
         i = int(np.searchsorted(xs, x))
     return float(ys[i - 1] + (ys[i] - ys[i - 1]) * (x - xs[i - 1]) / (xs[i] - xs[i - 1]))
+
+
+@compiled
+def up_to(x: float, table: tuple[Floats, Floats, Floats]) -> float:
+    """Integral of a value over depth from the surface to x (m), by its integral up to each of the even nodes."""
+    xs, ys, sums = table
+    i = min(max(int((x - xs[0]) / (xs[-1] - xs[0]) * (len(xs) - 1)), 0), len(xs) - 2)
+    d = x - xs[i]
+    return float(sums[i] + d * (ys[i] + 0.5 * d * (ys[i + 1] - ys[i]) / (xs[i + 1] - xs[i])))
 
 
 @compiled
@@ -51,34 +59,40 @@ def vertex(z: float, down: bool, fastest: float, bottom: float, depth: Floats, s
 
 
 @compiled
-def leg(a: float, b: float, p: float, bent: bool, water: tuple[Floats, Floats], table: tuple[Floats, Floats],
+def leg(a: float, b: float, p: float, bent: bool, water: tuple[Floats, Floats], table: tuple[Floats, Floats, Floats],
         times: float, sums: Floats) -> None:  # fmt: skip
     """Add a monotone leg between two depths, so many times: its length, and the value along it, to sums (2,)."""
-    nodes, weights = (NODE, WEIGHT) if bent else (EVEN_NODE, EVEN_WEIGHT)
-    for n in range(len(nodes)):
-        z = a + (b - a) * nodes[n]
-        length = times * abs(b - a) * weights[n]
-        if bent:
-            c = at(z, water[0], water[1])
-            length /= max(np.sqrt(max(1.0 - (p * c) ** 2, 0.0)), LEAST_SINE)
+    if not bent:
+        deep = abs(b - a)
+        within = (
+            deep * at(0.5 * (a + b), table[0], table[1]) if deep < LEVEL else abs(up_to(b, table) - up_to(a, table))
+        )
+        sums[0] += times * deep
+        sums[1] += times * within
+        return
+    for n in range(len(NODE)):
+        z = a + (b - a) * NODE[n]
+        c = at(z, water[0], water[1])
+        length = times * abs(b - a) * WEIGHT[n] / max(np.sqrt(max(1.0 - (p * c) ** 2, 0.0)), LEAST_SINE)
         sums[0] += length
         sums[1] += length * at(z, table[0], table[1])
 
 
 @compiled
 def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: bool, bottom: float,
-          water: tuple[Floats, Floats], table: tuple[Floats, Floats], out: Floats) -> None:  # fmt: skip
+          water: tuple[Floats, Floats], table: tuple[Floats, Floats, Floats], out: Floats) -> None:  # fmt: skip
     """Mean (ray,) along rays from depths start to end (ray,) m of a value of depth.
 
     climb (ray,): upward component of the unit vector in which each leaves; vertices (ray,): how many times it turns or
     is reflected; bent: whether it follows Snell's law in water, depth and sound speed (node,), or is straight; bottom
-    (m); table: depth and value (node,), both ascending. A ray with vertices goes to and fro between two depths.
+    (m); table: even depths, values there and their integrals from the surface (node,). A ray with vertices goes to and
+    fro between two depths.
     """
     sums = np.zeros(2)
     for r in range(len(start)):
         z, z_end, n = start[r], end[r], vertices[r]
         sums[:] = 0.0
-        p = np.sqrt(max(1.0 - climb[r] ** 2, 0.0)) / at(z, water[0], water[1])
+        p = np.sqrt(max(1.0 - climb[r] ** 2, 0.0)) / at(z, water[0], water[1]) if bent else 0.0
         if n == 0:
             leg(z, z_end, p, bent, water, table, 1.0, sums)
         else:

@@ -1,0 +1,70 @@
+"""Straight rays whose ends move, compiled: when sound meets them, and where (`tracing.doppler` has the equations)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sonarsynth.compiling import compiled
+from sonarsynth.conventions import Floats, Ints
+
+ROUNDS = 2
+"""Of solving for how much longer legs get while ends move: each leaves v/c v t/r of the error."""
+
+
+@compiled
+def elongation(length: float, along: Floats, dx: float, dy: float, dz: float) -> float:
+    """How much longer in m a straight leg gets when its ends come apart by d, more than by what is along it.
+
+    |r a + d| - r - a.d of a leg r m along a unit vector a (xyz); never negative, and without cancellation.
+    """
+    forward = along[0] * dx + along[1] * dy + along[2] * dz
+    x, y, z = dx - forward * along[0], dy - forward * along[1], dz - forward * along[2]
+    square = x * x + y * y + z * z
+    forward += length
+    return float(square / max(math.sqrt(forward * forward + square) + forward, 1e-300))
+
+
+@compiled
+def meet(
+    length: Floats, arrival: Floats, gone: Floats, speed: Floats, velocity: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """When sound meets ends that move: s (ray,) after they are where rays lead, and directions of arrival (ray, xyz)
+    and lengths (ray,) m then. gone (ray,) s: by how much later than that it would be there were they at rest; speed
+    (ray,) of sound there, velocity (ray, xyz) m/s of the ends."""
+    late, towards, far = np.empty(len(gone)), np.empty((len(gone), 3)), np.empty(len(gone))
+    for i in range(len(gone)):
+        a, v = arrival[i], velocity[i]
+        per_metre = 1.0 / (speed[i] - (v[0] * a[0] + v[1] * a[1] + v[2] * a[2]))
+        start = t = gone[i] * speed[i] * per_metre
+        for _ in range(ROUNDS):
+            t = start + elongation(length[i], a, v[0] * t, v[1] * t, v[2] * t) * per_metre
+        x, y, z = length[i] * a[0] + v[0] * t, length[i] * a[1] + v[1] * t, length[i] * a[2] + v[2] * t
+        late[i], far[i] = t, math.sqrt(x * x + y * y + z * z)
+        towards[i, 0], towards[i, 1], towards[i, 2] = x / far[i], y / far[i], z / far[i]
+    return late, towards, far
+
+
+@compiled
+def hear(
+    length: Floats, arrival: Floats, source: Floats, gone: Floats, velocity: Floats, speed: float, moved: Floats,
+    bounces: Ints,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """When an array at a velocity (xyz) m/s hears rays whose starts have moved (ray, xyz) m: s (ray,) after it is where
+    rays lead, and their sources (ray, xyz) m, or images of these, as it sees them then. source (ray, xyz) m: as it sees
+    them by the rays; gone (ray,) s: as of `meet`, with what the starts are nearer; speed: of sound at the array."""
+    late, seen = np.empty(len(gone)), np.empty((len(gone), 3))
+    ux, uy, uz = velocity[0], velocity[1], velocity[2]
+    for i in range(len(gone)):
+        a = arrival[i]
+        x, y, z = moved[i, 0], moved[i, 1], -moved[i, 2] if bounces[i] % 2 == 1 else moved[i, 2]
+        per_metre = 1.0 / (speed - (a[0] * ux + a[1] * uy + a[2] * uz))
+        start = t = gone[i] * speed * per_metre
+        for _ in range(ROUNDS):
+            t = start + elongation(length[i], a, ux * t - x, uy * t - y, uz * t - z) * per_metre
+        late[i] = t
+        seen[i, 0] = source[i, 0] + (x - ux * t)
+        seen[i, 1] = source[i, 1] + (y - uy * t)
+        seen[i, 2] = source[i, 2] + (z - uz * t)
+    return late, seen
