@@ -48,7 +48,7 @@ def accuracy(
         int | None, typer.Option(min=0, help="Redraw the random frames with this seed; keep the planner's choices.")
     ] = None,
     peers: Annotated[
-        bool, typer.Option(help="Also run other programs for comparison: the thesis's loop, Acoular.")
+        bool, typer.Option(help="Also run other programs for comparison: the thesis's loop, FINUFFT, Acoular.")
     ] = True,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the table and the picture.")] = Path(
         "accuracy"

@@ -11,7 +11,7 @@ from sonarsynth.conventions import finite_json
 from sonarsynth.frontiers.exact_frame import ExactFrame, exact_frame, synthesis_check
 from sonarsynth.frontiers.full_frame import FullFrame, whole_points
 from sonarsynth.frontiers.image_knobs import image_points, range_points
-from sonarsynth.frontiers.peers import image_peers
+from sonarsynth.frontiers.peer_rows import image_peers, synthesis_peers
 from sonarsynth.frontiers.picking_knobs import picking_points
 from sonarsynth.frontiers.rows import Point, Verdict, merged
 from sonarsynth.frontiers.signal_knobs import speckle_points, synthesis_points
@@ -133,7 +133,8 @@ def _frame(base: Plan, index: int, hydrophones: int | None, say: Say, *, peers: 
     points += picking_points(plan, frame, arrivals, full.beamformed)
     if peers:
         say(f"frame {index}: peers")
-        points += image_peers(plan, frame, arrivals.seen_from_centre, full.beamformed)  # peers know no shade
+        points += synthesis_peers(plan, frame, arrivals.seen_from_centre)  # peers know no shade
+        points += image_peers(plan, frame, arrivals.seen_from_centre, full.beamformed)
     say(f"frame {index}: everything exact")
     spent = full.seconds + sum(
         p.seconds for p in points if p.chosen and p.stage not in ("synthesis", "reverberation", "picking")

@@ -1,78 +1,28 @@
-"""Other programs in the place of our imaging, on the same signals and against the same exact image: the thesis's loop,
-and Acoular's BeamformerTime. Errors are whatever the scale of the image."""
+"""What others do in the place of our stages: the thesis's imaging loop, Acoular's BeamformerTime, FINUFFT."""
 
 from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Iterator
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
 from scipy.fft import irfft
 
 from sonarsynth.conventions import Floats, direction
-from sonarsynth.frontiers.image_knobs import image_of, imaged
-from sonarsynth.frontiers.rows import Point
-from sonarsynth.imaging import DenseDelayAndSum
-from sonarsynth.pipeline import BeamformedFrame
-from sonarsynth.planning import Plan
+from sonarsynth.planning import Plan, frame_start
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals.array_paths import array_paths, delay_and_gain, reach
 from sonarsynth.signals.filtered_pulse import pulse_spectrum, pulse_support
 from sonarsynth.signals.segments import fast_length
 from sonarsynth.state import Emission
 
-THESIS_BEAMS = 24
-"""Bright beams that the thesis's loop is timed on."""
 
-
-def image_peers(plan: Plan, frame: Frame, arrivals: Arrivals, beamformed: BeamformedFrame) -> Iterator[Point]:
-    """A row for each of the two; nothing where the frame has no image."""
-    if not imaged(beamformed):
-        return
-    assert beamformed.image is not None and beamformed.imaged is not None
-    sonar, focus = plan.scene.sonar, getattr(plan.choices.beamforming, "focus", None)
-    slow = DenseDelayAndSum(focus=focus, shading="uniform")
-    exact = np.asarray(image_of(plan, beamformed, slow).energy, float)
-    bright = np.flatnonzero(exact.ravel() >= 0.01 * exact.max())
-    beams = bright[np.linspace(0, len(bright) - 1, min(THESIS_BEAMS, len(bright))).astype(int)]
-    if len(beams) > 1 and (~arrivals.direct).any():
-        pulse = thesis_pulse(frame.moment.snaps[0], plan)
-        energy, seconds = thesis_image(plan, arrivals, pulse, sonar.sampling_frequency, beams, sonar.band.centre)
-        note = f"cost from {len(beams)} beams; whatever the scale"
-        of_all = seconds * exact.size / len(beams)
-        yield _row(plan, "the thesis's loop", "every ray, every beam", energy, exact.ravel()[beams], of_all, note)
-    if find_spec("acoular") is None:
-        nothing = float("nan")
-        yield Point(
-            "image", "Acoular", "not installed", nothing, "", nothing, nothing, role="peer", note="not installed"
-        )
-        return
-    start, stop = beamformed.image.start, beamformed.image.stop
-    energy, seconds = acoular_image(plan, beamformed.imaged, start, stop, focus or 1e6)
-    yield _row(plan, "Acoular", "BeamformerTime", energy, exact, seconds, "whatever the scale")
-
-
-def _row(plan: Plan, name: str, setting: str, image: np.ndarray, exact: np.ndarray, seconds: float, note: str) -> Point:
-    """How far an image is from the exact one: over the beams within 20 dB of the peak."""
-    bright = exact >= 0.01 * exact.max()
-    decibels = 10 * np.log10(image[bright] / exact[bright])
-    return Point(
-        stage="image",
-        knob=name,
-        setting=setting,
-        error=float(np.std(decibels)),
-        unit="dB",
-        allowed=plan.recipe.accuracy.image_db,
-        seconds=seconds,
-        role="peer",
-        also={
-            "largest_db": float(np.abs(decibels - np.mean(decibels)).max()),
-            "correlation": float(np.corrcoef(image[bright], exact[bright])[0, 1]),
-        },
-        note=note,
-    )
+def installed(library: str) -> bool:
+    """Whether a library can be imported."""
+    return find_spec(library) is not None
 
 
 def thesis_pulse(snap: Emission, plan: Plan) -> Floats:
@@ -149,3 +99,58 @@ def _acoular_image(plan: Plan, signals: Signals, start: float, stop: float, focu
         energy += np.sum(np.square(block), axis=0)
     seconds = time.process_time() - began
     return (energy / rate).reshape(grid.elevations, grid.azimuths), seconds
+
+
+def likeness(image: np.ndarray, exact: np.ndarray) -> dict[str, float]:
+    """How far an image is from the exact one, whatever its scale: over the beams within 20 dB of the peak."""
+    bright = exact >= 0.01 * exact.max()
+    decibels = 10 * np.log10(image[bright] / exact[bright])
+    return {
+        "rms_error_db": float(np.std(decibels)),
+        "largest_error_db": float(np.abs(decibels - np.mean(decibels)).max()),
+        "correlation": float(np.corrcoef(image[bright], exact[bright])[0, 1]),
+    }
+
+
+def plain(arrivals: Arrivals, plan: Plan, frame: Frame) -> Arrivals:
+    """What FINUFFT can add up: paths of the first snap that are wholly heard, their pulses not reshaped."""
+    start = frame_start(plan, frame)
+    after = start + plan.windows.samples / plan.scene.sonar.sampling_frequency
+    selected = arrivals.select((arrivals.snap == 0) & (arrivals.delay > start) & (arrivals.delay < after))
+    nought = np.zeros_like(selected.delay)
+    return replace(
+        selected,
+        delay_std=nought,
+        echo_delay_std=nought,
+        doppler=nought,
+        coherent=np.zeros(len(nought), bool),
+        corner_delays=np.zeros((len(nought), 3)),
+        coherent_fraction=nought,
+        height_delay_std=nought,
+        expansion=selected.expansion.without("phase", "delay_variance"),
+    )
+
+
+def finufft_signals(plan: Plan, frame: Frame, arrivals: Arrivals, error: float) -> Floats:
+    """Pressure (sensor, sample) of `plain` arrivals at point hydrophones, absorption that of the centre of the band: a
+    transform of type 1 for each hydrophone."""
+    import finufft
+
+    sonar, elements, snap = plan.scene.sonar, plan.elements, frame.moment.snaps[0]
+    fs, start, samples = sonar.sampling_frequency, frame_start(plan, frame), plan.windows.samples
+    front = array_paths(arrivals, frame.moment.snaps, elements)
+    late, gain = delay_and_gain(front, elements.position)
+    support = sum(pulse_support(snap.waveform, sonar.antialias))
+    margin = int(np.ceil((2.0 * reach(front).max() + support) * fs)) + 2
+    length = fast_length(samples + 2 * margin)
+    frequency, spectrum = pulse_spectrum(snap.waveform, sonar.antialias, fs, length, 0.0)
+    used = len(frequency)
+    turn = np.mod(2.0 * np.pi * fs / length * (front.delay[:, None] + late - start + margin / fs), 2.0 * np.pi)
+    turn = np.ascontiguousarray(turn.T)  # (sensor, path)
+    strength = np.ascontiguousarray(((front.amplitude * np.exp(1j * front.phase))[:, None] * gain * elements.gain).T)
+    spectra = np.zeros((elements.count, used), complex)
+    for n in range(elements.count):
+        modes = finufft.nufft1d1(turn[n], strength[n], 2 * used, eps=error, isign=-1, nthreads=1)
+        spectra[n] = modes[used:]  # from frequency 0 on
+    pressure = irfft(spectra * spectrum, length, axis=1)[:, margin : margin + samples]
+    return np.asarray(pressure * fs)

@@ -14,6 +14,7 @@ import pytest
 from sonarsynth.cli import app
 from sonarsynth.cli.accuracy_tables.frontier_table import show
 from sonarsynth.cli.running import run
+from sonarsynth.environment.boundaries import SeaBottom, Sediment
 from sonarsynth.frontiers import AccuracyReport, Point, exact_frame, measure, usual_frames
 from sonarsynth.frontiers.exact_frame import differences, each_hydrophone, exact_plan, spread
 from sonarsynth.frontiers.frontier_report import write
@@ -22,8 +23,10 @@ from sonarsynth.frontiers.rows import merged
 from sonarsynth.frontiers.verdicts import cheapest, verdicts
 from sonarsynth.imaging import AutoBeamforming, FocusedDelayAndSum
 from sonarsynth.planning import Choices, plan
+from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import BeamGrid, PlanarLattice
 from sonarsynth.recipe import Accuracy, Recipe, reading
+from sonarsynth.signals import GriddedSynthesis
 from tests.scenes import remus
 
 STAGES = {"trace", "synthesis", "image", "range", "frame"}
@@ -41,7 +44,7 @@ def small(signal: float = 1e-2, frames: int = 2) -> Recipe:
 def alone() -> pytest.MonkeyPatch:
     """Without libraries of others: they compile for long."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.frontiers.peers.find_spec", lambda library: None)
+        patch.setattr("sonarsynth.frontiers.peer_rows.installed", lambda library: False)
         yield patch
 
 
@@ -131,7 +134,7 @@ def test_json_has_no_number_that_is_none(measured: AccuracyReport) -> None:
         wanted = {"stage", "error", "unit", "allowed", "seconds", "frames", "recipe"}
         assert wanted | ({"ok", "ratio", "cheapest"} if row["row"] == "verdict" else {"meets", "chosen"}) <= set(row)
     absent = [row for row in answer if row["setting" if "setting" in row else "note"] == "not installed"]
-    assert {row["knob"] for row in absent} == {"Acoular"}
+    assert {row["knob"] for row in absent} == {"FINUFFT", "Acoular"}
     assert all(row["error"] is None and not row["meets"] for row in absent)
     (thesis,) = (row for row in answer if row["row"] == "peer" and "thesis" in row["knob"])
     assert thesis["error"] > 0.1
@@ -276,3 +279,22 @@ def test_bad_options_are_one_line(
     assert run(app, ["accuracy", *named, "--out", str(tmp_path)]) in (1, 2)
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and says in said
+
+
+@pytest.mark.parametrize("bounces", [0, 1])
+def test_finufft_and_ours_agree(bounces: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sonarsynth.frontiers.peer_rows.installed", lambda library: True)
+    from sonarsynth.frontiers.peer_rows import synthesis_peers
+    from sonarsynth.planning import arrivals_of
+
+    recipe, bottom = small(1e-4), SeaBottom(reflection=Sediment(name="medium sand"))
+    world = replace(recipe.scene.world, environment=replace(recipe.scene.world.environment, bottom=bottom))
+    physics = replace(recipe.scene.physics, tracing=AutoTracing(bounces=bounces))
+    recipe = replace(recipe, scene=replace(recipe.scene, world=world, physics=physics))
+    made = plan(recipe, choices=Choices(synthesis=GriddedSynthesis(width=8, tolerance=1e-5)))
+    frame = made.recipe.frame(1)[1]
+    found = list(synthesis_peers(made, frame, arrivals_of(made, frame)))
+    errors = [p.error for p in found if p.knob == "FINUFFT"]
+    assert errors[0] > errors[2] > errors[-1]
+    assert errors[-1] < 1e-6
+    assert found[-1].knob == "ours, on the same" and found[-1].meets
