@@ -26,9 +26,9 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.kernels import moving_ends
 from sonarsynth.equations.kernels.row_products import row_products
 from sonarsynth.equations.kernels.unit_vectors import moved
-from sonarsynth.equations.rays import moving_ends
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import ArrayExpansion, Arrivals
