@@ -53,4 +53,6 @@ _CHOICES: TypeAdapter[Choices] = TypeAdapter(Choices)
 
 def choices_from(value: object) -> Choices:
     """Choices from JSON values, as `Choices.as_json` gives them. Raises ValueError where they are none."""
+    if isinstance(value, dict) and value.get("degree") == 3:  # of stores from before cubics were all that there is
+        value = {k: v for k, v in value.items() if k != "degree"}
     return _CHOICES.validate_python(value)
