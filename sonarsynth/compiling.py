@@ -2,6 +2,8 @@
 
 Numba keeps what it compiled beside the file of a function, and forgets it when that file changes; not when another
 changes, from which the function calls something or takes a constant. Old and new code would be mixed after an update.
+And it compiles products of complex numbers and the like once a process: as fast mathematics in all kernels, where one
+with fast mathematics was compiled first.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.core.registry import cpu_target
+from numba.core.targetconfig import ConfigStack
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -44,7 +48,7 @@ class _Cache(FunctionCache):
     """Compiled code by the types of its arguments, the processor, and the code that it was made of."""
 
     def _index_key(self, *types_and_processor: Any) -> tuple[Any, ...]:
-        made_of = sorted(set(_made_of(self._py_func, {self._py_func})))
+        made_of = [_digest(__file__), *sorted(set(_made_of(self._py_func, {self._py_func})))]
         key = super()._index_key(*types_and_processor)  # type: ignore[no-untyped-call]
         return (*key, hashlib.sha256("\n".join(made_of).encode()).hexdigest())
 
@@ -66,3 +70,22 @@ def _made_of(function: Any, seen: set[Any]) -> Iterator[str]:
 def _digest(file: str) -> str:
     """Digest of a file of this package, as it was when first asked for: when what it holds was imported."""
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+
+
+class _ByFastMath(dict[Any, Any]):
+    """What numba compiles for its own use within kernels, apart for those with fast mathematics and those without."""
+
+    def __getitem__(self, key: Any) -> Any:
+        return super().__getitem__(self._full(key))
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        super().__setitem__(self._full(key), value)
+
+    def get(self, key: Any, default: Any = None) -> Any:
+        return super().get(self._full(key), default)
+
+    def _full(self, key: Any) -> tuple[Any, frozenset[str]]:
+        return key, frozenset(ConfigStack().top().fastmath.flags)
+
+
+cpu_target.target_context.cached_internal_func = _ByFastMath()

@@ -7,9 +7,11 @@ bits, with it only where there are none, because they are inlined always.
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
@@ -28,3 +30,21 @@ def test_compiled_functions_with_fast_mathematics_that_others_call_are_inlined(f
     called = {name for value in compiled.values() for name in value.py_func.__code__.co_names if name in compiled}
     loose = [n for n in called if compiled[n].targetoptions.get("fastmath")]
     assert [name for name in loose if not compiled[name].targetoptions.get("forceinline")] == []
+
+
+def test_products_of_complex_numbers_are_fast_in_no_kernel_but_those_that_ask(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Numba compiles them apart from the kernels, whose order would tell which bits all get."""
+    lines = "def {0}(z):\n    return z * z\n"
+    header = "from sonarsynth.compiling import compiled\n"
+    kernels = lines.format("plain") + "@compiled(fastmath=True)\n" + lines.format("fast")
+    (tmp_path / "products_of_two.py").write_text(header + "@compiled\n" + kernels)
+    monkeypatch.syspath_prepend(tmp_path)
+    module = import_module("products_of_two")
+    for name in ("fast", "plain"):
+        kernel = getattr(module, name)
+        assert kernel(np.complex128(1.0 + 2.0j)) == -3.0 + 4.0j
+        steps = re.findall(r"= f(?:mul|add|sub) (fast )?", next(iter(kernel.inspect_llvm().values())))
+        assert steps
+        assert {bool(step) for step in steps} == {name == "fast"}
