@@ -91,7 +91,7 @@ def _horizon(
 
 
 @compiled
-def leave(
+def clear_of_body(
     facet: Ints, direction: Floats, normal: Floats, nodes: Floats, order: Int32s, vertices: Floats, faces: Int32s,
     horizon: Floats,
 ) -> Bools:  # fmt: skip

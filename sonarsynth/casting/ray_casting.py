@@ -234,7 +234,7 @@ def first_hit(
     return facet, distance * ready.size
 
 
-def leave_own(bodies: tuple[PlacedTarget, ...], owner: Ints, facet: Ints, direction: Floats) -> Ints:
+def clear_of_own_body(bodies: tuple[PlacedTarget, ...], owner: Ints, facet: Ints, direction: Floats) -> Ints:
     """Body (ray,) that rays from the middles of facets (owner and facet of each) in directions (ray, xyz), world, of
     length one, come from and surely do not meet again; -1 where that is not certain."""
     from sonarsynth.casting import horizons
@@ -243,7 +243,7 @@ def leave_own(bodies: tuple[PlacedTarget, ...], owner: Ints, facet: Ints, direct
     for number, body in enumerate(bodies):
         rows = slice(None) if len(bodies) == 1 and (owner == 0).all() else np.flatnonzero(owner == number)
         mesh, towards = casting_mesh(body.mesh), body.pose.turn_to_body(direction[rows])
-        far = horizons.leave(
+        far = horizons.clear_of_body(
             facet[rows], towards, body.mesh.normal, *mesh.tree, mesh.vertices, mesh.faces, mesh.horizon
         )
         own[rows] = np.where(far, number, NO_TARGET)
@@ -254,7 +254,7 @@ def occluded(
     bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, own: Ints | None = None, backend: Backend = "embree"
 ) -> Bools:
     """Whether any body stands in each straight segment from start (segment, xyz) to end (segment, xyz) in the world;
-    own (segment,): the body that surely does not (`leave_own`), -1 for none.
+    own (segment,): the body that surely does not (`clear_of_own_body`), -1 for none.
 
     A segment that starts on a facet must be moved off it (`OFFSET`). Raises ValueError for ends that are not finite.
     """

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,8 @@ from sonarsynth.evaluation.point_checks import points as points_of
 from sonarsynth.pictures.figures.style import decibels
 from sonarsynth.pictures.store_reading import needed
 from sonarsynth.store import Folder, here
+from sonarsynth.store.files.json_lines import read_lines
+from sonarsynth.store.files.within import Mismatch
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -121,20 +123,10 @@ def _costs(file: Path, frames: frozenset[int]) -> dict[str, str]:
 
 
 def _rows(file: Path) -> list[dict[str, Any]]:
-    """Rows of a file of JSON lines; none where it is not there, and none of a line that was cut short."""
-    try:
-        lines = file.read_text("utf-8").splitlines()
-    except OSError:
-        return []
-    rows = []
-    for line in lines:
-        try:
-            row = json.loads(line)
-        except ValueError:
-            continue
-        if isinstance(row, dict) and isinstance(row.get("cpu"), dict) and "frame" in row:
-            rows.append(row)
-    return rows
+    """Rows of frames in the file of run times; none where it is not there."""
+    with suppress(OSError, Mismatch):
+        return [row for row in read_lines(file) if isinstance(row.get("cpu"), dict) and "frame" in row]
+    return []
 
 
 def as_table(names: Sequence[str], standings: Sequence[dict[str, str]]) -> str:

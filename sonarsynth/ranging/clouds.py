@@ -36,7 +36,7 @@ def point_cloud(
     source, velocity, spin = window.estimates.position[0], np.zeros(3), np.zeros(3)
     if track is not None and not track.still:
         velocity, spin = track.pose.turn_to_body(track.velocity), track.pose.turn_to_body(track.spin)
-        echoes = _from_ahead(echoes, velocity, window)
+        echoes = _at_true_directions(echoes, velocity, window)
     beam = direction(echoes.azimuth, echoes.elevation)
     solution = placing.place(echoes.delay, beam, source, window.sonar, sonar_pose, profile)
     if velocity.any() or spin.any():
@@ -58,17 +58,17 @@ def point_cloud(
     return cloud.select(np.flatnonzero(np.isfinite(solution.range) & (solution.range > 0) & np.isfinite(error)))
 
 
-def _from_ahead(echoes: PickedEchoes, velocity: Floats, window: ReceivedWindow) -> PickedEchoes:
+def _at_true_directions(echoes: PickedEchoes, velocity: Floats, window: ReceivedWindow) -> PickedEchoes:
     """Echoes where they come from, of beams that an array at rest would hear them in; velocity (xyz): m/s."""
     live, c = window.elements.position[window.elements.gain != 0], window.sonar.assumed_sound_speed
     heard = direction(echoes.azimuth, echoes.elevation)
     azimuth, elevation = azimuth_elevation(
-        ahead_of_beams(heard, velocity / c, plane_normal(live, c / window.sonar.band.centre))
+        true_directions(heard, velocity / c, plane_normal(live, c / window.sonar.band.centre))
     )
     return replace(echoes, azimuth=azimuth, elevation=elevation)
 
 
-def ahead_of_beams(beam: Floats, mach: Floats, normal: Floats | None) -> Floats:
+def true_directions(beam: Floats, mach: Floats, normal: Floats | None) -> Floats:
     """Where (echo, xyz) waves come from that an array which moves by `mach` (xyz) m per m of sound hears in beams
     (echo, xyz) that are steered for one at rest.
 

@@ -221,7 +221,7 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     speed = float(medium.profile.at(depth(snap.position)))
     out = TransmitPaths.of(paths, bounced, facet, snap, speed)
     out = out.select(picked(lit & (out.spreading != 0.0)))
-    own = facets.leaving(bodies, out.facet, -out.arrival)
+    own = facets.clear_of_own(bodies, out.facet, -out.arrival)
     out = out.select(picked(~_hides(array, bodies, snap, out, facets.clear[out.facet], own)))
     for number, before in overlapping(bodies):
         owned = np.flatnonzero(facets.owner[out.facet] == number)

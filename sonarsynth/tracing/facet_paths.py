@@ -131,7 +131,7 @@ def facet_paths(
             facing = may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack)
             every = every.select(picked(facing))
         leaving = receive_paths(every, medium, receiver, propagation, slack)
-        own = every.leaving(bodies, leaving.row, leaving.departure)
+        own = every.clear_of_own(bodies, leaving.row, leaving.departure)
         leaving = view.visible(leaving, *every.side(leaving.row, leaving.departure), own)
         reached, row = np.unique(leaving.row, return_inverse=True)
         columns[0].append(leaving.numbered(count + row))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import OFFSET, leave_own
+from sonarsynth.casting.ray_casting import OFFSET, clear_of_own_body
 from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth, picked
 from sonarsynth.equations.kernels.placing import placed
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, TOLERANCE
@@ -100,9 +100,9 @@ class Facets:
         sideless = self.sideless
         return self.clear[row], np.where(sideless[row, None], departure, normal) if sideless.any() else normal
 
-    def leaving(self, bodies: tuple[PlacedTarget, ...], row: Ints, direction: Floats) -> Ints:
-        """As `ray_casting.leave_own`, of straight paths to or from facets (row of each): direction (path, xyz) away."""
-        return leave_own(bodies, self.owner[row], self.facet[row], direction)
+    def clear_of_own(self, bodies: tuple[PlacedTarget, ...], row: Ints, direction: Floats) -> Ints:
+        """As `clear_of_own_body`, of straight paths to or from facets (row of each): direction (path, xyz) away."""
+        return clear_of_own_body(bodies, self.owner[row], self.facet[row], direction)
 
     def lit(self, row: Ints, arrival: Floats) -> Bools:
         """Whether paths that arrive along (path, xyz) light facets (row of each): from their side, if they have one."""

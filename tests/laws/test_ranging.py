@@ -12,7 +12,7 @@ from sonarsynth.environment.sea import Profile, Tabulated
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.ranging import BeamAxis, IsovelocityPlacing, RefractedPlacing, SensorDelays
-from sonarsynth.ranging.clouds import ahead_of_beams
+from sonarsynth.ranging.clouds import true_directions
 from sonarsynth.ranging.location.refraction import first_rays, refracted_solution
 from sonarsynth.ranging.placing.solution import isovelocity_solution
 from sonarsynth.receiver import Romanis, Sonar, elements
@@ -281,7 +281,7 @@ def test_beams_of_a_moving_array_look_where_sound_comes_from(turn: float) -> Non
             late = (np.linalg.norm(source - q - np.outer(late, velocity), axis=1) - far) / C
         within = np.linalg.lstsq(q, -C * late, rcond=1e-6)[0]
         heard.append(within + np.sqrt(1.0 - within @ within) * lean[:, 0])
-    found = ahead_of_beams(np.array(heard), velocity / C, lean[:, 0])
+    found = true_directions(np.array(heard), velocity / C, lean[:, 0])
     assert np.abs(found - u).max() < 2e-5  # the square of v/c is 4e-5, the aperture over the distance 5e-6
     assert np.abs(heard - u).max() > 2e-3
 

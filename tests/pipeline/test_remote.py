@@ -214,7 +214,7 @@ def test_a_holder_renews_its_claim_and_leaves_that_of_another(anywhere: Folder) 
     assert lock.holder(anywhere) == "other"
 
 
-@pytest.mark.parametrize("content", [b"", b"[1]", b"{}", b"process 7"])
+@pytest.mark.parametrize("content", [b"", b"[1]", b"{}", b"process 7", b"[" * 100_000])
 def test_what_is_no_claim_keeps_nobody_out(anywhere: Folder, content: bytes) -> None:
     store.beside(anywhere, "lock").write_bytes(content)
     with store.lock(anywhere) as name:

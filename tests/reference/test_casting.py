@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from sonarsynth.casting import ray_casting
-from sonarsynth.casting.ray_casting import OFFSET, Backend, first_hit, hide, leave_own, occluded
+from sonarsynth.casting.ray_casting import OFFSET, Backend, clear_of_own_body, first_hit, hide, occluded
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.geometry.mesh import Mesh
@@ -120,7 +120,7 @@ def test_rays_that_leave_their_own_body_meet_it_nowhere(mesh: Mesh, least: float
     for _ in range(40):
         towards = unit(rng.normal(size=(count, 3)))
         towards *= np.sign(np.sum(towards * mesh.normal, axis=1))[:, None]
-        own = leave_own(bodies, np.ones(count, int), np.arange(count), bodies[1].pose.turn_to_world(towards))
+        own = clear_of_own_body(bodies, np.ones(count, int), np.arange(count), bodies[1].pose.turn_to_world(towards))
         assert set(own) == {-1, 1}
         share.append(np.mean(own == 1))
         facet, _ = first_hit(mesh, mesh.centroid + 1e-6 * mesh.radius * mesh.normal, towards)

@@ -102,5 +102,5 @@ def frame_space(axes: Axes3D, points: Floats, bearing: float) -> float:
         axis.set_label_text(name, fontsize=8)
         axis.labelpad = 10.0
         axis.get_major_locator().set_params(nbins=max(2, round(7 * float(size / span.max()))))
-    return factor
     axes.tick_params(labelsize=7)
+    return factor

@@ -219,7 +219,7 @@ def _read(file: Folder) -> tuple[bytes | None, int]:
 def _claim(content: bytes | None) -> dict[str, Any]:
     try:
         claim = json.loads(content or b"")
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return claim if isinstance(claim, dict) else {}
 

@@ -32,9 +32,9 @@ def hidden(
     """Whether a body stands in rays (ray, xyz) that leave start in direction departure and end after length (m) at end.
 
     bounces, turning (ray,): their reflections from surface and bottom, and turning points; own (ray,): the body that
-    straight ones surely do not meet (`ray_casting.leave_own`). Straight rays and reflections in uniform water are
-    exact; bent rays are followed by chords within `SAGITTA_TOLERANCE`, but only where they may pass a body: no ray is
-    farther from the straight line between its ends, unfolded at its reflections, than its largest curvature allows.
+    straight ones surely do not meet (`clear_of_own_body`). Straight rays and reflections in uniform water are exact;
+    bent rays are followed by chords within `SAGITTA_TOLERANCE`, but only where they may pass a body: no ray is farther
+    from the straight line between its ends, unfolded at its reflections, than its largest curvature allows.
     """
     blocked = np.zeros(len(start), bool)
     if not bodies or not len(start):
