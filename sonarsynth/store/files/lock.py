@@ -139,7 +139,8 @@ def _replaced(store: Folder, file: Folder, stale: bytes | None, content: bytes, 
             raise StoreLocked(f"{store} is being built by another process")  # two took over at once
         return _read(file)[0] == content
     with _locked(store, file, fcntl.LOCK_EX, wait) as handle:
-        if os.pread(handle, len(content) + 1000, 0) != (stale or b""):
+        there = stale or b""
+        if os.pread(handle, len(there) + 1, 0) != there:
             return False
         os.ftruncate(handle, 0)
         os.pwrite(handle, content, 0)
