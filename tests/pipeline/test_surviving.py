@@ -26,6 +26,7 @@ from sonarsynth import store
 from sonarsynth.planning import Plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule import TooLarge, build, connecting, disk_space
+from sonarsynth.store.files import lock
 from sonarsynth.store.files.json_lines import read_lines
 from tests.waiting import wait_until
 
@@ -269,7 +270,27 @@ def test_a_disk_that_takes_no_more_is_one_line_and_the_build_goes_on(
     assert different(tmp_path / "s.zarr", reference) == []
 
 
-def test_the_next_build_waits_for_a_writer_that_outlived_its_own_and_that_writer_then_refuses(tmp_path: Path) -> None:
+def test_nothing_is_left_of_a_claim_whose_writer_is_killed_as_the_build_ends(tmp_path: Path) -> None:
+    path = tmp_path / "s.zarr"
+    writing = (
+        "import sys, time\nfrom sonarsynth import store\n"
+        "with store.shared_lock(*sys.argv[1:]):\n    print('writes', flush=True)\n    time.sleep(600)"
+    )
+    claim = store.beside(path, "lock")
+    with store.lock(path) as name:
+        writer = subprocess.Popen([sys.executable, "-c", writing, str(path), name], stdout=subprocess.PIPE, text=True)
+        assert writer.stdout is not None and writer.stdout.readline() == "writes\n"
+        killing = threading.Thread(target=lambda: (wait_until(lambda: not claim.read_bytes()), writer.kill()))
+        killing.start()
+    killing.join()
+    writer.communicate()
+    assert not claim.exists()
+
+
+def test_the_next_build_waits_for_a_writer_that_outlived_its_own_and_that_writer_then_refuses(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lock, "ENDING", 0.1)
     path = tmp_path / "s.zarr"
     with store.lock(path) as name, store.shared_lock(path, name):
         pass

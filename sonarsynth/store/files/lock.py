@@ -30,6 +30,8 @@ from sonarsynth.store.files.within import Mismatch, open_own
 
 WAIT: Final = 60.0
 """Seconds that a build waits for a writer of an earlier one."""
+ENDING: Final = 5.0
+"""Seconds that a build which ends waits for its own writers, so that no empty file is left of its claim."""
 RENEWED: Final = 10.0
 """Seconds between two renewals of a claim."""
 LEASE: Final = 60.0
@@ -148,17 +150,17 @@ def _replaced(store: Folder, file: Folder, stale: bytes | None, content: bytes, 
 
 
 def _give_back(store: Folder, file: Folder) -> None:
-    """Remove a claim; where a writer still shares its file, leave that without one."""
+    """Remove a claim; where a writer still shares its file after `ENDING`, leave that without one."""
     if isinstance(file, Remote):
         file.unlink(missing_ok=True)
         return
     os.truncate(file, 0)
-    _remove(store, file)
+    _remove(store, file, ENDING)
 
 
-def _remove(store: Folder, file: Path) -> None:
-    """Remove a file without a claim, unless somebody shares it, or takes it just then."""
-    with suppress(StoreLocked), _locked(store, file, fcntl.LOCK_EX) as handle:
+def _remove(store: Folder, file: Path, wait: float = 0.0) -> None:
+    """Remove a file without a claim, unless somebody still shares it after `wait` seconds, or takes it just then."""
+    with suppress(StoreLocked), _locked(store, file, fcntl.LOCK_EX, wait) as handle:
         if not os.pread(handle, 1, 0):
             file.unlink()
 
