@@ -23,6 +23,7 @@ from sonarsynth.equations.water.boundary_reflection import (
     roughness_blur,
     wind_wave_height,
 )
+from sonarsynth.equations.water.formula_ranges import OutOfRange
 
 GRAZING = np.linspace(0.0, NORMAL, 181)
 TABLE = ReflectionTable(grazing=(0.0, 0.3, 0.5, NORMAL), modulus=(1.0, 0.9, 0.4, 0.35), phase=(np.pi, 1.0, 0.2, 0.1))
@@ -96,6 +97,29 @@ def test_the_air_over_the_sea_is_almost_pressure_release() -> None:
 def test_more_of_the_same_water_reflects_nothing() -> None:
     same = SeaBottom(reflection=FluidHalfSpace(density_ratio=1.0, speed_ratio=1.0))
     np.testing.assert_array_equal(coefficient(same, GRAZING), 0.0)
+
+
+def test_a_boundary_of_density_alone_reflects_the_same_at_every_angle() -> None:
+    q = np.array([0.0, 1e-12, 1e-3, 0.7, NORMAL])
+    np.testing.assert_allclose(rayleigh(q, 1.5, 1.0), 0.2, rtol=1e-12)
+
+
+@pytest.mark.parametrize("loss", [0.0, 1e-12, 0.01624, 0.5])
+@pytest.mark.parametrize("speed", [0.98, 1.1782])
+def test_the_wave_in_the_bed_goes_down_and_dies_away(speed: float, loss: float) -> None:
+    """exp(+i w t - i k w z) at a depth z in the bottom, with w = m sin q (1 - V)/(1 + V): Im w <= 0 and Re w >= 0."""
+    q = np.linspace(0.01, NORMAL, 200)
+    v = rayleigh(q, 1.845, speed, loss)
+    w = 1.845 * np.sin(q) * (1 - v) / (1 + v)
+    assert w.imag.max() <= 1e-12
+    assert w.real.min() >= -1e-12
+    assert np.abs(w).min() > 0.01
+    np.testing.assert_allclose(w**2, ((1 - 1j * loss) / speed) ** 2 - np.cos(q) ** 2, atol=1e-12)
+
+
+def test_the_reflection_is_continuous_in_the_loss() -> None:
+    lossy, lossless = (rayleigh(GRAZING, 1.845, 1.1782, loss) for loss in (1e-14, 0.0))
+    np.testing.assert_allclose(lossy, lossless, atol=1e-12)
 
 
 @pytest.mark.parametrize("reflection", EVERY)
@@ -225,6 +249,19 @@ def test_the_loss_in_bubbles_is_continuous_where_waves_begin_to_break() -> None:
     assert below == pytest.approx(above, rel=1e-8)
 
 
+@pytest.mark.parametrize("wind", [0.5, 5.0, 25.0])
+def test_waves_warn_outside_the_winds_that_were_measured(wind: float) -> None:
+    with pytest.warns(OutOfRange, match=f"wind speed {wind:g} m/s is outside 10 to 21 m/s"):
+        assert wind_wave_height(wind) == pytest.approx(0.00533 * wind**2, rel=1e-3)
+    assert wind_wave_height([0.0, 10.0, 21.0])[0] == 0.0
+
+
+@pytest.mark.parametrize("frequency", [1e3, 200e3])
+def test_bubbles_warn_outside_the_frequencies_of_the_handbook(frequency: float) -> None:
+    with pytest.warns(OutOfRange, match="kHz is outside 10 to 100 kHz"):
+        bubble_loss(8.0, frequency, 0.3)
+
+
 def test_bubbles_without_a_frequency_are_refused() -> None:
     with pytest.raises(ValueError, match=r"^the loss in bubbles needs a frequency$"):
         coefficient(SeaSurface(wind_speed=8.0, bubbles=True), 0.3)
@@ -232,7 +269,7 @@ def test_bubbles_without_a_frequency_are_refused() -> None:
 
 def test_bellhops_form_of_the_coefficient_is_the_same_number() -> None:
     """-(f - i s m)/(f + i s m) with f = sqrt(cos^2 q - n^2): exp(-i omega t delays) as here."""
-    q = np.concatenate([np.linspace(0.01, 0.5, 20), np.linspace(0.6, 1.57, 20)])
+    q = np.concatenate([np.linspace(0.01, 0.5, 20), np.linspace(0.6, NORMAL, 20)])
     for loss in (0.0, 0.02):
         n = (1 - 1j * loss) / 1.18
         f = np.sqrt(np.cos(q) ** 2 - n**2 + 0j)
