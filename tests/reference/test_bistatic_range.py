@@ -47,15 +47,16 @@ def test_no_digit_is_lost_where_the_textbook_form_loses_half():
     assert abs(float(printed / exact - 1)) > 1e-7
 
 
-def random_geometry(count, seed=1):
+def random_geometry(count, seed=1, nearest=-1, farthest=3):
     random = np.random.default_rng(seed)
     beam = unit(random.standard_normal((count, 3)))
-    source = unit(random.standard_normal((count, 3))) * 10 ** random.uniform(-1, 3, (count, 1))
-    return beam, 10 ** random.uniform(-1, 3, count), source
+    source = unit(random.standard_normal((count, 3))) * 10 ** random.uniform(nearest, farthest, (count, 1))
+    return beam, 10 ** random.uniform(nearest, farthest, count), source
 
 
-def test_random_targets_are_found_again():
-    beam, r, source = random_geometry(20_000)
+@pytest.mark.parametrize(("nearest", "farthest"), [(-1, 3), (-3, 4)])
+def test_random_targets_are_found_again(nearest, farthest):
+    beam, r, source = random_geometry(20_000, nearest=nearest, farthest=farthest)
     x = np.linalg.norm(r[:, None] * beam - source, axis=1) + r - np.linalg.norm(source, axis=1)
     found = bistatic_range(x, beam, source)
     sane = ~found.ill_conditioned
@@ -63,6 +64,8 @@ def test_random_targets_are_found_again():
     assert sane.mean() > 0.9
     assert np.max(np.abs(found.range - r)[sane] / size[sane]) < 2e-13
     assert np.allclose(excess_path(beam, r, source), x, rtol=1e-9, atol=1e-12 * size.max())
+    assert (excess_path(beam, r, source) >= -1e-12 * size).all()
+    assert ((found.by_path >= 0.5 - 1e-9) & (found.by_path <= 10.0 + 1e-9))[sane].all()
 
 
 @pytest.mark.parametrize("seed", range(3))
