@@ -127,18 +127,6 @@ def test_facets_and_coherent_reflection_give_back_all_and_never_more(wind: float
         assert (0.91 if grazing >= 45.0 else 0.84) < whole < 1.01, grazing
 
 
-def test_no_angle_and_no_wind_makes_a_missing_number() -> None:
-    edges = np.array([0.0, 1e-12, 1e-6, 0.5, 1.0 - 1e-12, 1.0])
-    angles = Angles(*(a.ravel() for a in np.meshgrid(edges, edges, [-1.0, 0.0, 1.0])))
-    for wind in (0.0, 0.3, 0.7, 1.0, 11.0, 60.0):
-        out = WindySurface().strength(angles, BoundarySite(50e3, WAVENUMBER, np.ones_like, wind, rms_height=0.1))
-        assert np.isfinite(out).all() and (out >= 0.0).all()
-    for name in GRAIN_SIZE:
-        out = sediment(angles, WAVENUMBER, name)
-        assert np.isfinite(out).all() and (out >= 0.0).all()
-        assert (out[(angles.sine_in == 0.0) & (angles.forward < 0.0)] < 1e-4).all()
-
-
 def test_rock_is_refused() -> None:
     with pytest.raises(ValueError, match="'rock' has no law; known"):
         RoughSediment(name="rock")

@@ -213,7 +213,7 @@ def _strengths() -> CaseResult:
     edges = np.array([0.0, 1e-12, 1e-6, 0.5, 1.0 - 1e-12, 1.0])
     angles = Angles(*(a.ravel() for a in np.meshgrid(edges, edges, [-1.0, 0.0, 1.0])))
     k = 2.0 * np.pi * 50e3 / C
-    sites = [BoundarySite(50e3, k, np.ones_like, wind, rms_height=0.1) for wind in (0.0, 0.69, 1.0, 11.0, 60.0)]
+    sites = [BoundarySite(50e3, k, np.ones_like, wind, rms_height=0.1) for wind in (0.0, 0.3, 0.69, 1.0, 11.0, 60.0)]
     values = [sediment(angles, k, name) for name in GRAIN_SIZE]
     values += [WindySurface().strength(angles, site) for site in sites]
     along = np.array([x[(angles.sine_in == 0.0) & (angles.sine_out == 0.0) & (angles.forward < 0.0)] for x in values])
