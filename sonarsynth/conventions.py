@@ -16,7 +16,7 @@ Instrument       the sample grid, the beam grid and the assumed sound speed belo
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
@@ -218,8 +218,19 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
+def aligned(rows: Sequence[Sequence[str]], words: Iterable[int] = (0,)) -> list[str]:
+    """Lines of a table of cells (row, column): columns of `words` are flush left, the others, numbers, flush right."""
+    left, columns = frozenset(words), []
+    for n, column in enumerate(zip(*rows, strict=True)):
+        width = max(map(len, column))
+        columns.append([cell.ljust(width) if n in left else cell.rjust(width) for cell in column])
+    return ["  ".join(row).rstrip() for row in zip(*columns, strict=True)]
+
+
 def finite_json(value: Any) -> Any:
-    """Plain JSON values: a number that is not finite, which JSON does not have, becomes null."""
+    """Plain JSON values, of arrays too: a number that is not finite, which JSON does not have, becomes null."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
     if isinstance(value, Mapping):
         return {str(name): finite_json(inner) for name, inner in value.items()}
     if isinstance(value, list | tuple):

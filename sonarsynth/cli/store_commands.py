@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -117,16 +116,20 @@ def _print(score: dict[str, Any], console: Console) -> None:
     from rich.markup import escape
     from rich.table import Table
 
+    from sonarsynth.evaluation.detectors.detector_scores import share_found, words_of
+
     console.print(f"{score['detections']} detections of {score['objects']} objects in {score['frames']} frames")
     table = Table("", "objects", "AP by boxes", "AP50", "AP by distance", "AP 2 m", "found at 1 false alarm a frame")
-    table.add_row("all", *_cells({**score, **next(r for r in score["detection"] if r["false_alarms_a_frame"] == 1.0)}))
+    at_one = next(rate for rate in score["detection"] if rate["false_alarms_a_frame"] == 1.0)
+    table.add_row("all", str(score["objects"]), *words_of(score, at_one))
     for name in (name for name in score if name.startswith("by_")):
         table.add_section()
         for text, row in score[name].items():
-            table.add_row(escape(text) if name == "by_category" else f"{name[3:]} {text}", *_cells(row))
+            which = escape(text) if name == "by_category" else f"{name[3:]} {text}"
+            table.add_row(which, str(row["objects"]), *words_of(row, row))
     console.print(table)
     for rate in score["detection"]:
-        console.print(f"found at {rate['false_alarms_a_frame']:g} false alarms a frame: {_share(rate)}")
+        console.print(f"found at {rate['false_alarms_a_frame']:g} false alarms a frame: {share_found(rate)}")
     for name, row in score["errors"].items():
         if row["count"]:
             share = f"; {100 * row['share_within_3']:.3g} % within 3 predicted errors" if "predicted" in row else ""
@@ -135,14 +138,3 @@ def _print(score: dict[str, Any], console: Console) -> None:
                 f"error of {name}: median {row['median_abs']:.2g} {unit}, mean {row['mean']:.2g} {unit}, rms "
                 f"{row['rms']:.2g} {unit}, of {row['count']}{share}"
             )
-
-
-def _cells(row: dict[str, Any]) -> list[str]:
-    figures = ["-" if math.isnan(row[name]) else f"{row[name]:.3f}" for name in ("ap", "ap50", "ap_distance", "ap_2m")]
-    return [str(row["objects"]), *figures, _share(row)]
-
-
-def _share(row: dict[str, Any]) -> str:
-    if math.isnan(row["detected"]):
-        return "-"
-    return f"{100 * row['detected']:.1f} % ({100 * row['low']:.1f} to {100 * row['high']:.1f})"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.casting.ray_casting import OFFSET, occluded
-from sonarsynth.conventions import Floats, Ints, depth
+from sonarsynth.conventions import Floats, Ints, depth, finite_json
 from sonarsynth.description import FieldError
 from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
 from sonarsynth.environment.boundary_numbers import bounces
@@ -73,8 +73,8 @@ class RayLine:
     def as_json(self) -> dict[str, Any]:
         """The ray for a program: SI units, angles in rad and up positive, null where a number is not known."""
         lists = {n: getattr(self, n).tolist() for n in ("position", "time", "length")}
-        angles = [_number(a) for a in self.elevation]
-        single = {n: _number(getattr(self, n)) for n in ("transmission_loss", "level", "coefficient")}
+        angles = finite_json(self.elevation)
+        single = {n: finite_json(getattr(self, n)) for n in ("transmission_loss", "level", "coefficient")}
         counts = {kind: sum(e == kind for e in self.event) for kind in ("surface", "bottom", "turning point", "facet")}
         return {
             "name": self.name,
@@ -261,8 +261,3 @@ def _family(surface: bool, bottom: bool) -> str:
 def _flags(*words: str) -> tuple[str, ...]:
     """What there is to say against a ray, each thing once."""
     return tuple(dict.fromkeys(w for w in words if w and w != WORDS[GOOD]))
-
-
-def _number(value: Any) -> float | None:
-    """A number for JSON, which knows no NaN and no infinity."""
-    return float(value) if np.isfinite(value) else None

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import counted
+from sonarsynth.conventions import aligned, counted
 from sonarsynth.equations.rays.ray_solutions import water
 from sonarsynth.pictures.ray_figures.ray_figure import section_figure, space_figure
 from sonarsynth.pictures.ray_figures.ray_page import page
@@ -138,8 +138,7 @@ def table(lines: Sequence[RayLine]) -> str:
         texts = [f"{number:.{digits}f}" for number, digits in zip(numbers, (4, 3, 3, 3, 1), strict=True)]
         flags = ", ".join(line.flags) or "good"
         rows.append((line.name, line.family, line.vertices, *texts, str(line.caustics), flags))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    texts = ["  ".join(_aligned(row, widths)).rstrip() for row in rows]
+    texts = aligned(rows, words=(0, 1, 2, len(HEADINGS) - 1))
     if len(eigenrays) > LONGEST_TABLE:
         texts.append(f"... and {len(eigenrays) - LONGEST_TABLE} more, in rays.json")
     if eigenrays:
@@ -152,11 +151,6 @@ def table(lines: Sequence[RayLine]) -> str:
         turned = f"; {met['turning point']} turning points" if met["turning point"] else ""
         texts.append(f"{len(fan)} rays: {', '.join(words) or 'no'} reflections{turned}")
     return "\n".join(texts)
-
-
-def _aligned(row: Sequence[str], widths: Sequence[int]) -> list[str]:
-    """Cells of a table, numbers to the right."""
-    return [c.rjust(w) if 3 <= n <= 8 else c.ljust(w) for n, (c, w) in enumerate(zip(row, widths, strict=True))]
 
 
 def _bearing(frame: Frame, lines: Sequence[RayLine]) -> float:

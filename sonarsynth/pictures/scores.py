@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonarsynth.conventions import REFERENCE_PRESSURE, Floats, Ints
+from sonarsynth.conventions import REFERENCE_PRESSURE, Floats, Ints, aligned
 from sonarsynth.evaluation import brightest_beam_on_target, range_errors
 from sonarsynth.evaluation.point_checks import has_labels
 from sonarsynth.evaluation.point_checks import points as points_of
@@ -131,9 +131,4 @@ def _rows(file: Path) -> list[dict[str, Any]]:
 
 def as_table(names: Sequence[str], standings: Sequence[dict[str, str]]) -> str:
     """Standings of stores side by side, in text; levels are in `LEVEL`."""
-    lines = [["", *names], *([row, *(s[row] for s in standings)] for row in standings[0])]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join([line[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(line[1:], widths[1:], strict=True))]).rstrip()
-        for line in lines
-    )
+    return "\n".join(aligned([["", *names], *([row, *(s[row] for s in standings)] for row in standings[0])]))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, finite_json
 from sonarsynth.pictures.figures.strength_figure import strength_figure
 from sonarsynth.scattering import Scattering
 from sonarsynth.targets.shapes import Shape
@@ -26,11 +26,10 @@ class StrengthTable:
 
     def as_json(self) -> dict[str, Any]:
         """Numbers for programs: aspects in degrees, null for -inf."""
-        level = [[float(v) if np.isfinite(v) else None for v in row] for row in self.strength]
         return {
             "aspect_deg": np.rad2deg(self.aspect).round(9).tolist(),
             "frequency_hz": self.frequency.tolist(),
-            "target_strength_db": level,
+            "target_strength_db": finite_json(self.strength),
         }
 
     def summary(self) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -192,6 +193,19 @@ def evaluate(
         raise FieldError(("detections",), f"category_id {unknown[0] + 1} is not in the store, which has {listed}")
     judged = _with_angles(tree, detections.take(np.isin(detections.frame, frames)))
     return DetectorReport(len(frames), names, judged, objects)
+
+
+def words_of(precision: Mapping[str, float], found: Mapping[str, float]) -> tuple[str, ...]:
+    """Average precisions, and the share that is found with its band, as people read them: "-" where there is none.
+    Both are rows of `DetectorReport.as_json`."""
+    figures = (precision[name] for name in ("ap", "ap50", "ap_distance", "ap_2m"))
+    return *("-" if math.isnan(figure) else f"{figure:.3f}" for figure in figures), share_found(found)
+
+
+def share_found(found: Mapping[str, float]) -> str:
+    """The share that is found with its band of 95 %, as people read it."""
+    detected, low, high = (100.0 * found[name] for name in ("detected", "low", "high"))
+    return "-" if math.isnan(detected) else f"{detected:.1f} % ({low:.1f} to {high:.1f})"
 
 
 def _with_angles(tree: xr.DataTree, detections: Detections) -> Detections:

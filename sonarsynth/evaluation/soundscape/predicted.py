@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, finite_json
 from sonarsynth.equations.noise.stable_laws import ESTIMATORS
 from sonarsynth.evaluation.soundscape.measured import PERCENT, MeasuredFigures
 from sonarsynth.evaluation.soundscape.model import SoundModel
@@ -158,15 +158,5 @@ def as_json(measured: MeasuredFigures, predicted: PredictedFigures | None = None
             "spread": chance,
             "model": model.elevation,
         }
-    plain: dict[str, Any] = _plain(report)
+    plain: dict[str, Any] = finite_json(report)
     return plain
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _plain(inner) for name, inner in value.items()}
-    if isinstance(value, np.ndarray | list):
-        return [_plain(inner) for inner in (value.tolist() if isinstance(value, np.ndarray) else value)]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from sonarsynth.conventions import finite_json
 from sonarsynth.evaluation import warnings as warnings_of
+from sonarsynth.evaluation.detectors.detector_scores import words_of
 from sonarsynth.pictures.figures.style import PAGE_CONFIG
 from sonarsynth.pictures.report_figures.report_numbers import numbers_of
 from sonarsynth.pictures.store_reading import NothingToDraw
@@ -84,15 +85,7 @@ def _drawn(figure: Figure, script: bool) -> str:
 
 def _as_json(numbers: dict[str, Any]) -> str:
     """JSON that ends no element of the page; null where there is no number."""
-    return json.dumps(_plain(numbers)).replace("<", "\\u003c")
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(name): _plain(item) for name, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return json.dumps(finite_json(numbers)).replace("<", "\\u003c")
 
 
 def _head(numbers: dict[str, Any]) -> list[str]:
@@ -128,10 +121,7 @@ def _clouds(numbers: dict[str, Any]) -> list[str]:
 def _scores(numbers: dict[str, Any]) -> list[str]:
     if not numbers["baselines"]:
         return []
-    rows = [
-        (kind, *(_figure(of[name]) for name in ("ap", "ap50", "ap_distance", "ap_2m")), _share(of["detection"][-2]))
-        for kind, of in numbers["baselines"].items()
-    ]
+    rows = [(kind, *words_of(of, of["detection"][-2])) for kind, of in numbers["baselines"].items()]
     head = ("", "AP by boxes", "AP50", "AP by distance", "AP 2 m", "found at 1 false alarm a frame")
     hardest = [tuple(map(str, row.values())) for row in numbers["hardest"]]
     named = ("frame", "objects", "missed", "false alarms")
@@ -139,16 +129,6 @@ def _scores(numbers: dict[str, Any]) -> list[str]:
         f"<p>Of {numbers['judged_frames']} frames; bands of 95 %.</p>{_table(head, rows)}",
         f"<h2>Hardest frames</h2><p>Those that <code>peaks</code> errs in most.</p>{_table(named, hardest)}",
     ]
-
-
-def _figure(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value:.3f}"
-
-
-def _share(row: dict[str, float]) -> str:
-    if math.isnan(row["detected"]):
-        return "-"
-    return f"{100 * row['detected']:.1f} % ({100 * row['low']:.1f} to {100 * row['high']:.1f})"
 
 
 def _table(head: tuple[str, ...], rows: list[Any]) -> str:

@@ -75,17 +75,17 @@ class Facts:
     @property
     def plan(self) -> Mapping[str, Any]:
         """The plan as the store has it; {} in a store of an earlier version."""
-        return _mapping(self.attributes.get("plan"))
+        return mapping_of(self.attributes.get("plan"))
 
     @property
     def dataset(self) -> Mapping[str, Any]:
         """Whose it is, and how to cite it."""
-        return _mapping(self.attributes.get("dataset"))
+        return mapping_of(self.attributes.get("dataset"))
 
     @property
     def provenance(self) -> Mapping[str, Any]:
         """How the store was begun."""
-        return _mapping(self.attributes.get("provenance"))
+        return mapping_of(self.attributes.get("provenance"))
 
     @property
     def created(self) -> str:
@@ -103,7 +103,7 @@ class Facts:
         own = str(self.dataset.get("citation", ""))
         if own:
             return own
-        people = ", ".join(str(_mapping(c).get("name", "")) for c in self.dataset.get("creators", ()))
+        people = ", ".join(str(mapping_of(c).get("name", "")) for c in self.dataset.get("creators", ()))
         year = f" ({self.created[:4]})" if self.created else ""
         dated = f"{people or 'Anonymous'}{year}. {self.title}, version {self.dataset.get('version', '1.0.0')}."
         tool = f"Made with sonarsynth {self.attributes.get('sonarsynth_version', '')}".rstrip() + "."
@@ -115,7 +115,7 @@ class Facts:
         own = str(self.dataset.get("description", ""))
         if own:
             return own
-        sizes = _mapping(self.plan.get("sizes"))
+        sizes = mapping_of(self.plan.get("sizes"))
         phrases = [f"{self.frames} frames"]
         if self.plan.get("sequences"):
             phrases.append(f"in {self.plan['sequences']} sequence{'s' * (self.plan['sequences'] != 1)}")
@@ -140,7 +140,7 @@ def facts_of(store: Folder) -> Facts:
             sizes = [bytes_ for bytes_, _ in mark.files.values() if bytes_ >= 0]
             files += len(sizes)
             size += sum(sizes)
-            others = _mapping(mark.attributes.get("versions"))
+            others = mapping_of(mark.attributes.get("versions"))
             if others:
                 mixed[", ".join(f"{name} {number}" for name, number in others.items())] += len(mark.frames)
     return Facts(
@@ -185,5 +185,6 @@ def _failed(store: Folder) -> dict[str, int]:
     return dict(Counter(last.values()))
 
 
-def _mapping(value: Any) -> Mapping[str, Any]:
+def mapping_of(value: Any) -> Mapping[str, Any]:
+    """What a store says, where it is a mapping; nothing where it is not."""
     return value if isinstance(value, Mapping) else {}

@@ -9,7 +9,7 @@ from itertools import groupby
 from typing import Any, Final
 
 from sonarsynth.conventions import format_bytes
-from sonarsynth.store.cards.facts import Facts
+from sonarsynth.store.cards.facts import Facts, mapping_of
 
 LIMITS: Final = (
     "Everything is simulated; nothing was measured at sea.",
@@ -143,7 +143,7 @@ def _limits(facts: Facts) -> str:
 
 def _origin(facts: Facts) -> str:
     provenance, attrs = facts.provenance, facts.attributes
-    git, machine = _mapping(provenance.get("git")), _mapping(provenance.get("machine"))
+    git, machine = mapping_of(provenance.get("git")), mapping_of(provenance.get("machine"))
     changed = {True: ", with changes that are not in it", False: "", None: ", perhaps with changes"}
     rows = [
         ("sonarsynth", str(attrs.get("sonarsynth_version", ""))),
@@ -152,14 +152,14 @@ def _origin(facts: Facts) -> str:
         ("digest of the recipe", str(attrs.get("recipe_digest", ""))),
         ("seed", str(attrs.get("seed", ""))),
         ("machine", ", ".join(str(machine[k]) for k in ("cpu", "architecture", "distribution") if machine.get(k))),
-        ("libraries", ", ".join(f"{name} {number}" for name, number in _mapping(provenance.get("versions")).items())),
-        *_inputs(_mapping(attrs.get("inputs"))),
+        ("libraries", ", ".join(f"{name} {number}" for name, number in mapping_of(provenance.get("versions")).items())),
+        *_inputs(mapping_of(attrs.get("inputs"))),
     ]
     return _table(("", ""), [row for row in rows if row[1]])
 
 
 def _inputs(recorded: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for target, digests in _mapping(recorded.get("meshes")).items():
+    for target, digests in mapping_of(recorded.get("meshes")).items():
         more = f" and {len(digests) - 3} more" if len(digests) > 3 else ""
         yield f"mesh of {target} (SHA-256)", ", ".join(map(str, digests[:3])) + more
     for file in recorded.get("files", ()):
@@ -181,7 +181,7 @@ def _recipe(facts: Facts) -> str:
 
 def _rights(facts: Facts) -> str:
     who = []
-    for creator in map(_mapping, facts.dataset.get("creators", ())):
+    for creator in map(mapping_of, facts.dataset.get("creators", ())):
         details = [str(creator[k]) for k in ("affiliation", "url") if creator.get(k)]
         who.append(f"- {_text(', '.join([str(creator.get('name', '')), *details]))}")
     licence = str(facts.attributes.get("licence", ""))
@@ -200,7 +200,7 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def _rows(entries: Any, names: Sequence[str]) -> list[tuple[str, ...]]:
     rows = entries if isinstance(entries, list) else []
-    return [tuple(str(_mapping(row).get(name, "")) for name in names) for row in rows]
+    return [tuple(str(mapping_of(row).get(name, "")) for name in names) for row in rows]
 
 
 class Cell(str):
@@ -234,7 +234,3 @@ def _quoted(text: str) -> str:
 def _begun(line: str) -> str:
     """A line that begins as plain text."""
     return _BEGINS.sub(r"\1\\\2", line)
-
-
-def _mapping(value: Any) -> Mapping[str, Any]:
-    return value if isinstance(value, Mapping) else {}

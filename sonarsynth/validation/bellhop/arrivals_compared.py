@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from sonarsynth.conventions import aligned
 from sonarsynth.conventions import depth as depth_of
 from sonarsynth.pictures.ray_lines import RayLine, eigenray_lines
 from sonarsynth.planning import Plan
@@ -101,13 +102,7 @@ def comparison_table(rays: Sequence[RayComparison], file: Path) -> str:
             cells += [f"{np.rad2deg(_either(angle)):.3f}", f"{np.rad2deg(angle[0] - angle[1]):.3f}"]
         cells += [f"{_either(ray.loss):.2f}", f"{ray.loss[0] - ray.loss[1]:.2f}"]
         rows.append((ray.family, f"{ray.surface}, {ray.bottom}", *(c.replace("nan", "-") for c in cells)))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [" ".join(_aligned(row, widths)).rstrip() for row in rows]
-    return "\n".join([f"{file.name}, ours less Bellhop's:", *lines, _summary(rays, len(shown))])
-
-
-def _aligned(row: Sequence[str], widths: Sequence[int]) -> list[str]:
-    return [c.rjust(w + 1) if n else c.ljust(w) for n, (c, w) in enumerate(zip(row, widths, strict=True))]
+    return "\n".join([f"{file.name}, ours less Bellhop's:", *aligned(rows), _summary(rays, len(shown))])
 
 
 def _summary(rays: Sequence[RayComparison], shown: int) -> str:
