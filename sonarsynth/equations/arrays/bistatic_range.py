@@ -26,8 +26,6 @@ class BistaticRange:
     one_plus_cos: Floats  # 1 + cos B, B the angle at the target between the directions to array and source
     by_path: Floats  # dr/dx = 1/(1 + cos B)
     by_angle: Floats  # m/rad: dr/dpsi, psi the angle between beam and source
-    by_baseline: Floats  # dr/db at constant x
-    by_baseline_of_path: Floats  # dr/db at constant total path L = x + b
     by_source: Floats  # (..., xyz) dr/dS at constant x
 
     @property
@@ -61,8 +59,6 @@ def bistatic_range(excess_path: npt.ArrayLike, beam: npt.ArrayLike, source: npt.
             one_plus_cos=1 / by_path,
             by_path=by_path,
             by_angle=-r * b * sine / d,
-            by_baseline=(x - r * h) / d,
-            by_baseline_of_path=(r * (1 - h) - b) / d,
             by_source=by_path[..., None] * (s + from_source),
         )
 

@@ -148,28 +148,24 @@ def rectangular_plate(
 
 
 def circular_plate(
-    radius: float,
-    incident: npt.ArrayLike,
-    scattered: npt.ArrayLike,
-    wavenumber: npt.ArrayLike,
-    reflection: npt.ArrayLike = 1.0,
+    radius: float, incident: npt.ArrayLike, scattered: npt.ArrayLike, wavenumber: npt.ArrayLike
 ) -> Complexes:
     """Far-field amplitude f (...) (m) of a disc of that radius (m), its middle at 0, its normal z: 2 J1(x)/x lobes."""
     wave = _wave(incident, scattered, wavenumber)
     x = np.maximum(radius * np.hypot(wave[..., 0], wave[..., 1]), 1e-150)
-    return _amplitude(wave[..., 2], np.asarray(np.pi * radius**2 * (2.0 * j1(x) / x)), reflection)
+    return _amplitude(wave[..., 2], np.asarray(np.pi * radius**2 * (2.0 * j1(x) / x)), 1.0)
 
 
-def lit_sphere(radius: npt.ArrayLike, wavenumber: npt.ArrayLike, reflection: npt.ArrayLike = 1.0) -> Complexes:
+def lit_sphere(radius: npt.ArrayLike, wavenumber: npt.ArrayLike) -> Complexes:
     """Far-field amplitude f (...) (m) of the Kirchhoff integral over the lit half of a sphere, at backscatter.
 
-    i k a^2 V int_0^1 u exp(2 i k a u) du = (i/2) k a^2 V exp(i k a) (j0(ka) + i j1(ka)), spherical Bessel functions:
-    what ever finer flat facets approach. (a/2) V exp(2 i k a) for large k a, as the exact echo (`modal`), from which it
+    i k a^2 int_0^1 u exp(2 i k a u) du = (i/2) k a^2 exp(i k a) (j0(ka) + i j1(ka)), spherical Bessel functions:
+    what ever finer flat facets approach. (a/2) exp(2 i k a) for large k a, as the exact echo (`modal`), from which it
     differs by the edge that it has where the shadow begins.
     """
     a, k = np.asarray(radius, float), np.asarray(wavenumber, float)
     integral = 0.5 * np.exp(1j * k * a) * (spherical_jn(0, k * a) + 1j * spherical_jn(1, k * a))
-    return np.asarray(1j * k * a * a * np.asarray(reflection) * integral)
+    return np.asarray(1j * k * a * a * integral)
 
 
 def _wave(incident: npt.ArrayLike, scattered: npt.ArrayLike, wavenumber: npt.ArrayLike) -> Floats:
