@@ -237,17 +237,22 @@ def first_hit(
 def clear_of_own_body(bodies: tuple[PlacedTarget, ...], owner: Ints, facet: Ints, direction: Floats) -> Ints:
     """Body (ray,) that rays from the middles of facets (owner and facet of each) in directions (ray, xyz), world, of
     length one, come from and surely do not meet again; -1 where that is not certain."""
-    from sonarsynth.casting import horizons
-
     own = np.full(len(owner), NO_TARGET)
     for number, body in enumerate(bodies):
         rows = slice(None) if len(bodies) == 1 and (owner == 0).all() else np.flatnonzero(owner == number)
-        mesh, towards = casting_mesh(body.mesh), body.pose.turn_to_body(direction[rows])
-        far = horizons.clear_of_body(
-            facet[rows], towards, body.mesh.normal, *mesh.tree, mesh.vertices, mesh.faces, mesh.horizon
-        )
+        far = clear_of_body(body.mesh, facet[rows], body.pose.turn_to_body(direction[rows]))
         own[rows] = np.where(far, number, NO_TARGET)
     return own
+
+
+def clear_of_body(mesh: Mesh, facet: Ints, direction: Floats) -> Bools:
+    """Which rays (ray,) from the middles of facets in directions (ray, xyz), of length one, in the frame of the mesh,
+    surely do not meet it again."""
+    from sonarsynth.casting import horizons
+
+    ready = casting_mesh(mesh)
+    tables = mesh.normal, *ready.tree, ready.vertices, ready.faces, ready.horizon
+    return np.asarray(horizons.clear_of_body(facet, direction, *tables))
 
 
 def occluded(

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import OFFSET, occluded
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.casting.ray_casting import OFFSET, clear_of_body, occluded
+from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -64,24 +64,30 @@ def _visible(
     """The visible facets, in the view of the beams or not, and their share of the area that faces the array."""
     mesh, visible, facing = body.mesh, [], []
     for block in in_blocks(len(mesh.faces)):
-        rows = np.arange(block.start, block.stop)
-        faces, start = _leaving(body, rows, sonar_pose.position)
-        rows, start = rows[faces], start[faces]
+        rows, clear = _leaving(body, bodies, np.arange(block.start, block.stop), sonar_pose.position)
         facing.append(mesh.area[rows])
-        clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
         visible.append(rows[clear & finite(corners, mesh.faces[rows])])
     seen = np.concatenate(visible)
     return seen, float(mesh.area[seen].sum() / np.concatenate(facing).sum()) if len(seen) else 0.0
 
 
-def _leaving(body: PlacedTarget, rows: Ints, to: Floats) -> tuple[Bools, Floats]:
-    """Whether a place (xyz), world, is on the outer side of facets (row,), and their middles (row, xyz), moved off."""
+def _leaving(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], rows: Ints, to: Floats) -> tuple[Ints, Bools]:
+    """Those of facets (row,) on whose outer side a place (xyz), world, is, and which of them no body hides from it."""
+    facet, (start, towards) = np.empty(len(rows), np.int64), np.empty((2, len(rows), 3))
+    mesh, pose = body.mesh, body.pose
+    count = view_kernels.leaving(
+        rows, mesh.centroid, mesh.normal, _offset(body), pose.rotation, pose.position, to, facet, start, towards
+    )
+    facet, start = facet[:count], start[:count]
+    own = np.where(clear_of_body(mesh, facet, towards[:count]), 0, NO_TARGET)
+    others = tuple(other for other in bodies if other is not body)
+    return facet, ~occluded((body, *others), start, np.broadcast_to(to, start.shape), own)
+
+
+def _offset(body: PlacedTarget) -> float:
+    """How far (m) off the facets of a body rays start: more than places in the world are rounded by."""
     farthest = float(np.abs(body.pose.position).max()) + body.mesh.radius
-    offset = max(OFFSET * body.mesh.radius, 8.0 * np.finfo(float).eps * farthest)  # rounding of places in the world
-    facing, start = np.empty(len(rows), bool), np.empty((len(rows), 3))
-    of = rows, body.mesh.centroid, body.mesh.normal
-    view_kernels.leaving(*of, offset, body.pose.rotation, body.pose.position, to, facing, start)
-    return facing, start
+    return max(OFFSET * body.mesh.radius, 8.0 * np.finfo(float).eps * farthest)
 
 
 def lit_fraction(
@@ -98,28 +104,26 @@ def lit_fraction(
         return float("nan")
     if not snap.illuminates:
         return 0.0
-    lit = np.zeros(len(visible), bool)
+    lit, area = np.zeros(len(body.mesh.faces), bool), body.mesh.area
     for block in in_blocks(len(visible)):
         rows = visible[block]
-        facing, start = _leaving(body, rows, snap.position)
         if connect is None:
-            faced = np.flatnonzero(facing)
-            blocked = occluded(bodies, start[faced], np.broadcast_to(snap.position, (len(faced), 3)))
+            faced, clear = _leaving(body, bodies, rows, snap.position)
         else:
             position = body.pose.to_world(body.mesh.centroid[rows])
             normal = body.pose.turn_to_world(body.mesh.normal[rows])
             paths = connect(np.broadcast_to(snap.position, position.shape), position)
             towards = -paths.arrival
             lighting = np.flatnonzero(usable(paths) & (np.einsum("ij,ij->i", towards, normal[paths.pair]) > 0.0))
-            faced = paths.pair[lighting]
-            end = np.broadcast_to(snap.position, (len(faced), 3))
-            blocked = hidden(bodies, medium, start[faced], end, towards[lighting], paths.length[lighting])
-        lit[faced[~blocked] + block.start] = True
-    area = body.mesh.area[visible]
-    return float(area[lit].sum() / area.sum())
+            pair = paths.pair[lighting]
+            start, end = (position + _offset(body) * normal)[pair], np.broadcast_to(snap.position, (len(pair), 3))
+            clear = ~hidden(bodies, medium, start, end, towards[lighting], paths.length[lighting])
+            faced = rows[pair]
+        lit[faced[clear]] = True
+    return float(area[lit].sum() / area[visible].sum())
 
 
 def finite(points: Floats, faces: np.ndarray) -> Bools:
     """Facets (facet,) whose corners are all finite points (point, xyz)."""
-    valid = np.asarray(np.isfinite(points).all(axis=1))
-    return np.ones(len(faces), bool) if valid.all() else np.asarray(valid[faces].all(axis=1))
+    valid = np.isfinite(points)
+    return np.ones(len(faces), bool) if valid.all() else np.asarray(np.asarray(valid.all(axis=1))[faces].all(axis=1))

@@ -162,19 +162,30 @@ def box_of_part_ahead(corners: Floats, face: Ints, box: Floats) -> None:
 @compiled
 def leaving(
     rows: Ints, centroid: Floats, normal: Floats, offset: float, rotation: Floats, position: Floats, to: Floats,
-    facing: Bools, start: Floats,
-) -> None:  # fmt: skip
-    """Write whether a place `to` (xyz), world, is on the outer side of facets (row,), and their middles, moved off by
-    `offset` (m): start (row, xyz), world. rotation (xyz, xyz), position (xyz): the pose of their body."""
-    for r in range(len(rows)):
-        f, ahead = rows[r], 0.0
+    facet: Ints, start: Floats, towards: Floats,
+) -> int:  # fmt: skip
+    """Write those of facets (row,) on whose outer side a place `to` (xyz), world, is: which, their middles, moved off
+    by `offset` (m), world, and directions from there to it, of length one, in the frame of the body: facet (row,),
+    start and towards (row, xyz). Returns how many. rotation (xyz, xyz), position (xyz): the pose of the body."""
+    own, away, count = np.zeros(3), np.empty(3), 0
+    for x in range(3):
+        for y in range(3):
+            own[x] += rotation[y, x] * (to[y] - position[y])
+    for f in rows:
+        ahead = square = 0.0
         for x in range(3):
-            start[r, x], turned = position[x], 0.0
+            away[x] = own[x] - centroid[f, x] - offset * normal[f, x]
+            ahead += normal[f, x] * away[x]
+            square += away[x] ** 2
+        if ahead + offset <= 0.0:
+            continue
+        for x in range(3):
+            start[count, x], towards[count, x] = position[x], away[x] / math.sqrt(square)
             for y in range(3):
-                start[r, x] += rotation[x, y] * (centroid[f, y] + offset * normal[f, y])
-                turned += rotation[x, y] * normal[f, y]
-            ahead += turned * (to[x] - start[r, x])
-        facing[r] = ahead + offset > 0.0
+                start[count, x] += rotation[x, y] * (own[y] - away[y])
+        facet[count] = f
+        count += 1
+    return count
 
 
 @compiled
