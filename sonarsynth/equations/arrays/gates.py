@@ -77,9 +77,11 @@ def gated_spectra(
             f"a window of {count} samples resolves no frequency in {band[0]:g} to {band[1]:g} Hz: take a longer one"
         )
     taper = gate_taper(count, sampling_frequency)
+    gate = slice(first_sample, first_sample + count)
     spectra = np.empty((len(pressure), highest + 1 - lowest), np.complex64)
+    cut = np.zeros((SENSORS_AT_ONCE, length), np.result_type(pressure, taper))
     for low in range(0, len(pressure), SENSORS_AT_ONCE):
-        rows = slice(low, low + SENSORS_AT_ONCE)
-        cut = pressure[rows, first_sample : first_sample + count] * taper
-        spectra[rows] = rfft(cut, length, axis=1)[:, lowest : highest + 1]
+        some = pressure[low : low + SENSORS_AT_ONCE, gate]
+        np.multiply(some, taper, out=cut[: len(some), :count])
+        spectra[low : low + len(some)] = rfft(cut[: len(some)], axis=1)[:, lowest : highest + 1]
     return np.arange(lowest, highest + 1, dtype=float) * (sampling_frequency / length), spectra

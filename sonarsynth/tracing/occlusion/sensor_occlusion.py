@@ -23,8 +23,8 @@ from sonarsynth.tracing.receive_paths import ReceivePaths
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
 
-RAYS = 30_000
-"""Rays that are looked at together."""
+RAYS, STRAIGHT_RAYS = 30_000, 500_000
+"""Rays that are looked at together; of straight ones little is held."""
 NO_CONE = 3
 """Rays that are in no narrow cone for certain, by `ray_cones.ray_cones`: of these the centre and the rim of the array
 are looked at, and where they do not see alike every hydrophone; what only those within the rim see is not found."""
@@ -72,12 +72,12 @@ class Occlusion:
         in_sight, mixed = certain != CLOSED, certain == UNKNOWN
         first = np.append(0, 1 + rim(self.elements))
         for kind in (UNKNOWN, NO_CONE):
-            for rows in _parts(np.flatnonzero(certain == kind), len(first)):
+            for rows in self._parts(legs, np.flatnonzero(certain == kind), len(first)):
                 swerve = self._swerve(legs.select(rows), first) if kind == NO_CONE else None  # others stay open
                 unseen = self._unseen(legs, start, normal, rows, first, swerve)
                 in_sight[rows] = ~unseen.all(axis=1)
                 mixed[rows] |= unseen.any(axis=1)
-        for rows in _parts(np.flatnonzero(mixed & ~in_sight & (certain == UNKNOWN)), len(self._points)):
+        for rows in self._parts(legs, np.flatnonzero(mixed & ~in_sight & (certain == UNKNOWN)), len(self._points)):
             in_sight[rows] = ~self._dark(legs, start, normal, rows, not self._straight(legs)).all(axis=1)
         none = np.zeros((np.count_nonzero(in_sight), 1 + self.elements.count // 8), np.uint8)
         return legs.select(np.flatnonzero(in_sight)).seen(none, mixed[in_sight])
@@ -91,7 +91,7 @@ class Occlusion:
         if not len(rows):
             return legs
         occluded = legs.occluded.copy()
-        for block in _parts(rows, len(self._points)):
+        for block in self._parts(legs, rows, len(self._points)):
             occluded[block] = np.packbits(self._dark(legs, start, normal, block), axis=1)
         return legs.seen(occluded, np.zeros(len(legs.row), bool))
 
@@ -185,6 +185,11 @@ class Occlusion:
         """Whether legs are straight lines from end to end."""
         return self.bending.profile.uniform and not legs.bounces.any()
 
+    def _parts(self, legs: ReceivePaths, rows: Ints, points: int) -> list[Ints]:
+        """Rows in parts, so that few rays to so many points are held at a time."""
+        most = STRAIGHT_RAYS if self._straight(legs) else RAYS
+        return np.array_split(rows, max(1, len(rows) * points // most))
+
     def _unseen(
         self, legs: ReceivePaths, start: Floats, normal: Floats | None, rows: Ints, point: Ints, swerve: Floats | None,
         look: Bools | None = None,
@@ -266,8 +271,3 @@ def cells(elements: Elements) -> Cells:
     for number, group in enumerate(groups):
         cell[group] = number
     return Cells(cell, centre, radius)
-
-
-def _parts(rows: Ints, points: int) -> list[Ints]:
-    """Rows in parts, so that few rays to so many points are held at a time."""
-    return np.array_split(rows, max(1, len(rows) * points // RAYS))
