@@ -17,7 +17,7 @@ from typing import Any, Final
 from distributed import Client, Future, KilledWorker
 
 from sonarsynth.schedule import tasks, worker_status
-from sonarsynth.schedule.tasks import Failure, Job, StageResult, WrittenShard
+from sonarsynth.schedule.tasks import Failure, Job, WrittenShard
 
 SHARDS_AHEAD: Final = 3
 """Shards in flight for each worker: one being written, one being rendered, one to come."""
@@ -170,18 +170,14 @@ class _Builder:
         future.add_done_callback(self.landed.put)
 
     def _submit(self, flight: _Flight) -> Future[Any]:
-        """The tasks of a shard, all on its worker, later stages of earlier frames first."""
+        """The tasks of a shard, all on its worker, those of earlier frames first."""
         self.submitted += 1
         token, blocks = f"{self.token}.{self.submitted}", []
-        results: Any
         for begin in range(0, len(flight.frames), self.job.block):
-            results = flight.frames[begin : begin + self.job.block]
-            self.frames += len(results)
-            first, number = -len(tasks.STAGES) * self.frames, results[0]
-            for n, stage in enumerate(tasks.tasks_of(self.job.products)):
-                key = f"{stage}-{token}-{number}"
-                results = self._task(tasks.RUN[stage], results, key=key, priority=first + n, flight=flight)
-            blocks.append(results)
+            frames = flight.frames[begin : begin + self.job.block]
+            self.frames += len(frames)
+            key = f"frames-{token}-{frames[0]}"
+            blocks.append(self._task(tasks.render_frames, frames, key=key, priority=-self.frames, flight=flight))
         key = f"shard-{token}-{flight.shard}"
         return self._task(tasks.write, flight.shard, blocks, key=key, priority=1, flight=flight)
 
@@ -219,8 +215,7 @@ class _Builder:
 
 def _probe(job: Job, frame: int) -> None:
     """Render a frame and forget it."""
-    step: StageResult = tasks.render_frame(job, frame)
-    del step
+    tasks.render_frames(job, [frame])
 
 
 def run(

@@ -50,6 +50,9 @@ _SETTINGS: Final = {
     "distributed.admin.log-length": 100,  # logs that would grow for days
     "distributed.admin.low-level-log-length": 100,
     "distributed.admin.system-monitor.log-length": 600,
+    "distributed.admin.tick.interval": "1s",  # 20 ms of itself: 3 % of two cores, with the two that follow
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.worker.memory.monitor-interval": "1s",
     "distributed.worker.profile.enabled": False,  # its samples of stacks: 8 MB a worker in each 1000 frames of 13 ms
 }
 

@@ -22,9 +22,7 @@ BRIEF: Final = 5.0
 """Seconds of one core, by counts of work, that a build takes for it to be predicted and to have worker processes."""
 
 BLOCK_SECONDS: Final = 3.0
-"""A task is of as many frames as take so long in all stages, by counts of work: each costs some ms to schedule."""
-BLOCK_BYTES: Final = 64e6
-"""Signals that the frames of a task hold at most."""
+"""A task is of as many frames as take so long, by counts of work: each costs some 10 ms to schedule."""
 
 
 def reachable_by_workers(path: Folder, workers: int | None) -> Folder:
@@ -57,8 +55,7 @@ def job_of(path: Folder, plan: Plan, build: str, frame_timeout: float | None = N
     """
     predicted = plan.predicted_seconds / max(plan.recipe.frames, 1)
     limit = PATIENCE + 20 * predicted if frame_timeout is None else frame_timeout
-    signals = 8 * plan.sizes["sensor"] * plan.sizes["sample"]  # float32, and as they are without reflections
-    frames = min(BLOCK_SECONDS / max(predicted, 1e-6), BLOCK_BYTES / max(signals, 1), plan.shard_frames)
+    frames = min(BLOCK_SECONDS / max(predicted, 1e-6), plan.shard_frames)
     products = tuple(sorted(plan.products))
     return Job(str(path), plan.digest, products, build, limit, plan.shard_frames, max(int(frames), 1))
 
@@ -86,7 +83,7 @@ def make_shards(
     worker_status.close_folder(job.path)  # of a build that was killed
     if scheduler is None and workers == 0:
         for shard, frames in todo.items():
-            done(tasks.write(job, shard, [[tasks.render_frame(job, frame) for frame in frames]]))
+            done(tasks.write(job, shard, [tasks.render_frames(job, frames)]))
         return
     from sonarsynth.schedule import cluster, connecting
 

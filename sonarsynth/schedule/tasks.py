@@ -1,8 +1,8 @@
 """What runs for frames and for a shard, in whatever process: the same functions without a scheduler and on a cluster.
 
-A task is one stage of a block of frames: of one frame where they take long, of several where they are short. It knows
-the store and the recipe's digest, and finds the recipe in the store: nothing large travels to it. A stage that raises
-gives its failure as its result, so that one bad frame costs only itself.
+A task is a frame, or a block of several where they are short; another writes them. It knows the store and the recipe's
+digest, and finds the recipe in the store: nothing large travels to it. A stage of a frame that raises gives its failure
+as its result, so that one bad frame costs only itself.
 """
 
 from __future__ import annotations
@@ -23,16 +23,8 @@ from sonarsynth.schedule import worker_status
 from sonarsynth.store.layout import layout_of
 from sonarsynth.threads import in_one_thread
 
-STAGES = ("trace", "beamform", "range")
-"""Tasks of a block of frames, in order."""
-
 WARM_UP: Final = 300.0
 """Seconds that the first stage of its kind may take longer."""
-
-
-def tasks_of(products: Sequence[str]) -> tuple[str, ...]:
-    """Those of frames with such products: truth and paths are traced, and the last is for what takes single beams."""
-    return STAGES[: 1 if set(products) <= {"paths"} else 3 if {"cloud", "beams"} & set(products) else 2]
 
 
 @dataclass(frozen=True)
@@ -88,54 +80,40 @@ class WrittenShard:
     peak_bytes: int  # of memory of this process so far
 
 
-def trace(job: Job, frames: Sequence[int]) -> list[StageResult]:
-    """Task trace-<token>-<first frame>. Gives what was traced; truth where nothing else is wanted."""
-
-    def work(before: StageResult) -> Any:
-        plan = plan_of(job)
-        if plan.makes_sound:
-            return pipeline.trace_frame(plan, before.frame)
-        return layout_of(plan).check(pipeline.silent_frame(plan, before.frame))
-
-    return [_stage(job, "trace", StageResult(frame), work) for frame in frames]
-
-
-def beamform(job: Job, traced: Sequence[StageResult]) -> list[StageResult]:
-    """Task beamform-<token>-<first frame>. Gives what was heard with what was traced; values without a cloud."""
-
-    def work(before: StageResult) -> Any:
-        beamformed = pipeline.beamform_frame(plan_of(job), before.frame, before.value)
-        if len(tasks_of(job.products)) == 3:
-            return before.value, beamformed
-        return _values(job, before.frame, before.value, beamformed)
-
-    return [_stage(job, "beamform", before, work) for before in traced]
-
-
-def range_(job: Job, beamformed: Sequence[StageResult]) -> list[StageResult]:
-    """Task range-<token>-<first frame>: the values of the frames, in the types of the store."""
-    return [_stage(job, "range", before, lambda step: _values(job, step.frame, *step.value)) for before in beamformed]
-
-
-def _values(
-    job: Job, frame: int, traced: pipeline.TracedFrame, beamformed: pipeline.BeamformedFrame
-) -> pipeline.Values:
-    plan = plan_of(job)
-    return layout_of(plan).check(pipeline.range_frame(plan, frame, traced, beamformed))
-
-
-RUN: Mapping[str, Callable[[Job, Any], list[StageResult]]] = {"trace": trace, "beamform": beamform, "range": range_}
-"""What each task runs: the first of a block is given the numbers of its frames, each other what the one before made."""
-
-
 @in_one_thread
+def render_frames(job: Job, frames: Sequence[int]) -> list[StageResult]:
+    """Task frames-<token>-<first frame>: the values of some frames, in the types of the store, one after the other."""
+    return [render_frame(job, frame) for frame in frames]
+
+
 def render_frame(job: Job, frame: int) -> StageResult:
     """All stages of a frame, here and now."""
-    results: Any = [frame]
-    for name in tasks_of(job.products):
-        results = RUN[name](job, results)
-    step: StageResult = results[0]
-    return step
+    result = StageResult(frame)
+    for name, work in STAGES.items():
+        if name == "trace" or set(job.products) - {"paths"}:
+            result = _stage(job, name, result, work)
+    return result
+
+
+def _trace(plan: Plan, frame: int, before: Any) -> Any:
+    """What was traced; where nothing is heard, truth."""
+    if plan.makes_sound:
+        return pipeline.trace_frame(plan, frame)
+    return layout_of(plan).check(pipeline.silent_frame(plan, frame))
+
+
+def _beamform(plan: Plan, frame: int, traced: pipeline.TracedFrame) -> Any:
+    """What was traced with what was heard."""
+    return traced, pipeline.beamform_frame(plan, frame, traced)
+
+
+def _range(plan: Plan, frame: int, before: tuple[pipeline.TracedFrame, pipeline.BeamformedFrame]) -> Any:
+    """The values of the frame."""
+    return layout_of(plan).check(pipeline.range_frame(plan, frame, *before))
+
+
+STAGES: Final[Mapping[str, Callable[[Plan, int, Any], Any]]] = {"trace": _trace, "beamform": _beamform, "range": _range}
+"""What each stage makes of the plan, the number of a frame and what the stage before made."""
 
 
 def write(job: Job, shard: int, blocks: Sequence[Sequence[StageResult]]) -> WrittenShard:
@@ -199,14 +177,14 @@ def peak_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def _stage(job: Job, name: str, before: StageResult, work: Callable[[StageResult], Any]) -> StageResult:
+def _stage(job: Job, name: str, before: StageResult, work: Callable[[Plan, int, Any], Any]) -> StageResult:
     if before.failure is not None:
         return before
     wall, cpu = time.perf_counter(), time.thread_time()
     with pipeline.stage_timer() as laps:
         try:
             with worker_status.noted(job.path, before.frame, name, _limit(job, name)):
-                value, failure = work(before), None
+                value, failure = work(plan_of(job), before.frame, before.value), None
             _warm.add(name)
         except Exception as error:
             value, failure = None, failure_of(before.frame, name, error)
