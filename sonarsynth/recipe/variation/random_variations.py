@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from annotated_types import Ge, Le, MinLen
@@ -85,38 +85,40 @@ class NumberVariation(RandomVariation):
 
 
 @description
-class Uniform(NumberVariation):
-    """Evenly between two bounds."""
+class _Bounded:
+    """What is drawn between two bounds."""
 
-    kind: Literal["uniform"] = "uniform"
     low: Quantity
     """Least value."""
     high: Quantity
     """Largest value."""
 
     @model_validator(mode="after")
-    def _check(self) -> Uniform:
-        _check_bounds(self.low, self.high)
+    def _check_bounds(self) -> Self:
+        _check_order(self.low, self.high)
         return self
 
     def at(self, fraction: float) -> Plain:
-        """The value that this fraction (0 to 1) of all draws stays under."""
-        return _between(self.low, self.high, fraction)
+        """The value at this fraction (0 to 1) of the way, exactly low at 0 and high at 1."""
+        (low, unit), (high, _) = number_and_unit(self.low), number_and_unit(self.high)
+        return with_unit(min(max(low * (1.0 - fraction) + high * fraction, low), high), unit)
 
 
 @description
-class LogUniform(NumberVariation):
-    """Between two bounds, evenly in the logarithm."""
+class Uniform(_Bounded, NumberVariation):
+    """Evenly between two bounds."""
+
+    kind: Literal["uniform"] = "uniform"
+
+
+@description
+class LogUniform(_Bounded, NumberVariation):
+    """Between two bounds over 0, evenly in the logarithm."""
 
     kind: Literal["log_uniform"] = "log_uniform"
-    low: Quantity
-    """Least value, over 0."""
-    high: Quantity
-    """Largest value."""
 
     @model_validator(mode="after")
     def _check(self) -> LogUniform:
-        _check_bounds(self.low, self.high)
         if not number_and_unit(self.low)[0] > 0.0:
             raise ValueError(f"low must be greater than 0, not {self.low}")
         return self
@@ -168,7 +170,7 @@ class Normal(NumberVariation):
         if not number_and_unit(self.deviation)[0] > 0.0:
             raise ValueError(f"deviation must be greater than 0, not {self.deviation}")
         if self.low is not None and self.high is not None:
-            _check_bounds(self.low, self.high)
+            _check_order(self.low, self.high)
         first, last, _ = self._shares()
         if not last - first >= LEAST_SHARE:
             raise ValueError(f"less than {LEAST_SHARE:g} of the distribution lies between low and high")
@@ -242,26 +244,13 @@ class Choice(RandomVariation):
 
 
 @description
-class Sobol(RandomVariation):
+class Sobol(_Bounded, RandomVariation):
     """Evenly between two bounds, and more evenly than by chance: the repeats of a grid point share one Sobol sequence
     (Sobol 1967, directions of Joe and Kuo 2008), with a dimension for each variation of this kind, shifted at random
     (digital shift) for each grid point.
     """
 
     kind: Literal["sobol"] = "sobol"
-    low: Quantity
-    """Least value."""
-    high: Quantity
-    """Largest value."""
-
-    @model_validator(mode="after")
-    def _check(self) -> Sobol:
-        _check_bounds(self.low, self.high)
-        return self
-
-    def at(self, fraction: float) -> Plain:
-        """The value at this fraction (0 to 1) of the way from low to high."""
-        return _between(self.low, self.high, fraction)
 
     def draw(self, seed: int, key: str, path: str, dimension: int, repeat: int) -> Plain:
         """The value of a repeat of the grid point `key`, in this dimension of the sequence."""
@@ -271,13 +260,7 @@ class Sobol(RandomVariation):
 Variation = Annotated[Uniform | LogUniform | Integers | Normal | Choice | Sobol, BY_KIND]
 
 
-def _check_bounds(low: float | str, high: float | str) -> None:
+def _check_order(low: float | str, high: float | str) -> None:
     same_unit(low=low, high=high)
     if not number_and_unit(low)[0] < number_and_unit(high)[0]:
         raise ValueError(f"low must be less than high: {low} to {high}")
-
-
-def _between(low: float | str, high: float | str, fraction: float) -> Plain:
-    """Exactly low at 0 and high at 1."""
-    (a, unit), (b, _) = number_and_unit(low), number_and_unit(high)
-    return with_unit(min(max(a * (1.0 - fraction) + b * fraction, a), b), unit)
