@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args, get_type_hints
+from pathlib import Path
+from typing import Any
 
-from sonarsynth.conventions import UNITS, Unit
+from sonarsynth.conventions import UNITS
 from sonarsynth.recipe.reading import RecipeError, loads
+from sonarsynth.recipe.reading.yaml_source import read_text
+from sonarsynth.recipe.variation.setting import unit_at
 
 PREFERRED = {"m": ("m", "mm", "um"), "s": ("s", "ms", "us"), "Hz": ("kHz", "Hz"), "rad": ("deg",), "rad/s": ("deg/s",)}
 """Units that people read, largest first, of SI units."""
@@ -118,7 +121,7 @@ def _value(value: Any, path: tuple[str, ...], recipe: Any) -> str:
         return str(value.get("kind") or "given").replace("_", " ")
     if _form(value)[0] == "many":
         return f"of {len(value)}" if len(value) > 3 else ", ".join(_items(value))
-    unit = _unit(recipe, path)
+    unit = found.symbol if (found := unit_at(recipe, path)) else ""
     if isinstance(value, list):
         text = "[" + ", ".join(_number(item, "") for item in value) + "]" + (f" {unit}" if unit else "")
     else:
@@ -144,12 +147,9 @@ def _number(value: Any, unit: str) -> str:
 
 def _plain(text: str) -> Any:
     """A recipe as plain values; None where it is not YAML."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
     try:
-        return YAML(typ="safe", pure=True).load(text)
-    except (YAMLError, ValueError):
+        return read_text(text, "", Path()).data
+    except RecipeError:
         return None
 
 
@@ -159,22 +159,3 @@ def _loaded(text: str) -> Any:
         return loads(text, resolved=True)
     except (RecipeError, ValueError):
         return None
-
-
-def _unit(recipe: Any, path: Sequence[str]) -> str:
-    """SI unit of the field at a path; "" where it has none, or the recipe cannot be read."""
-    value, hint = recipe, None
-    for key in path:
-        if isinstance(value, tuple):
-            value = next((item for i, item in enumerate(value) if key in (str(i), getattr(item, "name", None))), None)
-        else:
-            hint = get_type_hints(type(value), include_extras=True).get(key) if value is not None else None
-            value = getattr(value, key, None)
-    return _unit_in(hint)
-
-
-def _unit_in(hint: Any) -> str:
-    for annotation in getattr(hint, "__metadata__", ()):
-        if isinstance(annotation, Unit):
-            return annotation.symbol
-    return next((symbol for annotation in get_args(hint) if (symbol := _unit_in(annotation))), "")

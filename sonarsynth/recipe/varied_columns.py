@@ -16,7 +16,7 @@ from sonarsynth.recipe.variation.grid import Axis
 from sonarsynth.recipe.variation.named_paths import listed_values
 from sonarsynth.recipe.variation.random_variations import Variation
 from sonarsynth.recipe.variation.setting import unit_at, value_at
-from sonarsynth.recipe.variation.values import Plain
+from sonarsynth.recipe.variation.values import Plain, where
 
 UDUNITS = {"rad": "degree", "rad/s": "degree s-1", "m/s": "m s-1", "kg/m3": "kg m-3", "psu": "1e-3"}
 """Units as stored; others as they are."""
@@ -54,7 +54,7 @@ def _column(sequences: Sequences, entry: Axis | Variation, values: Sequence[Plai
     value: Any = 0.0
     if applying is not None:
         scene = sequences.described(applying)
-        unit, value = unit_at(scene, path), value_at(scene, path)
+        unit, value = unit_at(scene, where(path)[1:]), value_at(scene, path)
     numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
     parsed = {v: _number(v, unit) for v in set(values) | set(listed) if v != NOTHING} if numeric else {}
     long_name = ", ".join(entry.path)

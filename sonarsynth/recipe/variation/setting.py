@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-import types
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Any, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
 from sonarsynth.conventions import Unit
 from sonarsynth.description import FieldError, named_files
 from sonarsynth.receiver import Sonar
-from sonarsynth.recipe.field_messages import error_message, error_path, members, unknown
+from sonarsynth.recipe.field_messages import error_message, error_path, unknown
 from sonarsynth.recipe.scene import Scene, Trajectory, World
 from sonarsynth.recipe.variation.values import Plain, Where, put, where
 
@@ -108,40 +107,20 @@ def value_at(scene: Scene, path: str) -> Any:
     return value
 
 
-def unit_at(scene: Scene, path: str) -> Unit | None:
-    """The unit of the number that a path leads to; None for one without."""
-    value: Any = scene
-    kind: Any = Scene
-    for key in where(path)[1:]:
+def unit_at(root: Any, keys: Where) -> Unit | None:
+    """The unit of the number that a path leads to, from a description on; None for one without, or no such field.
+    Entries of a list go by number or by name."""
+    value, hint = root, None
+    for key in keys:
         if isinstance(value, tuple):
-            kind, value = _member(kind, int(key), len(value)), value[int(key)]
+            value = next((item for i, item in enumerate(value) if key in (i, str(i), getattr(item, "name", ""))), None)
         else:
-            field = type(value).__pydantic_fields__[str(key)]
-            kind, value = _with(field.annotation, field.metadata), getattr(value, str(key))
-    return _unit(kind)
+            hint = None if value is None else get_type_hints(type(value), include_extras=True).get(str(key))
+            value = getattr(value, str(key), None)
+    return _unit_in(hint)
 
 
-def _with(annotation: Any, metadata: list[Any]) -> Any:
-    units = [m for m in metadata if isinstance(m, Unit)]
-    return Annotated[annotation, units[0]] if units else annotation
-
-
-def _member(kind: Any, index: int, size: int) -> Any:
-    """The annotation of a member of a tuple of this size."""
-    for option in members(kind):
-        inner = get_args(option)
-        if get_origin(option) is tuple and inner:
-            if inner[-1] is Ellipsis:
-                return inner[0]
-            if len(inner) == size:
-                return inner[index]
-    return None
-
-
-def _unit(kind: Any) -> Unit | None:
-    if get_origin(kind) is Annotated:
-        inner, *metadata = get_args(kind)
-        return next((m for m in metadata if isinstance(m, Unit)), None) or _unit(inner)
-    if get_origin(kind) in (Union, types.UnionType):
-        return next((unit for unit in map(_unit, get_args(kind)) if unit is not None), None)
-    return None
+def _unit_in(hint: Any) -> Unit | None:
+    """The unit that an annotation names, or the first that a part of it does."""
+    own = (annotation for annotation in getattr(hint, "__metadata__", ()) if isinstance(annotation, Unit))
+    return next(own, None) or next((unit for unit in map(_unit_in, get_args(hint)) if unit is not None), None)
