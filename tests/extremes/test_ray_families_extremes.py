@@ -11,8 +11,9 @@ import pytest
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.rays import ray_solutions
 from sonarsynth.validation.rays.ray_matching import rays_of
+from sonarsynth.validation.references.rays.followed_rays import families
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
-from tests.following import families, family, images
+from tests.ray_paths import family, images
 from tests.waiting import HANGING
 
 CHANNEL = ray_solutions.water(np.array([0.0, 20.0, 50.0]), np.array([1510.0, 1500.0, 1515.0]), 50.0)

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.rays import ray_solutions
-from tests.following import families, family, follow, images, nodes
+from sonarsynth.validation.references.rays.followed_rays import families, follow, nodes
+from tests.ray_paths import family, images
 
 BOTTOM_DEPTH = 100.0
 nodes_of_water = st.lists(

@@ -7,7 +7,7 @@ import pytest
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.rays import ray_solutions
-from tests.following import random_water
+from tests.ray_paths import random_water
 
 
 def along(

@@ -19,9 +19,9 @@ from sonarsynth.equations.rays.ray_solutions import CAUSTIC
 from sonarsynth.validation.rays import ray_cases
 from sonarsynth.validation.rays.ray_cases import Case
 from sonarsynth.validation.rays.ray_matching import Rays, errors, miscounted, nearest, rays_of, worst
+from sonarsynth.validation.references.rays.followed_rays import count_rays
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
 from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
-from sonarsynth.validation.references.rays.slowness_fan import count_rays
 from sonarsynth.validation.validation_rows import Row
 
 if TYPE_CHECKING:
@@ -75,7 +75,8 @@ def _layered(quick: bool) -> Iterator[Row]:
         eigenrays, cost = search(case)
         rays = rays_of(eigenrays)
         ends = (case.start, case.end, case.distance)
-        wrong = miscounted(rays, count_rays(case.depth, case.speed, *ends, case.vertices, case.reflections))
+        water = ray_solutions.water(case.depth, case.speed, case.bottom)
+        wrong = miscounted(rays, count_rays(water, *ends, case.vertices, case.reflections))
         yield Row(case.name, FAN, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(rays.pair)))
         keep = _thinned(case, rays)
         selected, trusted = rays.select(keep), np.asarray(eigenrays.flag[keep] != CAUSTIC)

@@ -1,11 +1,12 @@
 """Rays followed leg by leg through layered water by Snell's law: launch, refract, turn, reflect, and note every visit.
 
-Nothing is shared with the search for eigenrays: no sums with multiplicities, no bounds, no chains. Works on one ray or
-on many that see the same layers, in NumPy's long doubles.
+A dense fan of them has every ray that joins two points. Nothing is shared with the search for eigenrays: no sums with
+multiplicities, no bounds, no chains. Works on one ray or on many that see the same layers, in NumPy's long doubles.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,6 +16,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.rays import ray_solutions
+from sonarsynth.validation.rays import ray_matching
 
 Family = tuple[int, int, int, int, int]
 """(launch sign, surface, bottom, turning, arrival sign), up positive: no two rays of one such path cross."""
@@ -44,13 +46,17 @@ def nodes(water: ray_solutions.Water, ends: tuple[float, float]) -> tuple[list[A
 
 
 def middle(p: Any) -> Any:
+    """One of the slownesses, which stands for all."""
     return p[len(p) // 2] if isinstance(p, np.ndarray) else p
 
 
 def sides(z: list[Any], start: Any, end: Any) -> tuple[int, int]:
     """Nodes of the two ends; on a jump the side that faces the other end."""
-    upper, lower = z.index, lambda depth: len(z) - 1 - z[::-1].index(depth)
-    return (upper if start > end else lower)(start), (upper if end > start else lower)(end)
+    first, last = (
+        [z.index(depth) for depth in (start, end)],
+        [len(z) - 1 - z[::-1].index(depth) for depth in (start, end)],
+    )
+    return (first if start > end else last)[0], (first if end > start else last)[1]
 
 
 def follow(
@@ -63,12 +69,13 @@ def follow(
     last, typical = len(z) - 1, middle(p)
     i, receiver = sides(z, *ends)
     surface = bottom = turning = 0
-    total = 0
+    total, layers = 0, {}  # what each layer adds, by its upper node
     while True:
         j = i - up  # the next node
         if 0 <= j <= last and typical * c[j] < 1:
-            total = total + through(p, abs(z[j] - z[i]), c[i], c[j])
-            i = j
+            if (upper := min(i, j)) not in layers:
+                layers[upper] = through(p, abs(z[j] - z[i]), c[i], c[j])
+            total, i = total + layers[upper], j
         else:
             if j < 0 or j > last:
                 surface, bottom = surface + (up > 0), bottom + (up < 0)
@@ -132,9 +139,9 @@ def families(
         z[i] <= a <= z[i + 1] and c[i] == c[i + 1] and z[i] < z[i + 1] for i in range(len(z) - 1)
     )
     if level:
-        p = float(1 / c[z.index(a)])
+        flat = float(1 / c[z.index(a)])
         for rows in found:
-            rows.append(((0, 0, 0, 0, 0), p, p))
+            rows.append(((0, 0, 0, 0, 0), flat, flat))
     return found
 
 
@@ -153,35 +160,12 @@ def straddling(p: Any, miss: Any, at: Any, depth: int = 3) -> list[tuple[float, 
     return pairs
 
 
-def family(found: ray_solutions.Eigenrays, i: int) -> Family:
-    """The family of a found ray."""
-    counts = int(found.surface[i]), int(found.bottom[i]), int(found.turning[i])
-    return int(np.sign(found.start_sine[i])), *counts, int(np.sign(found.end_sine[i]))
-
-
-def images(bottom_depth: float, start: float, end: float, reflections: int) -> list[tuple[int, int, int, int, float]]:
-    """Paths in uniform water, shortest first: launch sign, surface, bottom, arrival sign, height gone (m)."""
-    direct = int(np.sign(start - end))
-    rows = [(direct, 0, 0, direct, abs(start - end))]
-    for hits in range(1, reflections + 1):
-        for up in (1, -1):
-            last_up = up if hits % 2 else -up  # sense of travel before the last hit
-            height = (
-                (start if up > 0 else bottom_depth - start)
-                + (hits - 1) * bottom_depth
-                + (end if last_up > 0 else bottom_depth - end)
-            )
-            first, second = (hits + 1) // 2, hits // 2
-            rows.append((up, first if up > 0 else second, second if up > 0 else first, -last_up, height))
-    return sorted(rows, key=lambda row: row[4])
-
-
-def random_water(rng: np.random.Generator, layers: int, spread: float) -> ray_solutions.Water:
-    """A random profile over a bottom at 100 m; some layers of one speed, some jumps."""
-    depth = np.sort(rng.uniform(0.0, 100.0, layers))
-    speed = 1500.0 + spread * rng.normal(size=layers)
-    if layers > 3 and rng.random() < 0.5:
-        speed[2] = speed[1]
-    if layers > 4 and rng.random() < 0.5:
-        depth[4] = depth[3]
-    return ray_solutions.water(depth, speed, 100.0)
+def count_rays(
+    water: ray_solutions.Water, start: Floats, end: Floats, distance: Floats, vertices: int, reflections: int
+) -> Counter[ray_matching.Family]:
+    """Rays of every family, for pairs of ends at depths (pair,) m, in distances (pair,) m."""
+    return Counter(
+        (pair, *family[:4])
+        for pair, (a, b, far) in enumerate(zip(start, end, distance, strict=True))
+        for family, *_ in families(water, float(a), float(b), np.array([far]), vertices, reflections)[0]
+    )
