@@ -87,7 +87,8 @@ class Attribution:
     """Whose energy beams hold at delays: groups of paths of one snap and target, and of one way to each."""
 
     clock: float  # s: when the direct pulse that delays are counted from arrives
-    paths: Arrivals  # that may be heard, ascending in delay
+    arrivals: Arrivals
+    rows: Ints  # (path,) those of them that may be heard, ascending in delay
     first: Ints  # (point,) the first path that may be heard then
     target: Ints  # (group,) -1: the snap itself, or scatterers without a body
     snap: Ints  # (group,)
@@ -111,38 +112,43 @@ def attribution(
     gate, reach = GATE / width, elements.aperture / listening.sound_speed
     clock = _clock(arrivals, listening.clock, gate)
     moment = clock + late
-    longer = float(np.abs(arrivals.corner_delays).max(initial=0.0))
+    longer = np.abs(arrivals.corner_delays).max(axis=1, initial=0.0)
     slowness = listening.sound_speed / arrivals.sound_speed
-    across = gate + reach * _apart(slowness * arrivals.direction, beam)
-    window = np.array([[-1.0], [1.0]]) * (across + longer)
+    across = gate + reach * kernels.farthest(arrivals.direction, slowness, beam)
+    window = np.array([[-1.0], [1.0]]) * (across + longer.max(initial=0.0))
     ends = np.searchsorted(np.sort(moment), arrivals.delay + window)
-    audible = np.flatnonzero(_loud(arrivals, len(band.energy)) & (ends[1] > ends[0]))
-    paths = arrivals.select(audible[np.argsort(arrivals.delay[audible], kind="stable")])
-    first, last = np.searchsorted(paths.delay, moment + window)
-    _, example, group = np.unique(_code(paths, len(band.energy)), return_index=True, return_inverse=True)
-    groups = paths.target[example], paths.snap[example], paths.arrives_by[example], paths.lit_by[example]
-    if not len(audible):
+    code = _code(arrivals, len(band.energy))
+    rows = np.flatnonzero(_loud(arrivals.amplitude**2, code) & (ends[1] > ends[0]))
+    rows = rows[np.argsort(arrivals.delay[rows], kind="stable")]
+    delay, direction, code = arrivals.delay[rows], arrivals.direction[rows], code[rows]
+    first, last = np.searchsorted(delay, moment + window)
+    known = np.flatnonzero(np.bincount(code))  # (group,) its code
+    group = np.searchsorted(known, code)
+    example = np.empty(len(known), np.int64)
+    example[group[::-1]] = rows[::-1]  # the first path of each
+    groups = arrivals.target[example], arrivals.snap[example], arrivals.arrives_by[example], arrivals.lit_by[example]
+    if not len(rows):
         none = np.zeros((len(beam), 0))
         owner, share = np.full(len(beam), NO_TARGET), np.zeros((len(beam), 1))
-        return Attribution(clock, paths, first, *groups, none, none, owner, share)
-    across = gate + reach * _apart(slowness * paths.direction, beam)  # without those that come at other times
+        return Attribution(clock, arrivals, rows, first, *groups, none, none, owner, share)
+    across = gate + reach * kernels.farthest(direction, slowness, beam)  # without those that come at other times
     fine = band.sliced(min(2.0 * width * across, MOST_BINS))
     focus = 0.0 if listening.focus is None else 1.0 / listening.focus
-    curvature, pulse = 1.0 / paths.radius, fine.energy[groups[1]]
+    curvature, pulse = 1.0 / arrivals.radius[rows], fine.energy[groups[1]]
     columns = kernels.attribute(
         beam,
         moment,
         0.5 * beam_energy,  # at positive frequencies
         first,
         last,
-        paths.direction,
+        direction,
         slowness,
-        paths.delay,
+        delay,
         curvature,
-        np.abs(paths.corner_delays).max(axis=1),
+        longer[rows],
         group,
-        paths.direct[example],
-        _spectra(paths, elements, fine),
+        arrivals.direct[example],
+        _spectra(arrivals, rows, elements, fine),
         _matched(fine)[groups[1]],
         pulse,
         fine.frequency,
@@ -152,7 +158,7 @@ def attribution(
         reach,
         pattern_of(elements, listening.sound_speed, curvature, focus, band.high),
     )
-    return Attribution(clock, paths, first, *groups, columns[0], 2.0 * columns[1], *columns[2:])
+    return Attribution(clock, arrivals, rows, first, *groups, columns[0], 2.0 * columns[1], *columns[2:])
 
 
 def _code(paths: Arrivals, snaps: int) -> Ints:
@@ -163,53 +169,41 @@ def _code(paths: Arrivals, snaps: int) -> Ints:
     return np.asarray(((owner + 1) * snaps + paths.snap) * len(FAMILIES) ** 2 + ways)
 
 
-def _loud(arrivals: Arrivals, snaps: int) -> Bools:
-    """(path,) without those that together bring `FAINT` of the power of their group at most."""
-    power, code = arrivals.amplitude**2, _code(arrivals, snaps)
-    order = np.lexsort((power, code))
-    up_to = np.cumsum(power[order])
-    start = np.searchsorted(code[order], code[order])  # the first of each group
-    total = np.bincount(code, power)[code[order]]
-    loud = np.empty(len(power), bool)
-    loud[order] = up_to - up_to[start] + power[order][start] > FAINT * total
+def _loud(power: Floats, code: Ints) -> Bools:
+    """(path,) without those that together bring `FAINT` of the power of their group, of one code, at most."""
+    loud, faint = np.empty(len(power), bool), np.asarray(FAINT * np.bincount(code, power))
+    kernels.louder(power, code, np.argsort(power, kind="stable"), faint, loud)
     return loud
-
-
-def _apart(vectors: Floats, others: Floats) -> float:
-    """Bound on how far vectors (row, xyz) are from others, two at most."""
-    if not (len(vectors) and len(others)):
-        return 0.0
-    far = np.maximum(vectors.max(axis=0) - others.min(axis=0), others.max(axis=0) - vectors.min(axis=0))
-    return min(float(np.linalg.norm(far)), 2.0)
 
 
 def _clock(arrivals: Arrivals, clock: float, gate: float) -> float:
     """When (s) the direct pulse that delays are counted from arrives: as traced, where one does at that time."""
-    direct = arrivals.delay[arrivals.direct & (arrivals.surface + arrivals.bottom == 0)]
+    rows = np.flatnonzero(arrivals.direct)
+    direct = arrivals.delay[rows[(arrivals.surface[rows] == 0) & (arrivals.bottom[rows] == 0)]]
     if not len(direct):
         return clock
     near = float(direct[np.argmin(np.abs(direct - clock))])
     return near if abs(near - clock) < gate else clock
 
 
-def _spectra(paths: Arrivals, elements: Elements, band: Band) -> kernels.Complexes:
-    """Spectra (path, bin) that elements hear, over that of the snap at 1 m, without delay."""
-    amplitude = paths.amplitude
-    if paths.occluded.shape[1]:  # of the array, as much as sees it
-        hidden = np.bitwise_count(paths.occluded).sum(axis=1) - (paths.occluded[:, 0] >= 128)
+def _spectra(arrivals: Arrivals, rows: Ints, elements: Elements, band: Band) -> kernels.Complexes:
+    """Spectra (path, bin) that elements hear of some paths (path,), over that of the snap at 1 m, without delay."""
+    amplitude = arrivals.amplitude[rows]
+    if arrivals.occluded.shape[1]:  # of the array, as much as sees it
+        occluded = arrivals.occluded[rows]
+        hidden = np.bitwise_count(occluded).sum(axis=1) - (occluded[:, 0] >= 128)
         amplitude = amplitude * (1.0 - hidden / elements.count)
-    sine = paths.direction[:, 1:] * (elements.face / paths.sound_speed)
+    sine = arrivals.direction[rows, 1:] * (elements.face / arrivals.sound_speed)
     frequency = band.frequency
-    spectra = kernels.path_spectra(
-        amplitude, paths.phase, paths.delay_std, paths.absorption, sine, frequency, band.relative
-    )
-    shaped = paths.coherent | paths.corner_delays.any(axis=1) | (paths.coherent_fraction > 0.0)
+    phase, delay_std, loss = (column[rows] for column in (arrivals.phase, arrivals.delay_std, arrivals.absorption))
+    spectra = kernels.path_spectra(amplitude, phase, delay_std, loss, sine, frequency, band.relative)
+    shaped = arrivals.coherent | arrivals.corner_delays.any(axis=1) | (arrivals.coherent_fraction > 0.0)
     if shaped.any():
-        echo = paths.select(shaped)
+        echo = arrivals.select(rows[shaped[rows]])
         shape = facet_response(
             frequency, echo.coherent, echo.corner_delays, echo.coherent_fraction, echo.height_delay_std, echo.centre
         )
-        spectra[shaped] *= shape
+        spectra[shaped[rows]] *= shape
     return spectra
 
 

@@ -12,7 +12,6 @@ from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Bools, Floats, Ints
 
 Complexes = npt.NDArray[np.complex128]
-Int32s = npt.NDArray[np.int32]
 RIM_STEP = 0.35
 """rad at the rim of the aperture between two tables of the pattern: the nearest one errs by 0.1 rad rms at most."""
 
@@ -30,33 +29,52 @@ class Pattern(NamedTuple):
 
 @compiled
 def path_spectra(
-    amplitude: Floats,
-    phase: Floats,
-    delay_std: Floats,
-    loss: Floats,
-    sine: Floats,
-    frequency: Floats,
-    relative: Floats,
+    amplitude: Floats, phase: Floats, delay_std: Floats, loss: Floats, sine: Floats, frequency: Floats, relative: Floats
 ) -> Complexes:
     """Spectra (path, bin) of paths as an element of the array hears them, over that of the snap at 1 m; no delay.
 
     phase rad, blur s, loss dB at the centre of the band, relative (bin,) more at the others; sine (path, 2): those of
     the direction along y and z times the side of the square face over the sound speed (s).
     """
-    spectrum = np.empty((len(amplitude), len(frequency)), np.complex128)
+    bins, spacing = len(frequency), frequency[1] - frequency[0] if len(frequency) > 1 else 0.0
+    spectrum = np.empty((len(amplitude), bins), np.complex128)
     for e in range(len(amplitude)):
         turn = complex(math.cos(phase[e]), math.sin(phase[e])) * amplitude[e]
-        for k in range(len(frequency)):
-            f = frequency[k]
-            gain = math.exp(
-                -0.5 * (2.0 * math.pi * f * delay_std[e]) ** 2 - math.log(10.0) / 20.0 * loss[e] * relative[k]
-            )
-            for axis in range(2):
-                x = math.pi * f * sine[e, axis]
+        blur, decay = 0.5 * (2.0 * math.pi * delay_std[e]) ** 2, math.log(10.0) / 20.0 * loss[e]
+        for k in range(bins):
+            spectrum[e, k] = turn * math.exp(-blur * frequency[k] ** 2 - decay * relative[k])
+        for axis in range(2):
+            x, step = math.pi * frequency[0] * sine[e, axis], math.pi * spacing * sine[e, axis]
+            phasor, turned = complex(math.cos(x), math.sin(x)), complex(math.cos(step), math.sin(step))
+            for k in range(bins):
                 if abs(x) > 1e-6:
-                    gain *= math.sin(x) / x
-            spectrum[e, k] = turn * gain
+                    spectrum[e, k] *= phasor.imag / x
+                x, phasor = x + step, phasor * turned
     return spectrum
+
+
+@compiled
+def farthest(vectors: Floats, factor: float, others: Floats) -> float:
+    """Bound on how far vectors (row, xyz) times a factor are from others (row, xyz), two at most; 0 without any."""
+    square = 0.0
+    for x in range(3):
+        low, high, least, most = np.inf, -np.inf, np.inf, -np.inf
+        for n in range(len(vectors)):
+            low, high = min(low, factor * vectors[n, x]), max(high, factor * vectors[n, x])
+        for n in range(len(others)):
+            least, most = min(least, others[n, x]), max(most, others[n, x])
+        square += max(high - least, most - low, 0.0) ** 2
+    return min(math.sqrt(square), 2.0)
+
+
+@compiled
+def louder(power: Floats, code: Ints, order: Ints, faint: Floats, loud: Bools) -> None:
+    """Write which paths (path,) are more than those that, from the faintest of their code on, bring `faint` (code,) at
+    most; order (path,): ascending in power."""
+    up_to = np.zeros(len(faint))
+    for e in order:
+        up_to[code[e]] += power[e]
+        loud[e] = up_to[code[e]] > faint[code[e]]
 
 
 @compiled
@@ -187,6 +205,28 @@ def attribute(
 
 
 @compiled
+def means(
+    share: Floats, first: Ints, rows: Ints, delay: Floats, radius: Floats, facet: Ints, centroid: Floats
+) -> Floats:
+    """Means (point, 5) over the paths (point, path from `first` on) of points by their shares: of delay (s), of radius
+    (m), and of the middle (xyz) of the facet.
+
+    rows (path,): which paths they are of those with delay, radius and facet (path,); centroid (facet, xyz).
+    """
+    out = np.zeros((len(share), 5))
+    for p in range(len(share)):
+        total = share[p].sum()
+        for e in range(share.shape[1]):
+            if share[p, e] > 0.0:
+                weight, row = share[p, e] / total, rows[first[p] + e]
+                out[p, 0] += weight * delay[row]
+                out[p, 1] += weight * radius[row]
+                for x in range(3):
+                    out[p, 2 + x] += weight * centroid[facet[row], x]
+    return out
+
+
+@compiled
 def _compare(
     power: Floats, total: Floats, sums: Complexes, peaks: Complexes, energy: Floats, pulse: Bools, beam_energy: float
 ) -> None:
@@ -203,69 +243,3 @@ def _compare(
         if pulse[g] and total[g] > remainder:
             power[g] *= remainder / total[g]
             total[g] = remainder
-
-
-@compiled
-def distances(points: Floats, vertices: Floats, faces: Int32s, nodes: Floats, order: Int32s, distance: Floats) -> None:
-    """Distance (point,) of points (point, xyz) to the nearest facet of a mesh, exact; nodes, order: `facet_tree`."""
-    leaves, count = len(nodes) // 2, len(order)
-    stack, near = np.empty(128, np.int64), np.empty(128)
-    for p in range(len(points)):
-        best, depth = np.inf, 1
-        stack[0], near[0] = 1, _to_box(points[p], nodes[1])
-        while depth:
-            depth -= 1
-            node = stack[depth]
-            if near[depth] >= best:
-                continue
-            if node >= leaves:
-                for i in range((node - leaves) * count // leaves, (node - leaves + 1) * count // leaves):
-                    f = order[i]
-                    a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-                    best = min(best, _to_triangle(points[p], a, b, c))
-                continue
-            child, sibling = _to_box(points[p], nodes[2 * node]), _to_box(points[p], nodes[2 * node + 1])
-            far = 2 * node + (1 if sibling > child else 0)
-            stack[depth], near[depth] = far, max(child, sibling)
-            stack[depth + 1], near[depth + 1] = 4 * node + 1 - far, min(child, sibling)
-            depth += 2
-        distance[p] = math.sqrt(best)
-
-
-@compiled
-def _to_box(point: Floats, node: Floats) -> float:
-    """Square of the distance to a box; infinite to an empty one."""
-    square = 0.0
-    for x in range(3):
-        if node[3 + x] < 0.0:
-            return np.inf
-        square += max(abs(point[x] - node[x]) - node[3 + x], 0.0) ** 2
-    return square
-
-
-@compiled
-def _to_triangle(p: Floats, a: Floats, b: Floats, c: Floats) -> float:
-    """Square of the distance to a triangle: to its plane where the foot is inside all edges, else to the nearest edge.
-
-    Source: Ericson (2005), Real-Time Collision Detection, section 5.1.5.
-    """
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    square = nx * nx + ny * ny + nz * nz
-    beyond_v = (y * vz - z * vy) * nx + (z * vx - x * vz) * ny + (x * vy - y * vx) * nz
-    beyond_u = (uy * z - uz * y) * nx + (uz * x - ux * z) * ny + (ux * y - uy * x) * nz
-    if square > 0.0 and beyond_v >= 0.0 and beyond_u >= 0.0 and beyond_v + beyond_u <= square:
-        return float((x * nx + y * ny + z * nz) ** 2 / square)
-    return min(_to_edge(p, a, b), _to_edge(p, b, c), _to_edge(p, c, a))
-
-
-@compiled
-def _to_edge(p: Floats, a: Floats, b: Floats) -> float:
-    """Square of the distance to an edge."""
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
-    square = ux * ux + uy * uy + uz * uz
-    t = min(max((x * ux + y * uy + z * uz) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    return float((x - t * ux) ** 2 + (y - t * uy) ** 2 + (z - t * uz) ** 2)

@@ -7,9 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import casting_mesh
+from sonarsynth.casting.surface_distances import surface_distances
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, direction
-from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import point_kernels as kernels
 from sonarsynth.labels.attribution_of_points import MOST_BINS, Attribution, SonarTiming, attribution
 from sonarsynth.labels.level_band import Band
@@ -60,22 +59,24 @@ def label_points(
     }
     labels["origin"][lit != NO_TARGET] = ORIGINS.index("reverberation")
     rows = np.flatnonzero(explained)
-    owner, loudest = attributed.owner[rows], attributed.first[rows] + attributed.share[rows].argmax(axis=1)
+    owner = attributed.owner[rows]
+    loudest = attributed.rows[attributed.first[rows] + attributed.share[rows].argmax(axis=1)]
     for name in ("target", "emission", "family", "lit_by"):
         labels[name][rows] = getattr(attributed, "snap" if name == "emission" else name)[owner]
-    labels["facet"][rows] = attributed.paths.facet[loudest]
-    labels["origin"][rows] = _origins(attributed.paths.select(loudest), beam[rows], listening, band)
+    labels["facet"][rows] = arrivals.facet[loudest]
+    labels["origin"][rows] = _origins(arrivals, loudest, beam[rows], listening, band)
     echo = np.flatnonzero(labels["target"] >= 0)
     near = _from_targets(attributed, echo, cloud.position[echo].astype(float), moment, listening)
     labels["true_range"][echo], labels["distance"][echo] = near
     return PointLabels(**labels)
 
 
-def _origins(paths: Arrivals, beam: Floats, listening: SonarTiming, band: Band) -> Ints:
+def _origins(arrivals: Arrivals, path: Ints, beam: Floats, listening: SonarTiming, band: Band) -> Ints:
     """Index into ORIGINS (point,) of what beams (point, xyz) hear of the paths (point,) that bring most."""
+    direction, kind = arrivals.direction[path], arrivals.kind[path]
     elements, centre = listening.elements, 0.5 * (band.low + band.high)
     spread = _spread(elements)
-    apart = paths.direction / paths.sound_speed - beam / listening.sound_speed  # s/m
+    apart = direction / arrivals.sound_speed - beam / listening.sound_speed  # s/m
     origin = np.full(len(beam), ORIGINS.index("main lobe"))
     beside = np.flatnonzero(2.0 * np.pi * centre * np.linalg.norm(apart @ spread, axis=1) > FIRST_NULL)
     origin[beside] = ORIGINS.index("side lobe")
@@ -87,9 +88,9 @@ def _origins(paths: Arrivals, beam: Floats, listening: SonarTiming, band: Band) 
         origin[beside[grating]] = ORIGINS.index("grating lobe")
     normal = _normal(elements, listening.sound_speed / centre)
     if normal is not None:
-        origin[(paths.direction @ normal) * (beam @ normal) < 0.0] = ORIGINS.index("mirror image")
-    origin[paths.direct] = ORIGINS.index("snap itself")
-    origin[paths.kind == Kind.REVERBERATION] = ORIGINS.index("reverberation")
+        origin[(direction @ normal) * (beam @ normal) < 0.0] = ORIGINS.index("mirror image")
+    origin[kind == Kind.DIRECT] = ORIGINS.index("snap itself")
+    origin[kind == Kind.REVERBERATION] = ORIGINS.index("reverberation")
     return origin
 
 
@@ -109,27 +110,18 @@ def _from_targets(
 ) -> tuple[Floats, Floats]:
     """Range (point,) of where the echoes of points were made, and distance (point,) of the places (point, xyz) that the
     sonar gives them from the target, where sound met it and the array (m)."""
-    paths, share = attributed.paths, attributed.share[points]
-    row = np.minimum(attributed.first[points, None] + np.arange(share.shape[1]), len(paths.delay) - 1)
-    weight = share / share.sum(axis=1, keepdims=True)
-    mean_delay = np.einsum("pe,pe->p", weight, paths.delay[row])
-    met = mean_delay - np.einsum("pe,pe->p", weight, paths.radius[row]) / paths.sound_speed
-    array = listening.pose.position + mean_delay[:, None] * listening.velocity
-    position = array + listening.pose.turn_to_world(places)
-    origin, distance, owner = np.empty(places.shape), np.empty(len(points)), attributed.owner[points]
+    arrivals, owner = attributed.arrivals, attributed.owner[points]
+    columns = attributed.rows, arrivals.delay, arrivals.radius, arrivals.facet
+    ranges, distance = np.empty((2, len(points)))
     for group in np.unique(owner):
-        rows, body = owner == group, moment.bodies[attributed.target[group]]
-        placed = body.later(float(met[rows].mean()))
-        moved = (met[rows, None] - met[rows].mean()) * placed.velocity
-        middle = body.mesh.centroid[np.where(weight[rows] > 0.0, paths.facet[row[rows]], 0)]
-        origin[rows] = placed.pose.to_world(np.einsum("pe,pex->px", weight[rows], middle)) + moved
-        distance[rows] = surface_distances(placed, position[rows] - moved)
-    return np.linalg.norm(origin - array, axis=1), distance
-
-
-def surface_distances(body: PlacedTarget, points: Floats) -> Floats:
-    """Distances (point,) m of points (point, xyz) of the world from the surface of a body, inside or outside: exact."""
-    ready = casting_mesh(body.mesh)
-    at, distance = (body.pose.to_body(points) - ready.centre) / ready.size, np.empty(len(points))
-    kernels.distances(at, ready.vertices, ready.faces, *ready.tree, distance)
-    return distance * ready.size
+        at, body = owner == group, moment.bodies[attributed.target[group]]
+        own = points[at]
+        mean = kernels.means(attributed.share[own], attributed.first[own], *columns, body.mesh.centroid)
+        met = mean[:, 0] - mean[:, 1] / arrivals.sound_speed
+        placed = body.later(float(met.mean()))
+        moved = (met[:, None] - met.mean()) * placed.velocity
+        array = listening.pose.position + mean[:, :1] * listening.velocity
+        ranges[at] = np.linalg.norm(placed.pose.to_world(mean[:, 2:]) + moved - array, axis=1)
+        place = array + listening.pose.turn_to_world(places[at])
+        distance[at] = surface_distances(placed, place - moved)
+    return ranges, distance

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import trimesh
 
+from sonarsynth.casting.surface_distances import surface_distances
 from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import ConstantVelocity, Still
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import Band, SonarTiming, label_points
 from sonarsynth.labels.attribution_of_points import attribution
-from sonarsynth.labels.point_labels import surface_distances
 from sonarsynth.pipeline import trace_frame
 from sonarsynth.pipeline.labelling import band_of
 from sonarsynth.planning import plan

@@ -16,8 +16,8 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
+from sonarsynth.casting.surface_distances import surface_distances
 from sonarsynth.geometry import Pose
-from sonarsynth.labels.point_labels import surface_distances
 from sonarsynth.pipeline import BeamformedFrame, beamform_frame, cloud_of, trace_frame
 from sonarsynth.planning import Plan, plan
 from sonarsynth.ranging import BeamAxis, FirstEcho, Peaks
