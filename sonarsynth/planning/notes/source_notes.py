@@ -10,8 +10,10 @@ from sonarsynth.ranging import LocatingMethod
 from sonarsynth.recipe.scene import Scene
 
 OFF = 3.0
-"""A source this many standard errors of the bottom's depth above the bottom stands off it; and a speed of sound that is
-assumed is another than the water's."""
+"""A source this many standard errors of the bottom's depth above the bottom stands off it."""
+OTHER_WATER = 2.0
+"""A speed of sound so many standard errors from the water's is taken for another: with what else errs, places are then
+past three predicted errors in more than one of twenty frames."""
 
 
 def standing_off(scene: Scene) -> tuple[str, ...]:
@@ -37,7 +39,7 @@ def off_the_bottom(scene: Scene) -> list[str]:
 
 def assumed_speed_notes(looks: Sequence[SampledScene]) -> list[str]:
     """Where the sonar takes the water about it for other water than it knows that it may be, in the worst sequence."""
-    worst, lines = OFF, []
+    worst, lines = OTHER_WATER, []
     for look in looks:
         sonar, depth = look.scene.sonar, -float(look.frames[0].sonar_pose.position[2])
         assumed, error, speed = sonar.assumed_sound_speed, sonar.sound_speed_error, float(look.profile.at(depth))
