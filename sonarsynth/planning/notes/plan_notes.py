@@ -134,15 +134,14 @@ def _accuracy(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
             f"{errors.uncut:.2g}"
         )
     if plan.choices.occlusion == "sensors" and plan.scene.physics.occlusion == "auto":
+        needs = f"accuracy.signal {allowed.signal:g} needs the targets' occlusion from each hydrophone"
         why = f"the error is {errors.uncut:.2g}" if np.isfinite(errors.uncut) else "the error is larger"
         if allowed.signal < OWN_VIEW:
             why = f"what is hidden from a few alone errs by up to {OWN_VIEW:g} at these"
         elif errors.uncut <= allowed.signal:
-            why += ", and may be more in sequences that were not measured in"
-        lines.append(
-            f"accuracy.signal {allowed.signal:g} needs the targets' occlusion from each hydrophone: with that from "
-            f"the array centre {why} (scene.physics.occlusion)"
-        )
+            needs = f"accuracy.signal {allowed.signal:g} may need the targets' occlusion from each hydrophone"
+            why += " in the sequences measured, and may be more in the others"
+        lines.append(f"{needs}: with that from the array centre {why} (scene.physics.occlusion)")
     if np.hypot(np.nan_to_num(errors.expansion), np.nan_to_num(errors.synthesis)) > allowed.signal:
         lines.append(
             f"signal errors are {errors.expansion:.2g} (paths over the array) and {errors.synthesis:.2g} (synthesis): "
