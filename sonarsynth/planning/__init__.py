@@ -49,14 +49,14 @@ __all__ = [
     "survey_of",
 ]
 
-SHARD_BYTES = 64e6
+SHARD_BYTES = 128e6
 """A shard holds about this much before compression, and at most so many frames:"""
 SHARD_FRAMES = 8
 MANY_FRAMES = 256
-"""Frames of a shard of a large dataset of short frames: a shard costs some 30 ms, whatever it holds, and 80 files."""
+"""Frames of a shard of a large dataset of short frames: a shard costs some 20 ms, whatever it holds, and 100 files."""
 SHARDS = 64
 """Shards of a dataset, at least, for there to be more than SHARD_FRAMES frames in one."""
-SHARD_SECONDS = 10.0
+SHARD_SECONDS = 20.0
 """Seconds that such a shard takes at most, by counts of work: those of the machine that costs were measured on."""
 STRANGERS = 4
 """Snaps that the sonar looks at besides those of the recipe, where there is a chorus."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import resource
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -89,10 +89,15 @@ def render_frames(job: Job, frames: Sequence[int]) -> list[StageResult]:
 def render_frame(job: Job, frame: int) -> StageResult:
     """All stages of a frame, here and now."""
     result = StageResult(frame)
-    for name, work in STAGES.items():
-        if name == "trace" or set(job.products) - {"paths"}:
-            result = _stage(job, name, result, work)
+    for name in stages_of(job.products):
+        result = _stage(job, name, result)
     return result
+
+
+def stages_of(products: Iterable[str]) -> list[str]:
+    """Those of frames with such products: truth and paths are traced, and the last is for what takes single beams."""
+    asked = set(products)
+    return list(STAGES)[: 1 if asked <= {"paths"} else 3 if asked & {"cloud", "beams"} else 2]
 
 
 def _trace(plan: Plan, frame: int, before: Any) -> Any:
@@ -103,8 +108,9 @@ def _trace(plan: Plan, frame: int, before: Any) -> Any:
 
 
 def _beamform(plan: Plan, frame: int, traced: pipeline.TracedFrame) -> Any:
-    """What was traced with what was heard."""
-    return traced, pipeline.beamform_frame(plan, frame, traced)
+    """What was traced with what was heard; values, where that is the last stage."""
+    both = traced, pipeline.beamform_frame(plan, frame, traced)
+    return both if len(stages_of(plan.products)) == 3 else _range(plan, frame, both)
 
 
 def _range(plan: Plan, frame: int, before: tuple[pipeline.TracedFrame, pipeline.BeamformedFrame]) -> Any:
@@ -177,14 +183,14 @@ def peak_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def _stage(job: Job, name: str, before: StageResult, work: Callable[[Plan, int, Any], Any]) -> StageResult:
+def _stage(job: Job, name: str, before: StageResult) -> StageResult:
     if before.failure is not None:
         return before
     wall, cpu = time.perf_counter(), time.thread_time()
     with pipeline.stage_timer() as laps:
         try:
             with worker_status.noted(job.path, before.frame, name, _limit(job, name)):
-                value, failure = work(plan_of(job), before.frame, before.value), None
+                value, failure = STAGES[name](plan_of(job), before.frame, before.value), None
             _warm.add(name)
         except Exception as error:
             value, failure = None, failure_of(before.frame, name, error)
