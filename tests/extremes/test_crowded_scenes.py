@@ -7,8 +7,7 @@ import pytest
 
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.description import FieldError
-from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.equations.scattering.facet_pulses import facet_response
+from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Still
@@ -16,7 +15,7 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.planning import plan
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
-from sonarsynth.receiver import PlanarLattice, Romanis, Sonar, elements
+from sonarsynth.receiver import PlanarLattice, Sonar
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Scene, World
 from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe
@@ -27,17 +26,11 @@ from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Sphere
 from sonarsynth.targets.target import Target
 from sonarsynth.tracing.arrivals import trace
+from tests.echoes import ARRAY, BOTTOM_DEPTH, EAST, PROFILE, ROMANIS, SCATTERED, C, transfer
+from tests.echoes import heard as every_path
 
-C = 1500.0
-BOTTOM_DEPTH = 30.0
-WATER = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
-ARRAY = np.array([0.0, 0.0, -15.0])
-EAST = quaternion(0.5 * np.pi)
-ROMANIS = elements(Romanis())
-F = np.linspace(25e3, 85e3, 7)
 SOURCE = ARRAY + [3.0, 5.0, 1.3]
 SHARP = Kirchhoff(edges="sharp")
-SCATTERED = Kirchhoff(forward="scattered")
 
 
 def placed(mesh: Mesh, *place: float, turned: float = 1.1, name: str = "body") -> PlacedTarget:
@@ -53,11 +46,8 @@ def heard(
     bent: bool = False,
 ) -> Arrivals:
     """Every path; all of them finite."""
-    speed = np.array([C + 8.0, C - 7.0]) if bent else np.array([C])
-    water = Medium(WATER, Profile(np.array([0.0, BOTTOM_DEPTH])[: len(speed)], speed))
-    snaps = (Emission(np.asarray(source), 0.0, LogarithmicBubble(), None),)
-    context = FrameContext(0.0, bodies, snaps, water, Receiver(Pose(ARRAY, EAST), ROMANIS), laws)
-    found = trace(context, AutoTracing(bounces=bounces))
+    bends = Profile(np.array([0.0, BOTTOM_DEPTH]), np.array([C + 8.0, C - 7.0]))
+    found = every_path(bodies, source, laws, bounces=bounces, profile=bends if bent else PROFILE)
     for name, value in found.columns.items():
         assert np.isfinite(value).all(), name
     return found
@@ -66,15 +56,6 @@ def heard(
 def echoes(*args: object, **kwargs: object) -> Arrivals:
     found = heard(*args, **kwargs)
     return found.select(~found.direct)
-
-
-def transfer(found: Arrivals) -> Floats:
-    """Pressure (frequency,) at the array centre for a snap of unit spectrum at 1 m."""
-    shape = facet_response(
-        F, found.coherent, found.corner_delays, found.coherent_fraction, found.height_delay_std, found.centre
-    )
-    phase = found.phase[:, None] - 2.0 * np.pi * found.delay[:, None] * F
-    return (found.amplitude[:, None] * shape * np.exp(1j * phase)).sum(axis=0)
 
 
 def unhidden(bodies: tuple[PlacedTarget, ...], own: int, towards: Floats) -> tuple[Bools, Bools]:

@@ -8,55 +8,20 @@ import numpy as np
 import pytest
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.equations.scattering.facet_pulses import facet_response
-from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.geometry import Pose
 from sonarsynth.products import Arrivals
-from sonarsynth.propagation import AutoTracing
-from sonarsynth.receiver import Romanis, elements
 from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
-from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
-from sonarsynth.tracing.arrivals import trace
+from tests.echoes import ARRAY, BOTTOM_DEPTH, EAST, ROMANIS, C, F, body, heard, transfer
 from tests.spheres import exact_sphere
 
-C = 1500.0
-BOTTOM_DEPTH = 30.0
-WATER = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
-PROFILE = Profile(np.array([0.0]), np.array([C]))
-ARRAY = np.array([0.0, 0.0, -15.0])
-EAST = quaternion(0.5 * np.pi)
-ROMANIS = elements(Romanis())
-F = np.linspace(25e3, 85e3, 7)
 
-
-def body(mesh: Mesh, place: Floats, name: str = "body", turned: float = 0.5 * np.pi) -> PlacedTarget:
-    return PlacedTarget(name, mesh, Pose(np.array(place, float), quaternion(turned)), np.zeros(3))
-
-
-def echo(
-    bodies: tuple[PlacedTarget, ...], source: Floats, laws: tuple[object, ...], bounces: int = 0, array: Floats = ARRAY
-) -> Arrivals:
-    snaps = (Emission(np.array(source, float), 0.0, LogarithmicBubble(), None),)
-    receiver = Receiver(Pose(array, EAST), ROMANIS)
-    found = trace(
-        FrameContext(0.0, bodies, snaps, Medium(WATER, PROFILE), receiver, laws), AutoTracing(bounces=bounces)
-    )
+def echo(*scene: object, **more: object) -> Arrivals:
+    """Every path of `heard` but the direct one."""
+    found = heard(*scene, **more)
     return found.select(~found.direct)
-
-
-def transfer(found: Arrivals) -> Floats:
-    """Pressure (frequency,) at the array centre for a snap of unit spectrum at 1 m."""
-    shape = facet_response(
-        F, found.coherent, found.corner_delays, found.coherent_fraction, found.height_delay_std, found.centre
-    )
-    phase = found.phase[:, None] - 2.0 * np.pi * found.delay[:, None] * F
-    left = np.exp(-0.5 * np.multiply.outer(found.delay_std, 2.0 * np.pi * F) ** 2)
-    return (found.amplitude[:, None] * shape * left * np.exp(1j * phase)).sum(axis=0)
 
 
 @pytest.mark.parametrize("angle", [0.0, 60.0, 100.0])

@@ -9,68 +9,15 @@ import pytest
 from scipy.special import fresnel
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.equations.scattering.facet_pulses import facet_response
-from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Track
-from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.products import Arrivals
-from sonarsynth.propagation import AutoTracing
-from sonarsynth.receiver import Romanis, elements
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting
-from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
-from sonarsynth.tracing.arrivals import trace
+from tests.echoes import ARRAY, BOTTOM_DEPTH, EAST, PROFILE, ROMANIS, SCATTERED, WATER, C, F, body, heard, transfer
 from tests.spheres import exact_sphere
-
-C = 1500.0
-BOTTOM_DEPTH = 30.0
-WATER = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
-PROFILE = Profile(np.array([0.0]), np.array([C]))
-ARRAY = np.array([0.0, 0.0, -15.0])
-EAST = quaternion(0.5 * np.pi)
-ROMANIS = elements(Romanis())
-F = np.linspace(25e3, 85e3, 7)
-SCATTERED = Kirchhoff(forward="scattered")
-
-
-def body(mesh: Mesh, place: Floats, name: str = "body", turned: float = 0.5 * np.pi) -> PlacedTarget:
-    return PlacedTarget(name, mesh, Pose(np.array(place, float), quaternion(turned)), np.zeros(3))
-
-
-def heard(
-    bodies: tuple[PlacedTarget, ...],
-    source: Floats,
-    laws: tuple[object, ...] = (SCATTERED,),
-    *,
-    array: Floats = ARRAY,
-    bounces: int = 0,
-    profile: Profile = PROFILE,
-    moving: Track | None = None,
-    water: Environment = WATER,
-) -> Arrivals:
-    snaps = (Emission(np.array(source, float), 0.0, LogarithmicBubble(), None),)
-    receiver = Receiver(Pose(np.array(array, float), EAST), ROMANIS, track=moving)
-    return trace(FrameContext(0.0, bodies, snaps, Medium(water, profile), receiver, laws), AutoTracing(bounces=bounces))
-
-
-def transfer(found: Arrivals, sensor: Floats | None = None) -> Floats:
-    """Pressure (frequency,) at the array centre, or at a sensor (xyz), for a snap of unit spectrum at 1 m."""
-    shape = facet_response(
-        F, found.coherent, found.corner_delays, found.coherent_fraction, found.height_delay_std, found.centre
-    )
-    delay, amplitude = found.delay, found.amplitude
-    if sensor is not None:
-        away = np.linalg.norm(found.radius[:, None] * found.direction - sensor, axis=1)
-        late, louder = (found.expansion.over(name, sensor[None])[:, 0] for name in ("delay", "amplitude"))
-        delay = delay + (away - found.radius) / found.sound_speed + late
-        amplitude = amplitude * found.radius / away * (1.0 + louder)
-    phase = found.phase[:, None] - 2.0 * np.pi * delay[:, None] * F
-    left = np.exp(-0.5 * np.multiply.outer(found.delay_std, 2.0 * np.pi * F) ** 2)
-    return (amplitude[:, None] * shape * left * np.exp(1j * phase)).sum(axis=0)
 
 
 def straight(source: Floats, array: Floats = ARRAY) -> Floats:
