@@ -6,10 +6,11 @@ from scipy.spatial import ConvexHull
 
 from sonarsynth.geometry.surfaces import longest_edge, sides, volume
 from sonarsynth.targets.generated.generation import generate, sphere
-from sonarsynth.targets.generated.myring import hull_length, hull_radius
+from sonarsynth.targets.generated.myring import hull_length
 from sonarsynth.targets.generated.remus import HULL
 from sonarsynth.targets.generated.smoothing import corner_normals, curved
 from sonarsynth.targets.shapes import Box, LShape, Remus100
+from tests.hulls import hull_radius
 
 CREASE = np.radians(40.0)
 

@@ -7,10 +7,11 @@ import pytest
 from scipy.integrate import quad
 
 from sonarsynth.geometry.surfaces import longest_edge, volume
-from sonarsynth.targets.generated.myring import hull_length, hull_radius
+from sonarsynth.targets.generated.myring import hull_length
 from sonarsynth.targets.generated.remus import FIN_FOOT, FIN_STATION, HULL, ROOT_CHORD, naca0012
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Remus100
+from tests.hulls import hull_radius
 
 BOUNDS = [0.0, 0.1745, 0.8285, hull_length(HULL)]
 

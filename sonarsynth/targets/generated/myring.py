@@ -7,7 +7,6 @@ the parameters of Prestero (2001), MIT, equations 2.1 and 2.2.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
 from sonarsynth.targets.generated.revolution import Arc, line
@@ -17,21 +16,6 @@ from sonarsynth.targets.shapes import Myring
 def hull_length(hull: Myring) -> float:
     """Length (m) of the hull without the tips that its offsets cut off."""
     return hull.nose - hull.nose_offset + hull.middle + hull.tail - hull.tail_offset
-
-
-def hull_radius(hull: Myring, station: npt.ArrayLike) -> Floats:
-    """Radius (m) of the hull at stations (m aft of the foremost point); NaN outside."""
-    at = np.asarray(station, float)
-    front = hull.nose - hull.nose_offset
-    ahead = (front - at) / hull.nose
-    behind = at - front - hull.middle
-    radius = np.where(ahead > 0, _nose(hull, np.clip(ahead, 0.0, 1.0)), _tail(hull, np.clip(behind, 0.0, hull.tail)))
-    return np.asarray(np.where((at >= 0) & (at <= hull_length(hull)), radius, np.nan))
-
-
-def _nose(hull: Myring, t: Floats) -> Floats:
-    """Radius at t nose lengths before the middle: r = (d/2) (1 - t^2)^(1/n)."""
-    return np.asarray(0.5 * hull.diameter * ((1.0 - t) * (1.0 + t)) ** (1.0 / hull.exponent))
 
 
 def _tail(hull: Myring, x: Floats) -> Floats:
