@@ -28,9 +28,9 @@ NODES, PANEL = 20, 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ExactCollapse:
-    """A bubble from rest to the top of its last rebound. Times are from rest."""
+    """A bubble from rest to the top of its rebound. Times are from rest."""
 
-    times: tuple[float, ...]  # s, where the wall stands still: smallest, largest, smallest, ...
+    times: tuple[float, ...]  # s, where the wall stands still: smallest, largest
     radii: tuple[float, ...]  # m
     pressures: tuple[float, ...]  # Pa at 1 m
     node: Floats  # (node,) s, of a quadrature from rest to the end
@@ -40,8 +40,8 @@ class ExactCollapse:
     steps: int
 
 
-def exact_bubble(cavity: Cavity, rebounds: int = 0) -> ExactCollapse:
-    """A bubble to 1e-17 through its first collapse and so many more. Raises ModuleNotFoundError without mpmath."""
+def exact_bubble(cavity: Cavity) -> ExactCollapse:
+    """A bubble to 1e-17 through its collapse and rebound. Raises ModuleNotFoundError without mpmath."""
     import mpmath as mp
 
     with mp.workdps(DIGITS + GUARD):
@@ -50,15 +50,15 @@ def exact_bubble(cavity: Cavity, rebounds: int = 0) -> ExactCollapse:
         R, v, t = numbers.radius, mp.mpf(0), mp.mpf(0)
         turns: list[tuple[Any, Any, Any]] = []
         pieces: list[tuple[Any, Any, list[Any]]] = []
-        while len(turns) < 2 * (rebounds + 1):
+        while len(turns) < 2:
             series = _series(R, v, numbers, slowness)
             speed = _slope(series)
             lasts = [k for k in (ORDER, ORDER + 1) if series[k]]  # every other one is 0 from rest without losses
             h = min((mp.mpf(10) ** -DIGITS * R / abs(series[k])) ** (mp.mpf(1) / k) for k in lasts)
             after = _at(speed, h)
-            turned = after > 0 if len(turns) % 2 == 0 else after < 0
+            turned = after < 0 if turns else after > 0
             x = _turn(speed, h * v / (v - after)) if turned else h
-            pieces.append((t, x if len(turns) + turned == 2 * (rebounds + 1) else h, series))
+            pieces.append((t, x if turns and turned else h, series))
             if turned:
                 R_turn, bend = _at(series, x), _at(_slope(speed), x)
                 turns.append((t + x, R_turn, numbers.density * R_turn**2 * bend))
