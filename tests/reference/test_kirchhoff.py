@@ -16,7 +16,7 @@ from sonarsynth.equations.scattering.kirchhoff_integral import (
     shadow_taper,
     triangle_integral,
 )
-from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
+from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude, spacing
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.equations.scattering.roughness import coherent_factor, roughness_parameter
 from sonarsynth.equations.water.boundary_reflection import rayleigh
@@ -48,24 +48,6 @@ def test_series_and_differences_meet(gap: float) -> None:
     for middle in (0.0, 0.3 * gap, gap):
         phases = np.array([0.0, middle, gap])
         assert abs(divided_exponential(phases) - exact_difference(phases)) < 2e-16
-
-
-@pytest.mark.parametrize("size", [1e-12, 1e-3, 1.0, 30.0, 1e3])
-def test_triangles_agree_with_exact_arithmetic_whatever_the_angle(size: float) -> None:
-    rng = np.random.default_rng(3)
-    corners = rng.normal(size=(12, 3, 3))
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal = np.cross(first, second)
-    area = 0.5 * np.linalg.norm(normal, axis=1)
-    wave = rng.normal(size=(12, 3))
-    wave[::4] = normal[::4]  # the mirror direction
-    wave[1::4] = np.cross(first[1::4], normal[1::4])  # square to an edge
-    wave[2::4] = normal[2::4] + 1e-8 * first[2::4]
-    wave *= size / np.linalg.norm(wave, axis=1)[:, None]
-    phases = np.einsum("fci,fi->fc", corners - corners[:, :1], wave)
-    exact = np.array([2 * a * exact_difference(p) for a, p in zip(area, phases, strict=True)])
-    got = triangle_integral(corners, wave) * np.exp(-1j * np.sum(corners[:, 0] * wave, axis=1))
-    assert (abs(got - exact) < (1e-15 + 1e-16 * size) * area).all()
 
 
 def test_a_triangle_is_the_sum_of_its_parts() -> None:
@@ -157,3 +139,28 @@ def test_the_compiled_sum_is_the_sum_of_the_facets() -> None:
     assert got[0] == 0.0
     with pytest.raises(ValueError, match="facet, 3, xyz"):
         mesh_amplitude(corners[0], a, b, k)
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 5, 40])
+@pytest.mark.parametrize("first", [0.0, 1.0, 100.0])
+@pytest.mark.parametrize("power", [1.0, 1.02])
+def test_rows_are_as_exact_as_single_frequencies(count: int, first: float, power: float) -> None:
+    """Phases across a facet from 1e-6 to 60 rad: by the series that a row shares, beyond it, and across its end."""
+    rng = np.random.default_rng(count)
+    k = np.linspace(first, 460.0, count) ** power
+    assert np.isfinite(spacing(k)) == (count > 2 and power == 1.0)
+    corners = rng.normal(size=(200, 1, 3)) * 0.5 + rng.normal(size=(200, 3, 3)) * 10.0 ** rng.uniform(
+        -8, -1.5, (200, 1, 1)
+    )
+    a, b = unit(rng.normal(size=(2, 3)))
+    slow = facet_amplitude(corners[:, None], a, b, k)
+    size = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    each = np.array([mesh_amplitude(facet[None], a, b, k) for facet in corners])
+    assert (abs(each - slow) <= 1e-12 * (size[:, None] * k + 1e-300)).all()
+
+
+def test_wavenumbers_of_equally_spaced_frequencies_are_seen_as_such() -> None:
+    for band in (np.arange(25e3, 110.1e3, 5e3), np.linspace(25e3, 110e3, 18), np.fft.rfftfreq(4096, 1 / 400e3)):
+        k = 2 * np.pi * band / 1497.3
+        assert spacing(k) == pytest.approx(k[1] - k[0], rel=1e-12)
+    assert np.isnan(spacing(np.array([1.0, 2.0, 3.0 + 1e-9])))
