@@ -19,15 +19,16 @@ def power_and_peak(pressure: Any, live: Any) -> Any:
 
     Squares of float32 are exact in float64.
     """
-    sensors, samples = pressure.shape
+    samples = pressure.shape[1]
     power = np.zeros(samples)
     high = np.zeros(samples, pressure.dtype)
-    for q in range(sensors):
-        if live[q]:
-            for n in range(samples):
-                p = pressure[q, n]
-                power[n] += np.float64(p) ** 2
-                high[n] = max(high[n], abs(p))
+    rows = np.flatnonzero(live)
+    for i in range(0, len(rows), 2):  # two at a time take a quarter less
+        a, b, both = rows[i], rows[min(i + 1, len(rows) - 1)], 1.0 if i + 1 < len(rows) else 0.0
+        for n in range(samples):
+            p, q = pressure[a, n], pressure[b, n]
+            power[n] += np.float64(p) ** 2 + both * np.float64(q) ** 2
+            high[n] = max(high[n], abs(p), abs(q))
     return power, float(high.max()) if samples > 0 else 0.0
 
 
@@ -113,6 +114,35 @@ def template_sums(spectrum: Any, response: Any) -> Any:
             total[k] += response[q, k] * spectrum[q, k]
             power[k] += response[q, k] * response[q, k]
     return total, power
+
+
+@compiled
+def common_wave(
+    spectrum: Any, shift: Any, position: Any, gain: Any, direction: Any, curvature: float, face: float, first: float,
+    spacing: float,
+) -> Any:  # fmt: skip
+    """Spectra of sensors turned by shift (sensor,) s, their responses to one wave, both (sensor, bin), and the
+    `template_sums` of these.
+
+    position (sensor, xyz) m, gain (sensor,); direction (xyz) and curvature (1/m) of the wave; face (s): side of the
+    faces over the sound speed; first, spacing (Hz): of the bins.
+    """
+    sensors, bins = spectrum.shape
+    across, up, loud, toward = np.empty(sensors), np.empty(sensors), np.empty(sensors), np.empty(3)
+    for q in range(sensors):
+        square = 0.0
+        for x in range(3):
+            toward[x] = direction[x] - curvature * position[q, x]
+            square += toward[x] * toward[x]
+        distance = np.sqrt(square)
+        across[q], up[q], loud[q] = toward[1] * face / distance, toward[2] * face / distance, gain[q] / distance
+    response = face_responses(across, up, first, spacing, bins)
+    for q in range(sensors):
+        for k in range(bins):
+            response[q, k] *= loud[q]
+    shifted = turned(spectrum, shift, first, spacing)
+    total, power = template_sums(shifted, response)
+    return shifted, response, total, power
 
 
 @compiled

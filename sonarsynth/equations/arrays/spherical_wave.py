@@ -138,17 +138,10 @@ def envelope_peak(
     count, spacing, omega = 16 * len(f), f[1] - f[0], 2 * np.pi * f
     top = int(np.abs(np.fft.ifft(taper * wave, count)).argmax())
     time = float((top if top < count / 2 else top - count) / (count * spacing))
-    longest, curve, carrier = 0.5 / (count * spacing), 0.0, 0.0
-    for _ in range(8):
-        turned = taper * wave * np.exp(1j * omega * time)
-        z, slope, bend = turned.sum(), (1j * omega * turned).sum(), -(omega**2 * turned).sum()
-        height, carrier = abs(z), float((slope / z).imag)
-        curve = float((bend * np.conj(z)).real / height + carrier**2 * height)
-        if not curve < 0:
-            return nothing
-        step = float(np.clip(-(slope * np.conj(z)).real / height / curve, -longest, longest))
-        time += step
-        if abs(step) < 1e-15:
-            break
+    from sonarsynth.equations.arrays.spherical_wave_kernel import climb_envelope
+
+    time, curve, carrier = climb_envelope(taper * wave, omega, time, 0.5 / (count * spacing))
+    if not curve < 0:
+        return nothing
     power = np.broadcast_to(np.asarray(noise, float), f.shape)
     return time, float(np.sqrt(0.5 * np.sum(((omega - carrier) * taper) ** 2 * power)) / abs(curve))

@@ -107,3 +107,25 @@ def gauss_newton(
         if not (found and moved >= SETTLED):
             break
     return found, u, k, step[3], tangents, covariance, covariance @ own / speed, late - jacobian @ step
+
+
+@compiled
+def climb_envelope(wave: Any, omega: Any, time: float, longest: float) -> tuple[float, float, float]:
+    """By Newton's steps, no longer than `longest` (s), from `time` (s) to the top of the envelope of a pulse with
+    spectrum `wave` (bin,) at `omega` (bin,) rad/s: when that is, the envelope's second derivative there, and the rate
+    (rad/s) at which the phase turns. It stops where the envelope is not hollow downwards."""
+    curve = carrier = 0.0
+    for _ in range(8):
+        z = slope = bend = 0j
+        for k in range(len(omega)):
+            turned = wave[k] * complex(np.cos(omega[k] * time), np.sin(omega[k] * time))
+            z, slope, bend = z + turned, slope + 1j * omega[k] * turned, bend - omega[k] ** 2 * turned
+        height, carrier = abs(z), (slope / z).imag
+        curve = (bend * np.conj(z)).real / height + carrier**2 * height
+        if not curve < 0:
+            break
+        step = min(max(-(slope * np.conj(z)).real / height / curve, -longest), longest)
+        time += step
+        if abs(step) < 1e-15:
+            break
+    return time, curve, carrier
