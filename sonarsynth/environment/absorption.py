@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.environment.sea import Absorption, Profile
 from sonarsynth.equations.rays import path_means
 from sonarsynth.equations.water import seawater
@@ -25,6 +25,8 @@ def absorption_db_per_m(absorption: Absorption, frequency: npt.ArrayLike, depth:
         return _formula(absorption, frequency, depth)
 
 
+ALIKE = 1e-3
+"""dB: a ray over which the depths of the water can differ by no more is averaged along straight legs."""
 NODES = 513
 """Depths that absorption is taken at: linear in between, it errs by 4e-6 of itself in 12 km of water."""
 
@@ -48,15 +50,26 @@ class DepthAbsorption:
         value = self.value
         return np.append(0.0, np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(self.depth)))
 
-    def along(self, profile: Profile, start: Floats, end: Floats, climb: Floats, vertices: Ints) -> Floats:
+    def lost(
+        self, length: Floats, profile: Profile, start: Floats, end: Floats, climb: Floats, vertices: Ints
+    ) -> Floats:
+        """What is absorbed (path,) in dB along rays of some length (path,) m; the rest as of `along`. Off by `ALIKE` at
+        most where that spares following them."""
+        bent = length * np.ptp(self.value) > ALIKE
+        return length * self.along(profile, start, end, climb, vertices, bent)
+
+    def along(
+        self, profile: Profile, start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: Bools | None = None
+    ) -> Floats:
         """Mean (path,) in dB/m along rays from depths start to end (path,) m.
 
         profile: what bends them, a uniform one if nothing does; climb (path,): upward component of the unit vector in
-        which each leaves; vertices (path,): reflections and turning points.
+        which each leaves; vertices (path,): reflections and turning points; bent (path,): which are followed where they
+        bend, all if left out.
         """
         out = np.empty(len(start))
         water, table = (profile.depth, profile.speed), (self.depth, self.value, self.integral)
-        bent = not profile.uniform
+        bent = np.full(len(start), not profile.uniform) if bent is None else bent & (not profile.uniform)
         path_means.means(start, end, climb, vertices, bent, float(self.depth[-1]), water, table, out)
         return out
 

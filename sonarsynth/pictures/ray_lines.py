@@ -201,9 +201,7 @@ def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays, start: Floats
         factor *= effect.modulus * np.exp(-0.5 * (2.0 * np.pi * frequency * effect.delay_std) ** 2)
     vertices = rays.surface + rays.bottom + rays.turning
     climb = np.nan_to_num(rays.start_sine)
-    lost = rays.length * plan.absorption_at_depths.along(
-        plan.profile, start[rays.pair], end[rays.pair], climb, vertices
-    )
+    lost = plan.absorption_at_depths.lost(rays.length, plan.profile, start[rays.pair], end[rays.pair], climb, vertices)
     with np.errstate(divide="ignore"):
         return np.asarray(-20.0 * np.log10(factor) + lost)
 

@@ -23,9 +23,9 @@ def path_loss(array: FacetPaths, snap: Emission, legs: ReceivePaths, out: Transm
         return np.asarray(absorption * (legs.length if out is None else out.length + legs.length))
     start, profile = depth(legs.point), array.bending.profile
     end = np.full(len(start), float(depth(array.context.receiver.pose.position)))
-    lost = legs.length * absorption.along(profile, start, end, legs.departure[:, 2], legs.bounces + legs.turning)
+    lost = absorption.lost(legs.length, profile, start, end, legs.departure[:, 2], legs.bounces + legs.turning)
     if out is None:
-        return np.asarray(lost)
+        return lost
     source = np.full(len(start), float(depth(snap.position)))
-    back = absorption.along(profile, start, source, -out.arrival[:, 2], out.bounces + out.turning)  # the way, reversed
-    return np.asarray(lost + out.length * back)
+    reversed_way = profile, start, source, -out.arrival[:, 2], out.bounces + out.turning
+    return lost + absorption.lost(out.length, *reversed_way)

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import quad
 
 import sonarsynth as ss
-from sonarsynth.environment.absorption import DepthAbsorption
+from sonarsynth.environment.absorption import ALIKE, DepthAbsorption
 from sonarsynth.environment.sea import Absorption, Profile
 from sonarsynth.equations.water.seawater import francois_garrison
 from sonarsynth.planning import Choices, Plan, arrivals_of, plan
@@ -159,3 +159,18 @@ def test_bent_rays_pass_the_depths_of_their_arcs(start: float, degrees: float, v
 def test_the_formula_at_no_absorption_is_nothing() -> None:
     table = DepthAbsorption.of(Absorption(formula="none"), 55e3, 100.0)
     assert table.along(FLAT, np.array([1.0]), np.array([1.0]), np.zeros(1), np.zeros(1, np.int64))[0] == 0.0
+
+
+def test_rays_over_alike_depths_lose_as_much_as_those_that_are_followed() -> None:
+    """By `ALIKE` at most, whatever they pass: turning, reflected, short and long."""
+    bottom_depth, rng = 40.0, np.random.default_rng(5)
+    profile = Profile(np.array([0.0, 15.0, 20.0, bottom_depth]), np.array([1540.0, 1538.0, 1510.0, 1508.0]))
+    table = DepthAbsorption.of(COLD, 55e3, bottom_depth)
+    start, end = rng.uniform(0.0, bottom_depth, (2, 400))
+    rays = profile, start, end, rng.uniform(-0.5, 0.5, 400), rng.integers(0, 4, 400)
+    length = 10.0 ** rng.uniform(0.5, 3.5, 400)
+    off = np.abs(table.lost(length, *rays) - length * table.along(*rays))
+    alike = length * np.ptp(table.value) <= ALIKE
+    assert 50 < alike.sum() < 350
+    assert 0.01 * ALIKE < off[alike].max() <= ALIKE
+    assert (off[~alike] == 0.0).all()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints
 
 _X, _W = np.polynomial.legendre.leggauss(24)
 NODE, WEIGHT = 0.5 - 0.5 * np.cos(0.5 * np.pi * (1.0 + _X)), 0.25 * np.pi * _W * np.sin(0.5 * np.pi * (1.0 + _X))
@@ -79,29 +79,29 @@ def leg(a: float, b: float, p: float, bent: bool, water: tuple[Floats, Floats], 
 
 
 @compiled
-def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: bool, bottom: float,
+def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: Bools, bottom: float,
           water: tuple[Floats, Floats], table: tuple[Floats, Floats, Floats], out: Floats) -> None:  # fmt: skip
     """Mean (ray,) along rays from depths start to end (ray,) m of a value of depth.
 
     climb (ray,): upward component of the unit vector in which each leaves; vertices (ray,): how many times it turns or
-    is reflected; bent: whether it follows Snell's law in water, depth and sound speed (node,), or is straight; bottom
-    (m); table: even depths, values there and their integrals from the surface (node,). A ray with vertices goes to and
-    fro between two depths.
+    is reflected; bent (ray,): whether it follows Snell's law in water, depth and sound speed (node,), or is straight;
+    bottom (m); table: even depths, values there and their integrals from the surface (node,). A ray with vertices goes
+    to and fro between two depths.
     """
     sums = np.zeros(2)
     for r in range(len(start)):
         z, z_end, n = start[r], end[r], vertices[r]
         sums[:] = 0.0
-        p = np.sqrt(max(1.0 - climb[r] ** 2, 0.0)) / at(z, water[0], water[1]) if bent else 0.0
+        p = np.sqrt(max(1.0 - climb[r] ** 2, 0.0)) / at(z, water[0], water[1]) if bent[r] else 0.0
         if n == 0:
-            leg(z, z_end, p, bent, water, table, 1.0, sums)
+            leg(z, z_end, p, bent[r], water, table, 1.0, sums)
         else:
-            fastest = 1.0 / max(p, 1e-300) if bent else np.inf
+            fastest = 1.0 / max(p, 1e-300) if bent[r] else np.inf
             upper = vertex(z, False, fastest, bottom, water[0], water[1])
             lower = vertex(z, True, fastest, bottom, water[0], water[1])
             first_down = climb[r] < 0.0
             last_down = first_down == (n % 2 == 1)
-            leg(z, lower if first_down else upper, p, bent, water, table, 1.0, sums)
-            leg(upper, lower, p, bent, water, table, n - 1.0, sums)
-            leg(lower if last_down else upper, z_end, p, bent, water, table, 1.0, sums)
+            leg(z, lower if first_down else upper, p, bent[r], water, table, 1.0, sums)
+            leg(upper, lower, p, bent[r], water, table, n - 1.0, sums)
+            leg(lower if last_down else upper, z_end, p, bent[r], water, table, 1.0, sums)
         out[r] = sums[1] / sums[0] if sums[0] > 0.0 else at(z, table[0], table[1])
