@@ -35,13 +35,13 @@ def direct_paths(arrivals: Arrivals, envelope: Callable[[int, float, float], flo
     envelope of its pulse peaks in the band, s after its collapse.
     """
     chosen = arrivals.seen_from_centre
-    direct = chosen.direct & (chosen.surface == 0) & (chosen.bottom == 0)
-    paths = chosen.select(direct)
-    order = np.lexsort((paths.delay, paths.snap))
-    snap = paths.snap[order]
-    heard = zip(snap.tolist(), paths.absorption[order].tolist(), paths.doppler[order].tolist(), strict=True)
+    rows = np.flatnonzero(chosen.direct)
+    rows = rows[(chosen.surface[rows] == 0) & (chosen.bottom[rows] == 0)]
+    rows = rows[np.lexsort((chosen.delay[rows], chosen.snap[rows]))]
+    snap = chosen.snap[rows]
+    heard = zip(snap.tolist(), chosen.absorption[rows].tolist(), chosen.doppler[rows].tolist(), strict=True)
     late = [envelope(*path) for path in heard]
-    return Direct(snap, paths.delay[order] + np.array(late), paths.direction[order])
+    return Direct(snap, chosen.delay[rows] + np.array(late), chosen.direction[rows])
 
 
 def heard_first(direct: Direct, snaps: int) -> tuple[Floats, Floats, Floats]:

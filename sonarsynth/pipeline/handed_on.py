@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from sonarsynth.conventions import Floats
+from sonarsynth.labels import Band
 from sonarsynth.pipeline.stored_values import Values
 from sonarsynth.products import Arrivals, BeamSpectra, Echoes, EnergyImage, LinkBudget, Signals, SourceEstimates, Truth
 from sonarsynth.recipe.scene import Frame
@@ -21,6 +22,7 @@ class TracedFrame:
     truth: Truth
     budget: LinkBudget
     echoes: Echoes
+    band: Band
     chorus: ChorusArrivals | None = None  # None: the scene has none
     reverberation: ReverberationArrivals | None = None
 

@@ -50,6 +50,7 @@ def point_labels(
     arrivals: Arrivals,
     estimates: SourceEstimates,
     cloud: PointCloud,
+    band: Band,
     scattered: Arrivals | None = None,
 ) -> PointLabels:
     """Whose echo each point of a cloud is; scattered: paths of what scatters in surface, bottom and water."""
@@ -64,7 +65,6 @@ def point_labels(
         frame.sonar_pose,
         frame.sonar_velocity * moves,
     )
-    band = band_of(plan, frame.moment.snaps)
     return label_points(cloud, arrivals, band, moment, listening, scattered)
 
 
