@@ -12,10 +12,10 @@ import pytest
 import xarray as xr
 
 from sonarsynth import schedule, store
-from sonarsynth.cli import main
 from sonarsynth.recipe import reading
 from sonarsynth.store import cards
 from sonarsynth.store.cards.croissant import CONTEXT
+from tests.commands import status
 
 SAID = """\
 dataset:
@@ -36,12 +36,6 @@ def built(tmp_path_factory: pytest.TempPathFactory, small_text: str) -> Path:
     source = reading.read(file)
     assert schedule.build(reading.recipe_of(source), path, frames=range(8), workers=0, source=source).ok
     return path
-
-
-def status(*arguments: str) -> object:
-    with pytest.raises(SystemExit) as end:
-        main(list(arguments))
-    return end.value.code
 
 
 def card_of(path: Path) -> str:

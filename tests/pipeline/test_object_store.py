@@ -16,11 +16,11 @@ import pytest
 import xarray as xr
 
 from sonarsynth import schedule, store
-from sonarsynth.cli import main
 from sonarsynth.planning import Plan, plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule.repairing import repair
 from sonarsynth.store import Remote
+from tests.commands import status
 from tests.places import contents
 from tests.waiting import wait_until
 
@@ -82,12 +82,6 @@ def same(place: Remote, whole: Path) -> bool:
         found.pop("provenance")
     alike = {n: c for n, c in there.items() if n not in apart} == {n: c for n, c in here.items() if n not in apart}
     return alike and there.keys() == here.keys() and attributes[0] == attributes[1]
-
-
-def status(*arguments: str) -> object:
-    with pytest.raises(SystemExit) as end:
-        main(list(arguments))
-    return end.value.code
 
 
 @pytest.mark.long

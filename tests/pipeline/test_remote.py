@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 
 from sonarsynth import schedule, store
-from sonarsynth.cli import main
 from sonarsynth.planning import Plan
 from sonarsynth.schedule.repairing import repair
 from sonarsynth.store import Folder, Remote, creating
 from sonarsynth.store.files import lock
+from tests.commands import status
 from tests.places import contents, web_server
 from tests.waiting import HANGING, wait_until
 
@@ -54,12 +54,6 @@ def copy(whole: Path, place: Remote) -> Remote:
     """The store, sent there."""
     place.write_each(contents(whole))
     return place
-
-
-def status(*arguments: str) -> object:
-    with pytest.raises(SystemExit) as end:
-        main(list(arguments))
-    return end.value.code
 
 
 def test_a_store_at_a_url_is_the_one_in_a_folder(small_plan: Plan, place: Remote, whole: Path, tmp_path: Path) -> None:
