@@ -79,27 +79,21 @@ def cylinder_panels() -> tuple[Panel, Panel]:
 
 def plate_panels() -> tuple[Panel, Panel]:
     """A wave that comes straight in: one way out over frequency, and one frequency over the way out."""
-    f, aside = _band(100.0), 40.0
-    two, dots = plate.rectangle(), plate.tiles(8)
-    into, out = plate.fan_out(np.array([aside]))
-    curves = (
-        Curve("closed form", f / 1e3, decibels(rectangular_plate(plate.SIDES, into, out, wavenumber(f))), "exact", 0),
-        Curve(f"{len(dots)} points", f / 1e3, decibels(plate.points_echo(dots, into, out, f)[0]), "other", 0),
-        Curve("two facets", f / 1e3, decibels(plate.echoes(two, into, out, f)[0]), "facets", 0),
-    )
+    f, aside, middle, off = _band(100.0), 40.0, np.array([MIDDLE]), np.arange(0.0, 90.01, 0.05)
     size = f"plate of {plate.SIDES[0]:g} by {plate.SIDES[1]:g} m"
     title = f"{size}, the wave straight in, out at {aside:g} degrees"
-    over_frequency = Panel(title, KHZ, STRENGTH, curves, -50.0, 30.0)
-    off = np.arange(0.0, 90.01, 0.05)
-    into, out = plate.fan_out(off)
-    middle = np.array([MIDDLE])
-    exact = decibels(rectangular_plate(plate.SIDES, into, out, wavenumber(MIDDLE)))
-    points = decibels(plate.points_echo(dots, into, out, middle)[:, 0])
-    facets = decibels(plate.echoes(two, into, out, middle)[:, 0])
-    pictured = (
-        Curve("closed form", off, exact, "exact", 0),
-        Curve(f"{len(dots)} points", off, points, "other", 0),
-        Curve("two facets", off, facets, "facets", 0),
-    )
+    over_frequency = Panel(title, KHZ, STRENGTH, _plate_curves(f, np.array([aside]), f / 1e3), -50.0, 30.0)
     title = f"{size}, the wave straight in at {MIDDLE / 1e3:g} kHz"
-    return over_frequency, Panel(title, "way out, off the normal (deg)", STRENGTH, pictured, -50.0, 20.0)
+    way_out = "way out, off the normal (deg)"
+    return over_frequency, Panel(title, way_out, STRENGTH, _plate_curves(middle, off, off), -50.0, 20.0)
+
+
+def _plate_curves(f: Floats, off: Floats, x: Floats) -> tuple[Curve, ...]:
+    """Levels (dB) over frequency (Hz) or over the way out, off the normal (deg)."""
+    dots, (into, out) = plate.tiles(8), plate.fan_out(off)
+    exact = rectangular_plate(plate.SIDES, into[:, None], out[:, None], wavenumber(f))
+    return (
+        Curve("closed form", x, decibels(exact).ravel(), "exact", 0),
+        Curve(f"{len(dots)} points", x, decibels(plate.points_echo(dots, into, out, f)).ravel(), "other", 0),
+        Curve("two facets", x, decibels(plate.echoes(plate.rectangle(), into, out, f)).ravel(), "facets", 0),
+    )
