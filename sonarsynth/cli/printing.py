@@ -75,6 +75,13 @@ def planning(activity: str = "planning") -> Iterator[None]:
         thread.join()
 
 
+def overwrite(text: str) -> None:
+    """What is being done, in place of what was said so before; on a terminal alone."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\033[K{text}")
+        sys.stderr.flush()
+
+
 def announce(dashboard: str) -> None:
     """Say where the dashboard is."""
     console(stderr=True).print(f"dashboard: {dashboard}", markup=False)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 from rich.table import Table
 
-from sonarsynth.cli.printing import console
+from sonarsynth.cli.printing import console, overwrite
 from sonarsynth.validation.extremes import extremes, groups
 
 if TYPE_CHECKING:
@@ -22,11 +21,8 @@ def extremes_table(out: Path, *, as_json: bool) -> None:
     total, rows = sum(len(cases) for cases in groups().values()), []
     for row in extremes():
         rows.append(row)
-        if sys.stderr.isatty():
-            sys.stderr.write(f"\r\033[K{len(rows)} of {total} cases: {row.case}")
-            sys.stderr.flush()
-    if sys.stderr.isatty():
-        sys.stderr.write("\r\033[K")
+        overwrite(f"{len(rows)} of {total} cases: {row.case}")
+    overwrite("")
     text = json.dumps([row.as_json() for row in rows], indent=2)
     out.mkdir(parents=True, exist_ok=True)
     file = out / "extremes.json"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import typer
 from rich.table import Table
 
-from sonarsynth.cli.printing import console
+from sonarsynth.cli.printing import console, overwrite
 from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import frame_numbers
 from sonarsynth.frontiers import measure
@@ -53,8 +53,8 @@ def recipe_table(
     count = _hydrophones(hydrophones)
     with reading.opened(recipe, settings) as made_from:
         chosen = frame_numbers(frames, made_from.frames)
-        measured = measure(made_from, chosen, hydrophones=count, seed=seed, peers=peers, say=_say)
-    _say("")
+        measured = measure(made_from, chosen, hydrophones=count, seed=seed, peers=peers, say=overwrite)
+    overwrite("")
     files = write(measured, out, recipe.stem)
     if as_json:
         typer.echo(json.dumps(measured.as_json(), indent=2, allow_nan=False))
@@ -75,13 +75,6 @@ def _hydrophones(text: str | None) -> int | None:
     if not text.isdecimal() or int(text) < 1:
         raise BadOption(f"--hydrophones {text} is neither 'all' nor a whole number from 1 on")
     return int(text)
-
-
-def _say(text: str) -> None:
-    """What is being done, on a terminal."""
-    if sys.stderr.isatty():
-        sys.stderr.write(f"\r\033[K{text}")
-        sys.stderr.flush()
 
 
 def show(measured: AccuracyReport) -> None:

@@ -127,7 +127,7 @@ def meaning(column: str, unit: str | None = None) -> Meaning | None:
     candidates = [quantity for quantity, names in NAMES.items() if name in names]
     if not candidates:
         return None
-    fitting = [q for q in candidates if stated is not None and _known(q, stated)]
+    fitting = [q for q in candidates if stated is not None and knows_unit(q, stated)]
     if fitting:
         return Meaning(fitting[0], *_conversion(fitting[0], str(stated), column))
     quantity = candidates[-1]  # 'c' without a unit is the sound speed
@@ -136,7 +136,7 @@ def meaning(column: str, unit: str | None = None) -> Meaning | None:
 
 def is_unit(text: str) -> bool:
     """Whether a text is one of the units, of any quantity."""
-    return any(_known(quantity, _clean_unit(text)) for quantity in UNITS)
+    return any(knows_unit(quantity, _clean_unit(text)) for quantity in UNITS)
 
 
 def split(column: str) -> tuple[str, str | None]:
@@ -169,13 +169,14 @@ def _clean_unit(text: str) -> str | None:
         return None
     words = [word.strip() for word in re.split(r"[,;]", plain)]
     scale = next((word for word in words if "68" in word), None)
-    units = [word for word in words if any(_known(quantity, word) for quantity in UNITS)]
+    units = [word for word in words if any(knows_unit(quantity, word) for quantity in UNITS)]
     unit = next((word for word in reversed(units) if word not in SCALES), units[-1] if units else plain)
     celsius = next(iter(UNITS["temperature"]))
-    return scale if scale and _known("temperature", scale) and unit in (scale, *celsius) else unit
+    return scale if scale and knows_unit("temperature", scale) and unit in (scale, *celsius) else unit
 
 
-def _known(quantity: str, unit: str | None) -> bool:
+def knows_unit(quantity: str, unit: str | None) -> bool:
+    """Whether a unit is one of a quantity's."""
     return any(unit in texts for texts in UNITS[quantity])
 
 

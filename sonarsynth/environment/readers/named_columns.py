@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from sonarsynth.environment.readers.cast_columns import UNITS, Meaning, UnitError, is_unit, meaning, split
+from sonarsynth.environment.readers.cast_columns import Meaning, UnitError, is_unit, knows_unit, meaning, split
 from sonarsynth.environment.readers.cast_table import CastError, CastTable, Column, is_number, numbers_of, placed
 
 HEAD_LINES: Final = 400
@@ -218,11 +218,7 @@ def _rows_follow(lines: list[str], separator: str) -> bool:
 def _misplaced(name: str) -> bool:
     """Whether a column bears a unit of another quantity."""
     unit, quantity = split(name)[1], _nominal(name)
-    return quantity is not None and unit is not None and is_unit(unit) and not _of(quantity, unit)
-
-
-def _of(quantity: str, unit: str) -> bool:
-    return any(unit in texts for texts in UNITS[quantity])
+    return quantity is not None and unit is not None and is_unit(unit) and not knows_unit(quantity, unit)
 
 
 def _sippican(path: Path, lines: list[str]) -> _Header | None:
