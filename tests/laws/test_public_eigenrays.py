@@ -18,39 +18,24 @@ from sonarsynth import (
     eigenrays_between,
 )
 from sonarsynth.environment.sea import SoundSpeed
+from tests.ray_paths import images
 
 WATER = Isovelocity(speed=1540.0)
 LAYERS = Tabulated(depth=(0.0, 5.0, 6.5, 20.0), speed=(1540.0, 1540.0, 1533.55, 1533.8))
 FIELDS = [field.name for field in dataclasses.fields(RayArrivals)]
 
 
-def images(bottom_depth: float, start: float, end: float, distance: float, most: int) -> list[tuple[float, ...]]:
-    """(time, launch angle, surface, bottom) of straight rays to the receiver's mirror images, sorted."""
-    found = []
-    for first in ("surface", "bottom"):
-        for count in range(most + 1):
-            mirrors = [("surface", "bottom")[(i + (first == "bottom")) % 2] for i in range(count)]
-            image = end
-            for mirror in reversed(mirrors):
-                image = -image if mirror == "surface" else 2 * bottom_depth - image
-            rise = image - start
-            time = float(np.hypot(distance, rise)) / 1540.0
-            row = (time, float(np.arctan2(rise, distance)), mirrors.count("surface"), mirrors.count("bottom"))
-            if row not in found:
-                found.append(row)
-    return sorted(found)
-
-
 @pytest.mark.parametrize("most", [0, 1, 2, 5])
 def test_isovelocity_rays_come_from_image_sources(most: int) -> None:
     bottom_depth, start, end, distance = 20.0, 3.0, 11.0, 60.0
     rays = eigenrays(WATER, bottom_depth, start, end, distance, vertices=most)
-    expected = np.array(images(bottom_depth, start, end, distance, most))
-    assert len(rays) == len(expected) == 2 * most + 1
-    np.testing.assert_allclose(rays.travel_time, expected[:, 0], rtol=1e-14)
-    np.testing.assert_allclose(rays.launch_angle, expected[:, 1], rtol=1e-13)
-    np.testing.assert_array_equal(np.stack([rays.surface, rays.bottom], axis=1), expected[:, 2:])
-    np.testing.assert_allclose(rays.length, 1540.0 * expected[:, 0], rtol=1e-14)
+    up, surface, bottom, _, climb = np.array(images(bottom_depth, start, end, most)).T
+    length = np.hypot(distance, climb)
+    assert len(rays) == len(length) == 2 * most + 1
+    np.testing.assert_allclose(rays.travel_time, length / 1540.0, rtol=1e-14)
+    np.testing.assert_allclose(rays.launch_angle, np.arctan2(-up * climb, distance), rtol=1e-13)
+    np.testing.assert_array_equal([rays.surface, rays.bottom], [surface, bottom])
+    np.testing.assert_allclose(rays.length, length, rtol=1e-14)
     np.testing.assert_allclose(rays.amplitude, 1 / rays.length, rtol=1e-13)
     flips = np.where((rays.surface + rays.bottom) % 2 == 0, 1.0, -1.0)
     np.testing.assert_allclose(rays.arrival_angle, flips * rays.launch_angle, rtol=1e-13)
