@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from sonarsynth.store import Folder, Remote
+from tools.fault_injection import corrupt
 
 
 def contents(folder: Folder) -> dict[str, bytes]:
     """Every file beneath."""
     if isinstance(folder, Remote):
         return {name: found for name, found in folder.read_each(folder.sizes()) if isinstance(found, bytes)}
-    return {f.relative_to(folder).as_posix(): f.read_bytes() for f in sorted(folder.rglob("*")) if f.is_file()}
+    return corrupt.contents(folder)
 
 
 class _Parts(http.server.SimpleHTTPRequestHandler):

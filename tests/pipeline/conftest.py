@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from sonarsynth.pipeline import Values
 from sonarsynth.planning import Plan, plan
 from sonarsynth.recipe import Recipe, reading
+from sonarsynth.schedule import build
 from sonarsynth.store import layout_of
 from tools.fault_injection.corrupt import RECIPE
 
@@ -41,6 +43,20 @@ def small_file(tmp_path: Path) -> Path:
     file = tmp_path / "small.yaml"
     file.write_text(SMALL)
     return file
+
+
+@pytest.fixture
+def copy(whole: Path, tmp_path: Path) -> Path:
+    """A copy of the store that a test module calls `whole`, to be damaged."""
+    return Path(shutil.copytree(whole, tmp_path / "s.zarr"))
+
+
+@pytest.fixture(scope="session")
+def reference(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan) -> Path:
+    """All frames, built in this process without a break."""
+    path = tmp_path_factory.mktemp("reference") / "s.zarr"
+    assert build(small_plan, path, workers=0).ok
+    return path
 
 
 @pytest.fixture(scope="session")

@@ -23,13 +23,6 @@ from tests.waiting import wait_until
 
 
 @pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory, small: Recipe) -> Path:
-    path = tmp_path_factory.mktemp("reference") / "s.zarr"
-    assert build(small, path, workers=0).ok
-    return path
-
-
-@pytest.fixture(scope="module")
 def here() -> Iterator[str]:
     """Address of a Dask scheduler whose one worker is a thread of this process."""
     with LocalCluster(

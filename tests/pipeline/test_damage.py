@@ -28,11 +28,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan, made_up: C
     return path
 
 
-@pytest.fixture
-def copy(whole: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(whole, tmp_path / "s.zarr"))
-
-
 def found(path: Path) -> dict[str, str]:
     report = store.verify(path)
     assert report.ok is (not report.problems)

@@ -18,6 +18,7 @@ from sonarsynth.recipe import Recipe, reading
 from sonarsynth.schedule import build
 from sonarsynth.schedule.repairing import repair
 from sonarsynth.store.marks import load_layout, load_mark, save_mark
+from tests.places import contents
 
 NO_MARKS = ("3.json", "99.json", "7")
 SHARD = "image/energy/c.1.0.0"
@@ -29,15 +30,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory, small: Recipe) -> Path:
     path = tmp_path_factory.mktemp("whole") / "s.zarr"
     assert build(small, path, frames=range(18), workers=0).ok
     return path
-
-
-@pytest.fixture
-def copy(whole: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(whole, tmp_path / "s.zarr"))
-
-
-def contents(path: Path) -> dict[str, bytes]:
-    return {f.relative_to(path).as_posix(): f.read_bytes() for f in path.rglob("*") if f.is_file()}
 
 
 def assert_identical(path: Path, whole: Path) -> None:

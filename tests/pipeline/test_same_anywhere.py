@@ -29,47 +29,45 @@ def contents(path: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan) -> dict[str, bytes]:
-    path = tmp_path_factory.mktemp("reference") / "s.zarr"
-    assert build(small_plan, path, workers=0).ok
-    return contents(path)
+def expected(reference: Path) -> dict[str, bytes]:
+    return contents(reference)
 
 
 @pytest.mark.parametrize("shard_frames", [1, 20])
 def test_another_number_of_frames_in_a_shard(
-    tmp_path: Path, small_plan: Plan, reference: dict[str, bytes], shard_frames: int
+    tmp_path: Path, small_plan: Plan, expected: dict[str, bytes], shard_frames: int
 ) -> None:
     made = replace(small_plan, shard_frames=shard_frames)
     assert build(made, tmp_path / "s.zarr", workers=0).ok
-    assert contents(tmp_path / "s.zarr") == reference
+    assert contents(tmp_path / "s.zarr") == expected
 
 
-def test_several_worker_processes(tmp_path: Path, small_plan: Plan, reference: dict[str, bytes]) -> None:
+def test_several_worker_processes(tmp_path: Path, small_plan: Plan, expected: dict[str, bytes]) -> None:
     """One is in test_object_store and test_surviving, of running schedulers in test_building."""
     report = build(replace(small_plan, shard_frames=3), tmp_path / "s.zarr", workers=2)
     assert (report.ok, report.written, report.workers) == (True, 20, 2)
     assert report.worker_peak_bytes > 1e7
-    assert contents(tmp_path / "s.zarr") == reference
+    assert contents(tmp_path / "s.zarr") == expected
 
 
-def test_another_order(tmp_path: Path, small_plan: Plan, reference: dict[str, bytes]) -> None:
+def test_another_order(tmp_path: Path, small_plan: Plan, expected: dict[str, bytes]) -> None:
     frames = list(range(20))
     random.Random(5).shuffle(frames)
     for first in range(0, 20, 5):
         build(small_plan, tmp_path / "s.zarr", frames=frames[first : first + 5], workers=0)
-    assert contents(tmp_path / "s.zarr") == reference
+    assert contents(tmp_path / "s.zarr") == expected
 
 
 @pytest.mark.long
 def test_another_locale_time_zone_hash_seed_and_folder(
-    tmp_path: Path, small_file: Path, reference: dict[str, bytes]
+    tmp_path: Path, small_file: Path, expected: dict[str, bytes]
 ) -> None:
     place = tmp_path / "elsewhere"
     place.mkdir()
     env = os.environ | {"LC_ALL": "C", "TZ": "Pacific/Chatham", "PYTHONHASHSEED": "4242", "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "sonarsynth", "build", "../small.yaml", "s.zarr", "--workers", "0", "--no-predict"]
     subprocess.run(command, cwd=place, env=env, check=True, capture_output=True)
-    assert contents(place / "s.zarr") == reference
+    assert contents(place / "s.zarr") == expected
 
 
 def test_a_frame_has_one_thread_for_linear_algebra_and_gives_the_others_back(

@@ -50,13 +50,6 @@ render.beamform_frame = fails
 """
 
 
-@pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan) -> Path:
-    path = tmp_path_factory.mktemp("reference") / "s.zarr"
-    assert build(small_plan, path, workers=0).ok
-    return path
-
-
 def different(path: Path, reference: Path, frames: list[int] | None = None) -> list[str]:
     """Arrays that are not the same, bit for bit, in the frames given."""
     ours, theirs = zarr.open_group(path, mode="r"), zarr.open_group(reference, mode="r")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import threading
 from pathlib import Path
 
@@ -18,18 +17,13 @@ FILE = "image/energy/c.1.0.0"
 
 
 @pytest.fixture(scope="module")
-def half(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan) -> Path:
+def whole(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan) -> Path:
     """Two shards, the second as a writer has it in hand: data and a scratch file, no mark."""
-    path = tmp_path_factory.mktemp("half") / "s.zarr"
+    path = tmp_path_factory.mktemp("whole") / "s.zarr"
     build(small_plan, path, frames=range(16), workers=0)
     (path / ".marks/1.json").rename(path / ".marks/.1.json.7.partial")
     (path / FILE).write_bytes(b"cut sh")
     return path
-
-
-@pytest.fixture
-def copy(half: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(half, tmp_path / "s.zarr"))
 
 
 def test_what_a_build_has_in_hand_is_no_damage_and_it_is_said(copy: Path, capfd: pytest.CaptureFixture[str]) -> None:
