@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import exp, pi, sqrt
 
-import numpy as np
 from scipy.optimize import brentq
 
 from sonarsynth.conventions import Floats
@@ -27,17 +26,27 @@ def expected_peaks(level: float, size: Floats) -> float:
     Source: Worsley (1994), Advances in Applied Probability 26, 13, theorem 3.5, for chi-squared fields, two degrees of
     freedom.
     """
-    u, volumes = 2.0 * level, np.array([1.0, 0.0, 0.0, 0.0])
-    for length in np.asarray(size, float):
-        volumes[1:] += length * volumes[:-1]
-    densities = [1.0, (u / (2 * pi)) ** 0.5, (u - 1.0) / (2 * pi), (u**2 - 3 * u) / ((2 * pi) ** 1.5 * u**0.5)]
-    return float(np.exp(-level) * (volumes @ densities))
+    return _expected(level, _volumes(size))
+
+
+def _volumes(size: Floats) -> tuple[float, float, float, float]:
+    """The intrinsic volumes of a box of up to three axes."""
+    x, y, z = [float(length) for length in size] + [0.0] * (3 - len(size))
+    return 1.0, x + y + z, x * y + y * z + z * x, x * y * z
+
+
+def _expected(level: float, volumes: tuple[float, float, float, float]) -> float:
+    """As `expected_peaks`, of a box of these volumes."""
+    u = 2.0 * level
+    densities = 1.0, sqrt(u / (2 * pi)), (u - 1.0) / (2 * pi), (u**2 - 3 * u) / ((2 * pi) ** 1.5 * sqrt(u))
+    return exp(-level) * sum((v * d for v, d in zip(volumes, densities, strict=True)), 0.0)
 
 
 def peak_level(false_alarms: float, size: Floats) -> float:
     """Level, over the mean power of noise, that so many peaks exceed on average (`expected_peaks`)."""
+    volumes = _volumes(size)
 
     def excess(level: float) -> float:
-        return expected_peaks(level, size) - false_alarms
+        return _expected(level, volumes) - false_alarms
 
     return LOWEST if excess(LOWEST) <= 0.0 else float(brentq(excess, LOWEST, HIGHEST))
