@@ -34,6 +34,7 @@ _HOMES = {
     "geometry.hovering": "Hover",
     "geometry.motion": "Circle ConstantVelocity Line RecordedTrack Still Waypoint Waypoints",
     "imaging": "DenseDelayAndSum FocusedDelayAndSum",
+    "loading.moved_sources": "with_sources",
     "pictures": "show",
     "pictures.preview_figures.preview_pictures": "preview",
     "pictures.ray_pictures": "rays",

@@ -60,6 +60,7 @@ from sonarsynth.geometry.motion import (
 from sonarsynth.geometry.recorded_track import RecordedTrack as RecordedTrack
 from sonarsynth.imaging import DenseDelayAndSum as DenseDelayAndSum, FocusedDelayAndSum as FocusedDelayAndSum
 from sonarsynth.loading import open as open
+from sonarsynth.loading.moved_sources import with_sources as with_sources
 from sonarsynth.pictures import show as show
 from sonarsynth.pictures.preview_figures.preview_pictures import preview as preview
 from sonarsynth.pictures.ray_pictures import rays as rays

@@ -42,7 +42,7 @@ from sonarsynth.pipeline.synthesis import Hearing, digitise, frame_signals, keep
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, frame_tree, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
-from sonarsynth.products import PointCloud, Signals, no_points
+from sonarsynth.products import Arrivals, PointCloud, Signals, no_points
 from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.location.association import in_record, light_first
 from sonarsynth.ranging.received_window import ReceivedWindow
@@ -68,6 +68,7 @@ __all__ = [
     "coordinates",
     "digitise",
     "follow_rays",
+    "frame_tree",
     "locate_and_image",
     "range_frame",
     "render",
@@ -76,6 +77,7 @@ __all__ = [
     "stage_timer",
     "trace_at",
     "trace_frame",
+    "values_at",
     "variables",
 ]
 
@@ -85,10 +87,10 @@ def silent_frame(plan: Plan, index: int) -> Values:
     return silent_at(*_checked(plan, index))
 
 
-def silent_at(plan: Plan, frame: Frame) -> Values:
-    """The same of a frame that is at hand; `plan` is that of its sequence."""
+def silent_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> Values:
+    """The same of a frame that is at hand; `plan` is that of its sequence, arrivals as of `trace_at`."""
     if plan.products:
-        traced = trace_at(plan, frame)
+        traced = trace_at(plan, frame, arrivals)
         direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
         return in_slots(plan, _traced_values(plan, traced, direct) | which_values(plan), VARIABLES)
     truth = label(context_of(plan, frame), plan.propagation, snap_levels(frame.moment.snaps))
@@ -105,15 +107,16 @@ def trace_frame(plan: Plan, index: int) -> TracedFrame:
 def _checked(plan: Plan, index: int) -> tuple[Plan, Frame]:
     """The plan of a frame's sequence, and the frame, which was looked at now or before."""
     plan = plan.at(index)
-    frame = plan.recipe.frame(index)[1]
+    frame = plan.frame(index)
     check_unsampled_frame(plan, frame)
     return plan, frame
 
 
-def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
-    """Every path of a frame that is at hand, and its truth; `plan` is that of its sequence."""
+def trace_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> TracedFrame:
+    """Every path of a frame that is at hand, and its truth; `plan` is that of its sequence; arrivals: its paths, where
+    these are traced already."""
     context = context_of(plan, frame)
-    arrivals = trace(context, plan.propagation)
+    arrivals = trace(context, plan.propagation) if arrivals is None else arrivals
     mark_stage("trace")
     from_centre, levels = arrivals.seen_from_centre.without_reverberation, snap_levels(context.snaps)
     truth = label(context, plan.propagation, levels)
@@ -244,12 +247,12 @@ def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointClou
     return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile, track)
 
 
-def _values(plan: Plan, index: int) -> Values:
-    """Every stored value of a frame."""
+def values_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> Values:
+    """Every stored value of a frame that is at hand; `plan` is that of its sequence, arrivals as of `trace_at`."""
     if not plan.makes_sound:
-        return silent_frame(plan, index)
-    traced = trace_frame(plan, index)
-    return range_frame(plan, index, traced, beamform_frame(plan, index, traced))
+        return silent_at(plan, frame, arrivals)
+    traced = trace_at(plan, frame, arrivals)
+    return range_frame(plan, frame.index, traced, beamform_frame(plan, frame.index, traced))
 
 
 @in_one_thread
@@ -270,4 +273,4 @@ def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
     FieldError as `plan` does, IndexError for a frame that is not there.
     """
     resolved = plan(recipe) if isinstance(recipe, Recipe) else recipe
-    return frame_tree(resolved, index, _values(resolved, index))
+    return frame_tree(resolved, index, values_at(*_checked(resolved, index)))

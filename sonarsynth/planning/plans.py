@@ -25,8 +25,10 @@ from sonarsynth.planning.plan_tables import Omission, Stage, as_html, as_text
 from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import Elements, elements
 from sonarsynth.recipe import Recipe
-from sonarsynth.recipe.scene import Scene
+from sonarsynth.recipe.rising_bottom import with_sources
+from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.chorus.chorus_arrivals import ChorusReach
+from sonarsynth.sources import Source
 from sonarsynth.state import Medium
 
 
@@ -88,11 +90,24 @@ class Plan:
     thinning: float = 0.0  # error of signals, relative, of the layers that stand for a measured profile
     sequence: int = 0  # whose scene, profile and propagation these are
     odds: str = ""  # of finding targets in frames that were tried; "": none were, or no target is in view
+    sources: tuple[Source, ...] | None = None  # in the place of the recipe's (`other_sources`); None: those
 
     @property
     def scene(self) -> Scene:
         """The scene of the sequence."""
-        return self.recipe.scene_of(self.sequence)
+        return self.recipe.scene_of(self.sequence) if self.sources is None else self._with_sources
+
+    @cached_property
+    def _with_sources(self) -> Scene:
+        assert self.sources is not None
+        return with_sources(self.recipe.scene_of(self.sequence), self.sources)
+
+    def frame(self, index: int) -> Frame:
+        """Frame number `index`, which is one of the sequence."""
+        frame = self.recipe.frame(index)[1]
+        if self.sources is None:
+            return frame
+        return self.scene.frame(frame.step, index=index, trajectory=frame.trajectory, seed=frame.seed, key=frame.key)
 
     def at(self, index: int) -> Plan:
         """The plan for a frame: with the scene, the water and the propagation of its sequence. Raises FieldError."""
@@ -162,7 +177,7 @@ class Plan:
         """The depths of the paths of the sequence, in its first, middle and last frame."""
         first, count = self.recipe.first_frame(self.sequence), self.recipe.steps(self.sequence)
         steps = sorted({0, count // 2, count - 1})
-        return passed_by([self.recipe.frame(first + step)[1] for step in steps])
+        return passed_by([self.frame(first + step) for step in steps])
 
     @cached_property
     def absorption_error(self) -> float:

@@ -9,6 +9,7 @@ from typing import Final
 from sonarsynth.description import FieldError
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.recipe.scene import Scene
+from sonarsynth.sources import Source
 from sonarsynth.targets.meshes import file_stamp
 from sonarsynth.targets.relief import BOTTOM, highest_within
 
@@ -35,9 +36,15 @@ def _with_relief(scene: Scene, stamp: tuple[int, int] | None) -> Scene:
     if (rise := world.relief.target(depth)) is None:
         return scene
     risen = replace(scene, world=replace(world, targets=(*world.targets, rise)))
-    ground = partial(highest_within, risen.mesh_of(len(world.targets)), radius=0.0)
-    sources = tuple(source.on_relief(depth, ground) for source in world.sources)
-    return replace(risen, world=replace(risen.world, sources=sources))
+    return with_sources(risen, world.sources)
+
+
+def with_sources(scene: Scene, sources: tuple[Source, ...]) -> Scene:
+    """A scene with other sources, those that say no depth on what rises of its bottom."""
+    if (mesh := relief_of(scene)) is not None:
+        ground = partial(highest_within, mesh, radius=0.0)
+        sources = tuple(source.on_relief(scene.world.environment.depth, ground) for source in sources)
+    return replace(scene, world=replace(scene.world, sources=sources))
 
 
 def relief_of(scene: Scene) -> Mesh | None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,22 +38,39 @@ def trace(context: FrameContext, propagation: Propagation) -> Arrivals:
     faces, and is heard by those. The snap itself is heard if no body stands in between, but for those that scatter
     forward (`tracing.occlusion.forward_scattering`). Raises ValueError for anything outside the water.
     """
-    receiver, snaps = context.receiver, context.snaps
-    moving = receiver.track
+    return trace_each(context, propagation, (context.snaps,))[0]
+
+
+def trace_each(
+    context: FrameContext, propagation: Propagation, choices: Sequence[tuple[Emission, ...]]
+) -> list[Arrivals]:
+    """As `trace`, for each choice of snaps in the place of the context's. The way from facets to the array is traced
+    once for all, where what moves meets their sound at about one place (`Tolerances.shared`)."""
+    receiver, snaps = context.receiver, tuple(snap for of in choices for snap in of)
+    last = np.cumsum([0, *map(len, choices)]).tolist()
+    own = [range(start, stop) for start, stop in pairwise(last)]
+    context, moving = replace(context, snaps=snaps), receiver.track
     still = all(body.track.still for body in context.bodies) and not any(snap.velocity.any() for snap in snaps)
     if moving is None or (moving.still and still) or not snaps:
-        return arrivals(facet_paths(context, propagation, snaps=snaps))
-    blocks: list[Arrivals] = []
-    begun = set[int]()
-    for group in occasions(context, moving):
-        moved = replace(receiver, pose=group.meeting.sonar.pose)
-        lights = tuple(snaps[index] for index in group.snaps)
-        met = facet_paths(replace(context, bodies=group.bodies, receiver=moved), propagation, group.owners, lights)
-        array = replace(met, meeting=group.meeting)
-        blocks += [_direct(_hearing(array, snaps[index], moving), index) for index in set(group.snaps) - begun]
-        blocks += _echoes(array, group.snaps)
-        begun |= set(group.snaps)
-    return join(blocks, receiver.speed(context.medium), receiver.centre)
+        array = facet_paths(context, propagation, snaps=snaps)
+        found = [[*(_direct(array, index) for index in of), *_echoes(array, of)] for of in own]
+    else:
+        found = [[] for _ in own]
+        begun = set[int]()
+        for group in occasions(context, moving):
+            moved = replace(receiver, pose=group.meeting.sonar.pose)
+            lights = tuple(snaps[index] for index in group.snaps)
+            met = facet_paths(replace(context, bodies=group.bodies, receiver=moved), propagation, group.owners, lights)
+            array = replace(met, meeting=group.meeting)
+            for of, own_blocks in zip(own, found, strict=True):
+                together = [index for index in group.snaps if index in of]
+                new = [index for index in together if index not in begun]
+                own_blocks.extend(_direct(_hearing(array, snaps[index], moving), index) for index in new)
+                own_blocks.extend(_echoes(array, together))
+            begun |= set(group.snaps)
+    speed = receiver.speed(context.medium)
+    every = [join(blocks or [no_arrivals(array.legs)], speed, receiver.centre) for blocks in found]
+    return [replace(of, snap=of.snap - first) for of, first in zip(every, last, strict=False)]
 
 
 def _hearing(array: FacetPaths, snap: Emission, sonar: Track) -> FacetPaths:
@@ -62,13 +80,6 @@ def _hearing(array: FacetPaths, snap: Emission, sonar: Track) -> FacetPaths:
     track = sonar.later(arrival_time)
     context = replace(array.context, receiver=replace(array.context.receiver, pose=track.pose))
     return replace(array, context=context, meeting=Meeting(np.zeros(0), arrival_time, track))
-
-
-def arrivals(array: FacetPaths) -> Arrivals:
-    """As `trace`, of what is at rest, from legs that are traced already; shadows of targets have legs of their own."""
-    context, every = array.context, range(len(array.context.snaps))
-    blocks = [no_arrivals(array.legs), *(_direct(array, index) for index in every), *_echoes(array, every)]
-    return join(blocks, context.receiver.speed(context.medium), context.receiver.centre)
 
 
 def _echoes(array: FacetPaths, snaps: Iterable[int]) -> list[Arrivals]:

@@ -19,9 +19,8 @@ from sonarsynth.receiver import Elements, PositionTable, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
-from sonarsynth.tracing.arrivals import arrivals, trace
+from sonarsynth.tracing.arrivals import trace, trace_each
 from sonarsynth.tracing.expansion.probe_sensors import probes
-from sonarsynth.tracing.facet_paths import facet_paths
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))
 UNIFORM = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1540.0]))
@@ -121,10 +120,10 @@ def test_arrivals_are_sorted_by_snap_target_and_facet() -> None:
 def test_legs_of_the_array_side_serve_a_moved_shrimp(profile: Profile) -> None:
     bodies = (body((20.0, 1.0, -11.0)), body((15.0, 0.5, -11.5), name="other"))
     water, laws = Medium(ENVIRONMENT, profile, 0.02), (MirrorLobe(),) * 2
-    legs = facet_paths(FrameContext(0.0, bodies, (), water, Receiver(SONAR, ROMANIS), laws), AutoTracing())
-    for place in ((3.0, 6.0, -30.0), (10.0, -9.0, -29.0), (25.0, 3.0, -30.0)):
-        again = arrivals(replace(legs, context=replace(legs.context, snaps=(snap(place),))))
-        anew = run(bodies, (snap(place),), profile)
+    choices = [(), *((snap(p),) for p in ((3.0, 6.0, -30.0), (10.0, -9.0, -29.0), (25.0, 3.0, -30.0)))]
+    context = FrameContext(0.0, bodies, (), water, Receiver(SONAR, ROMANIS), laws)
+    for snaps, again in zip(choices, trace_each(context, AutoTracing(), choices), strict=True):
+        anew = run(bodies, snaps, profile)
         for name, value in anew.columns.items():
             np.testing.assert_array_equal(again.columns[name], value, err_msg=name)
 
