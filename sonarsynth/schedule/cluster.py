@@ -17,7 +17,7 @@ from typing import Any, Final
 from distributed import Client, Future, KilledWorker
 
 from sonarsynth.schedule import tasks, worker_status
-from sonarsynth.schedule.tasks import Failure, Job, WrittenShard
+from sonarsynth.schedule.tasks import Failure, Job, StageResult, WrittenShard
 
 SHARDS_AHEAD: Final = 3
 """Shards in flight for each worker: one being written, one being rendered, one to come."""
@@ -170,14 +170,17 @@ class _Builder:
         future.add_done_callback(self.landed.put)
 
     def _submit(self, flight: _Flight) -> Future[Any]:
-        """The tasks of a shard, all on its worker, those of earlier frames first."""
+        """The tasks of a shard, all on its worker, later stages of earlier frames first."""
         self.submitted += 1
         token, blocks = f"{self.token}.{self.submitted}", []
         for begin in range(0, len(flight.frames), self.job.block):
             frames = flight.frames[begin : begin + self.job.block]
             self.frames += len(frames)
-            key = f"frames-{token}-{frames[0]}"
-            blocks.append(self._task(tasks.render_frames, frames, key=key, priority=-self.frames, flight=flight))
+            results: Any = [StageResult(frame) for frame in frames]
+            for n, stages in enumerate(tasks.tasks_of(self.job)):
+                key, priority = f"{'-'.join(stages)}-{token}-{frames[0]}", n - len(tasks.STAGES) * self.frames
+                results = self._task(tasks.run_stages, stages, results, key=key, priority=priority, flight=flight)
+            blocks.append(results)
         key = f"shard-{token}-{flight.shard}"
         return self._task(tasks.write, flight.shard, blocks, key=key, priority=1, flight=flight)
 

@@ -1,8 +1,8 @@
 """What runs for frames and for a shard, in whatever process: the same functions without a scheduler and on a cluster.
 
-A task is a frame, or a block of several where they are short; another writes them. It knows the store and the recipe's
-digest, and finds the recipe in the store: nothing large travels to it. A stage of a frame that raises gives its failure
-as its result, so that one bad frame costs only itself.
+A task is a stage of a frame; where frames are short, all stages of a block of them; another writes them. It knows the
+store and the recipe's digest, and finds the recipe in the store: nothing large travels to it. A stage of a frame that
+raises gives its failure as its result, so that one bad frame costs only itself.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from pathlib import Path
 from typing import Any, Final
 
@@ -80,18 +81,23 @@ class WrittenShard:
     peak_bytes: int  # of memory of this process so far
 
 
+def tasks_of(job: Job) -> list[list[str]]:
+    """The stages of each task of a block of frames, in order: a task each where a frame is a block. Short frames have
+    one chain of them as a task, so that little is scheduled and no block of signals is held between two."""
+    stages = stages_of(job.products)
+    return [stages] if job.block > 1 else [[stage] for stage in stages]
+
+
 @in_one_thread
+def run_stages(job: Job, stages: Sequence[str], before: Sequence[StageResult]) -> list[StageResult]:
+    """Task <stages>-<token>-<first frame>: what some stages make of some frames, one frame after the other; of the last
+    one, values in the types of the store."""
+    return [reduce(lambda so_far, stage: _stage(job, stage, so_far), stages, frame) for frame in before]
+
+
 def render_frames(job: Job, frames: Sequence[int]) -> list[StageResult]:
-    """Task frames-<token>-<first frame>: the values of some frames, in the types of the store, one after the other."""
-    return [render_frame(job, frame) for frame in frames]
-
-
-def render_frame(job: Job, frame: int) -> StageResult:
-    """All stages of a frame, here and now."""
-    result = StageResult(frame)
-    for name in stages_of(job.products):
-        result = _stage(job, name, result)
-    return result
+    """All stages of some frames, here and now."""
+    return run_stages(job, stages_of(job.products), [StageResult(frame) for frame in frames])
 
 
 def stages_of(products: Iterable[str]) -> list[str]:

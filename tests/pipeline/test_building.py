@@ -17,7 +17,7 @@ from distributed import Client, Future, LocalCluster
 from sonarsynth import evaluation, pipeline, store
 from sonarsynth.planning import Plan
 from sonarsynth.recipe import Recipe
-from sonarsynth.schedule import build, cluster, tasks
+from sonarsynth.schedule import build, cluster, making, tasks
 from sonarsynth.schedule.making import job_of
 from tests.waiting import wait_until
 
@@ -73,10 +73,19 @@ def test_a_worker_of_a_running_scheduler_makes_the_same_arrays(
     assert_same(tmp_path / "s.zarr", reference)
 
 
-@pytest.mark.parametrize("products", ["cloud", "truth"])
-def test_dask_runs_a_block_of_short_frames_as_a_task(
-    tmp_path: Path, small: Recipe, here: str, monkeypatch: pytest.MonkeyPatch, products: str
-) -> None:
+@pytest.mark.parametrize(
+    ("products", "seconds", "chains"),
+    [
+        ("cloud", 3.0, ["trace-beamform-range"]),
+        ("truth", 3.0, ["trace"]),
+        ("cloud", 0.0, ["trace", "beamform", "range"]),
+        ("image", 0.0, ["trace", "beamform"]),
+    ],
+)
+def test_dask_runs_stages_as_tasks_and_those_of_a_block_of_short_frames_as_one(
+    tmp_path: Path, small: Recipe, here: str, monkeypatch: pytest.MonkeyPatch, products: str, seconds: float,
+    chains: list[str],
+) -> None:  # fmt: skip
     keys: list[str] = []
     submit = Client.submit
 
@@ -85,10 +94,11 @@ def test_dask_runs_a_block_of_short_frames_as_a_task(
         return submit(client, *arguments, key=key, **options)
 
     monkeypatch.setattr(Client, "submit", noted)
+    monkeypatch.setattr(making, "BLOCK_SECONDS", seconds)
     assert build(small, tmp_path / "s.zarr", products=products, scheduler=here).ok
-    kinds = [(key.split("-")[0], int(key.split("-")[-1])) for key in keys]
-    shards = [("frames", 0), ("frames", 8), ("frames", 16), *(("shard", n) for n in range(3))]
-    assert sorted(kinds) == shards  # of 8 of 20 frames, named by their first frames
+    kinds = [(key.rsplit("-", 2)[0], int(key.split("-")[-1])) for key in keys]
+    firsts = (0, 8, 16) if seconds else range(20)  # shards of 8 of 20 frames, named by their first frames
+    assert sorted(kinds) == sorted([(c, n) for c in chains for n in firsts] + [("shard", n) for n in range(3)])
 
 
 def test_a_task_is_of_one_frame_where_they_are_long(small_plan: Plan) -> None:
