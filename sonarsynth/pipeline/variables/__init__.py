@@ -95,15 +95,20 @@ def frame_tree(plan: Plan, index: int, values: Mapping[tuple[str, str], npt.NDAr
     """
     import xarray as xr
 
-    groups = {"/": xr.Dataset(attrs=attributes(plan))}
+    static: dict[str, dict[str, Any]] = {}
+    varying: dict[str, dict[str, Any]] = {}
     for (group, name), (dims, array, attrs) in coordinates(plan).items():
         entry = (dims[1:], array[index], attrs) if "frame" in dims else (dims, array, attrs)
-        groups.setdefault(group, xr.Dataset()).coords[name] = entry
+        static.setdefault(group, {})[name] = entry
     for v in variables(plan):
         attrs = {"units": v.units, "long_name": v.long_name, **dict(v.attributes)}
         data = values[v.group, v.name]
         if "scale_factor" in attrs:
             packed = data * attrs.pop("scale_factor")
             data = np.where(data == v.fill, np.nan, packed).astype(np.float32)
-        groups.setdefault(v.group, xr.Dataset())[v.name] = (v.dims[1:], data, attrs)
+        varying.setdefault(v.group, {})[v.name] = (v.dims[1:], data, attrs)
+    groups = {  # each at once: xarray aligns all that a dataset has with every variable that is added
+        group: xr.Dataset(varying.get(group), static.get(group), attributes(plan) if group == "/" else None)
+        for group in dict.fromkeys(["/", *static, *varying])
+    }
     return xr.DataTree.from_dict(groups)
