@@ -82,7 +82,7 @@ def test_a_frame_has_one_thread_for_linear_algebra_and_gives_the_others_back(
         seen.extend(threads())
         raise InterruptedError
 
-    monkeypatch.setattr(pipeline, "_values", seeing)
+    monkeypatch.setattr(pipeline, "values_at", seeing)
     with threadpool_limits(2, user_api="blas"):
         assert set(threads()) == {2}
         with pytest.raises(InterruptedError):
