@@ -12,6 +12,7 @@ from sonarsynth.scattering import Component, Scatterers
 from sonarsynth.scattering.components import CoherentKirchhoff, DiffuseKirchhoff, Lobe
 from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse
 from sonarsynth.tracing.doppler import MotionTerms
+from sonarsynth.tracing.receive_paths import DOUBTFUL
 from sonarsynth.tracing.transmit_paths import TransmitPaths
 
 if TYPE_CHECKING:
@@ -119,7 +120,8 @@ def echo_batches(
             batch = EchoBatch(surface, component, row, patch, incident, scattered, wavenumber, amplitude, sign)
             strength = np.abs(amplitude) * factor[row]
             faint = np.sqrt(PRUNE_MARGIN * context.tolerances.negligible) / max(len(row), 1)
-            batches.append(batch.select(picked(strength > faint * strength.max(initial=0.0))))
+            heard = array.legs.open[owned_leg] < DOUBTFUL
+            batches.append(batch.select(picked(strength > faint * strength.max(initial=0.0, where=heard))))
     return batches
 
 

@@ -24,7 +24,7 @@ from sonarsynth.tracing.expansion.scattering_points import delay_to_scattering_p
 from sonarsynth.tracing.occlusion.ray_cones import hidden, overlapping
 from sonarsynth.tracing.path_absorption import path_loss
 from sonarsynth.tracing.pruning import EchoLevels, loud_of_all, loud_ones
-from sonarsynth.tracing.receive_paths import may_face_receiver, path_pairs, usable
+from sonarsynth.tracing.receive_paths import DOUBTFUL, ReceivePaths, may_face_receiver, path_pairs, usable
 from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arrivals, ordered
 
 if TYPE_CHECKING:
@@ -48,6 +48,14 @@ class _EchoBlock:
     terms: ArrayExpansion  # (echo,) but for amplitudes
     pulses: PulseResponse  # (echo,)
     carried: MotionTerms | None  # (pair,); None: nothing moves
+    legs: ReceivePaths | None = None  # (pair,) with the hydrophones that do not hear it; None: not looked at
+
+    def heard(self, loud: Bools) -> _EchoBlock:
+        """The echoes picked by a mask that a hydrophone hears, with what hides the others."""
+        legs, in_sight = self.array.settled(self.leg[_columns(self.groups, "row")[0][loud]])
+        heard = loud.copy()
+        heard[loud] = in_sight
+        return replace(self.select(heard), legs=legs)
 
     def select(self, loud: Bools) -> _EchoBlock:
         """The echoes picked by a mask, each with a pair of its own."""
@@ -94,7 +102,8 @@ class _EchoBlock:
         strongest = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
         owner = self.array.facets.owner[self.out.facet[row]]
         strength = strongest * in_band(self.pulses, self.array.context.receiver.band)
-        return EchoLevels(strength, self.pulses.coherent, owner, self.group)
+        heard = self.array.legs.open[self.leg[row]] < DOUBTFUL
+        return EchoLevels(strength, self.pulses.coherent, owner, heard, self.group)
 
     @property
     def group(self) -> Ints:
@@ -122,7 +131,8 @@ def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...
         spot = np.concatenate([g.spot for g in block.groups])
         if spot.any() and not block.array.bending.profile.uniform:
             over = delay_to_scattering_points(over, block.array, block.leg, spot)
-        array, out, legs, meeting = block.array, block.out, block.array.settled(block.leg), block.array.meeting
+        array, out, legs, meeting = block.array, block.out, block.legs, block.array.meeting
+        assert legs is not None
         if meeting is not None and block.carried is not None:
             legs = received(legs, block.carried, meeting, profile)
         kinds, target, facet = array.met(out.facet, kind)
@@ -149,7 +159,7 @@ def _loudest(array: FacetPaths, snap: Emission, components: tuple[tuple[Componen
     blocks = in_blocks(len(array.facets.facet))
     if len(blocks) == 1:
         block = _found(array, snap, components)
-        return [block.select(loud_ones(block.seen(), array.context.tolerances.negligible))]
+        return [block.heard(loud_ones(block.seen(), array.context.tolerances.negligible))]
     loud: list[_EchoBlock] = []
     levels: list[EchoLevels] = []
     masks: list[Bools] = []
@@ -160,9 +170,9 @@ def _loudest(array: FacetPaths, snap: Emission, components: tuple[tuple[Componen
         loud.append(block.select(masks[-1]))
     for n, wanted in enumerate(loud_of_all(levels, array.context.tolerances.negligible)):
         if (wanted & ~masks[n]).any():
-            loud[n] = _found(array.part(blocks[n]), snap, components).select(wanted)
+            loud[n] = _found(array.part(blocks[n]), snap, components).heard(wanted)
         else:
-            loud[n] = loud[n].select(wanted[masks[n]])
+            loud[n] = loud[n].heard(wanted[masks[n]])
     return loud
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET, Ints, picked
+from sonarsynth.conventions import NO_TARGET, Bools, Ints, picked
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.kernels.placing import in_front
 from sonarsynth.geometry.mesh import in_blocks
@@ -81,17 +81,22 @@ class FacetPaths:
         body = owner < len(self.context.bodies)
         return np.where(body, kind, Kind.REVERBERATION), np.where(body, owner, NO_TARGET), self.facets.facet[row]
 
-    def settled(self, leg: Ints) -> ReceivePaths:
-        """Some legs (row,), with the hydrophones that bodies hide them from."""
-        number, row = np.unique(leg[self.legs.open[leg]], return_inverse=True)
-        legs = self.legs.select(leg)
+    def settled(self, leg: Ints) -> tuple[ReceivePaths, Bools]:
+        """Those of some legs (row,) that a hydrophone sees, with the hydrophones that bodies hide them from, and which
+        (row,) these are."""
+        number, row = np.unique(leg[self.legs.open[leg] > 0], return_inverse=True)
+        in_sight = np.ones(len(leg), bool)
         if not len(number):
-            return legs
+            return self.legs.select(leg), in_sight
         pending = self.legs.select(number)
-        pending = self.view(self.context.bodies).settled(pending, *self.facets.side(pending.row, pending.departure))
+        side = self.facets.side(pending.row, pending.departure)
+        pending = self.view(self.context.bodies).settled(pending.numbered(np.arange(len(number))), *side)
+        found = np.isin(row, pending.row)
+        in_sight[self.legs.open[leg] > 0] = found
+        legs = self.legs.select(leg[in_sight])
         occluded = legs.occluded.copy()
-        occluded[legs.open] = pending.occluded[row]
-        return legs.seen(occluded, np.zeros(len(leg), bool))
+        occluded[legs.open > 0] = pending.occluded[np.searchsorted(pending.row, row[found])]
+        return legs.seen(occluded, np.zeros_like(legs.open)), in_sight
 
 
 def facet_paths(

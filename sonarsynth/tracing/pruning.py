@@ -16,6 +16,7 @@ class EchoLevels(NamedTuple):
     strength: Floats  # (echo,) the largest amplitude that it has anywhere on the array
     coherent: Bools  # (echo,)
     owner: Ints  # (echo,) index into `FrameContext.scattering`
+    heard: Bools  # (echo,) for certain, by some hydrophone
     group: Ints  # (echo,)
 
 
@@ -30,14 +31,15 @@ def loud_of_all(levels: list[EchoLevels], negligible: float) -> list[Bools]:
 
 
 def loud_ones(levels: EchoLevels, negligible: float) -> Bools:
-    """Which (path,) are kept: all but the faintest of each target, by `arrivals.NEGLIGIBLE`."""
-    strength, coherent, owner, _ = levels
+    """Which (path,) are kept: all but the faintest of each target, re what is heard of it for certain."""
+    strength, coherent, owner, heard, _ = levels
     keep = np.ones(len(strength), bool)
     for number, exponent in product(np.unique(owner), (1, 2)):
         rows = np.flatnonzero((owner == number) & (coherent == (exponent == 1)))
         loudest = strength[rows].max(initial=0.0)
         size = (strength[rows] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared
         order = np.argsort(size, kind="stable")
-        least = negligible * size.sum() if exponent == 2 else np.sqrt(negligible)
+        most = size[heard[rows]]
+        least = negligible * most.sum() if exponent == 2 else np.sqrt(negligible) * most.max(initial=0.0)
         keep[rows[order[np.cumsum(size[order]) <= least]]] = False
     return keep

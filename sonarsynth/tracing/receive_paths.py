@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
 
 
+SEEN, DOUBTFUL = 1, 2
+"""Legs of which it is not known which hydrophones bodies hide them from: by some they are seen, or maybe by none."""
+
+
 @dataclass(frozen=True, eq=False)
 class ReceivePaths:
     """Rays from points in the water to the array centre."""
@@ -47,7 +51,7 @@ class ReceivePaths:
     phase: Floats  # (leg,) rad of reflections and caustics
     delay_std: Floats  # (leg,) s
     occluded: Bytes  # (leg, byte) as of `Arrivals`
-    open: Bools  # (leg,) bodies hide it from some hydrophones: which is not known yet (`sensor_occlusion.Occlusion`)
+    open: Ints  # (leg,) not 0: bodies hide it from hydrophones, not known yet which (`sensor_occlusion.Occlusion`)
 
     def select(self, keep: Bools | Ints | slice) -> ReceivePaths:
         """The legs picked by a mask, by indices, or by a slice, which copies nothing."""
@@ -57,7 +61,7 @@ class ReceivePaths:
         """The legs with other numbers (leg,) for the points that they start from."""
         return replace(self, row=row)
 
-    def seen(self, occluded: Bytes, open: Bools) -> ReceivePaths:
+    def seen(self, occluded: Bytes, open: Ints) -> ReceivePaths:
         """The legs, hidden from some hydrophones, which are not known yet for some."""
         return replace(self, occluded=occluded, open=open)
 
@@ -161,7 +165,7 @@ def rays_to_centre(medium: Medium, point: Floats, receiver: Receiver, propagatio
         phase=bounced.phase[keep],
         delay_std=bounced.delay_std[keep],
         occluded=np.zeros((len(start), 0), np.uint8),
-        open=np.zeros(len(start), bool),
+        open=np.zeros(len(start), int),
     )
 
 

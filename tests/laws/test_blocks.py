@@ -22,6 +22,7 @@ from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing import echoes
 from sonarsynth.tracing.arrivals import trace
+from sonarsynth.tracing.pruning import EchoLevels, loud_ones
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))
 UNIFORM = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1540.0]))
@@ -114,3 +115,14 @@ def test_blocks_are_all_and_none_is_too_large(monkeypatch: pytest.MonkeyPatch) -
         assert [n for part in parts for n in range(part.start, part.stop)] == list(range(count))
         assert max(part.stop - part.start for part in parts) <= 10
         assert len(parts) == max(-(-count // 10), 1)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_echo_is_faint_beside_what_nobody_may_hear(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    strength, owner = random.exponential(size=400) ** 6, random.integers(0, 3, 400)
+    heard, coherent = random.random(400) < 0.5, random.random(400) < 0.5
+    keep = loud_ones(EchoLevels(strength * np.where(heard, 1.0, 1e9), coherent, owner, heard, owner), 1e-3)
+    alone = loud_ones(EchoLevels(*(column[heard] for column in (strength, coherent, owner, heard, owner))), 1e-3)
+    assert not alone.all()
+    assert keep[heard][alone].all()

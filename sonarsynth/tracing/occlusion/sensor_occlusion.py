@@ -18,7 +18,7 @@ from sonarsynth.receiver import Elements
 from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation
 from sonarsynth.tracing.occlusion.ray_cones import hidden, ray_cones
-from sonarsynth.tracing.receive_paths import ReceivePaths
+from sonarsynth.tracing.receive_paths import DOUBTFUL, SEEN, ReceivePaths
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
@@ -58,7 +58,7 @@ class Occlusion:
         self, legs: ReceivePaths, start: Floats, normal: Floats | None, own: Ints | None = None
     ) -> ReceivePaths:
         """The legs that no body hides from the array centre; or, with elements, from every hydrophone, some of them
-        open for `settled`.
+        open for `settled`, which finds those that are hidden from every one after all.
 
         start (leg, xyz): of the legs, moved off their facets; normal (leg, xyz): of these, which legs leave on their
         outer side; None where they have none; own (leg,): as of `hidden`.
@@ -77,23 +77,25 @@ class Occlusion:
                 unseen = self._unseen(legs, start, normal, rows, first, swerve)
                 in_sight[rows] = ~unseen.all(axis=1)
                 mixed[rows] |= unseen.any(axis=1)
-        for rows in self._parts(legs, np.flatnonzero(mixed & ~in_sight & (certain == UNKNOWN)), len(self._points)):
-            in_sight[rows] = ~self._dark(legs, start, normal, rows, not self._straight(legs)).all(axis=1)
-        none = np.zeros((np.count_nonzero(in_sight), 1 + self.elements.count // 8), np.uint8)
-        return legs.select(np.flatnonzero(in_sight)).seen(none, mixed[in_sight])
+        pending = mixed * SEEN + (mixed & ~in_sight & (certain == UNKNOWN)) * (DOUBTFUL - SEEN)
+        rows = np.flatnonzero(in_sight | (pending == DOUBTFUL))
+        none = np.zeros((len(rows), 1 + self.elements.count // 8), np.uint8)
+        return legs.select(rows).seen(none, pending[rows])
 
     def settled(self, legs: ReceivePaths, start: Floats, normal: Floats | None) -> ReceivePaths:
-        """The same legs, none of them open: those that are, looked at from each hydrophone; arguments as above.
+        """The same legs, none of them open: those that are, looked at from each hydrophone, and left out where none
+        sees them; arguments as above.
 
         That is left until it is known which of them count: of facets that are neither lit nor loud, none.
         """
         rows = np.flatnonzero(legs.open)
         if not len(rows):
             return legs
-        occluded = legs.occluded.copy()
+        occluded, in_sight = legs.occluded.copy(), np.ones(len(legs.row), bool)
         for block in self._parts(legs, rows, len(self._points)):
-            occluded[block] = np.packbits(self._dark(legs, start, normal, block), axis=1)
-        return legs.seen(occluded, np.zeros(len(legs.row), bool))
+            dark = self._dark(legs, start, normal, block)
+            occluded[block], in_sight[block] = np.packbits(dark, axis=1), ~dark.all(axis=1)
+        return legs.seen(occluded, np.zeros_like(legs.open)).select(picked(in_sight))
 
     @property
     def _points(self) -> Floats:
@@ -147,15 +149,11 @@ class Occlusion:
         verdict[rows] = classify_cones(self.bodies, start[rows], away[rows], slope[sure], reach[sure], far[sure])
         return verdict
 
-    def _dark(
-        self, legs: ReceivePaths, start: Floats, normal: Floats | None, rows: Ints, by_parts: bool = True
-    ) -> Bools:
+    def _dark(self, legs: ReceivePaths, start: Floats, normal: Floats | None, rows: Ints) -> Bools:
         """(row, 1 + sensor) from where some legs are hidden: the array centre, each hydrophone. Parts of the array that
-        see alike are looked at together, unless few are likely to see anything."""
+        see alike are looked at together."""
         every = np.arange(len(self._points))
         swerve = self._swerve(legs.select(rows), every)
-        if not by_parts:
-            return self._unseen(legs, start, normal, rows, every, swerve)
         array_cells = cells(self.elements)
         row, cell = np.repeat(rows, len(array_cells.radius)), np.tile(np.arange(len(array_cells.radius)), len(rows))
         repeated, offset, spread = (
