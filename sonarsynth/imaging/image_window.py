@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import hann_shading, live_gain
@@ -30,17 +29,15 @@ def snapshots_of(
     """
     rate = signals.sampling_frequency
     first, count = gate_samples(start, stop, signals.start, rate, signals.pressure.shape[1])
-    frequency, spectra = gated_spectra(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
+    frequency, spectra, power = gated_spectra(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
     if lasting is None:
-        lasting = _lasting(signals.pressure[:, first : first + count]) / rate
+        lasting = _lasting(power.astype(float)) / rate
     spacing, begin = frequency_spacing(count, rate), signals.start + first / rate
     return Snapshots(frequency, spacing, spectra, begin, count, rate, lasting)
 
 
-def _lasting(pressure: npt.NDArray[np.floating]) -> int:
-    """Samples from where pressures (sensor, sample) have `QUIET` of their energy behind them to where they have so much
-    before them."""
-    power = np.einsum("st,st->t", pressure, pressure).astype(float)
+def _lasting(power: Floats) -> int:
+    """Samples from where a power (sample,) has `QUIET` of its energy behind it to where it has so much before it."""
     silence = QUIET * power.sum()
     before, after = np.cumsum(power), np.cumsum(power[::-1])
     return max(len(power) - int(np.searchsorted(before, silence)) - int(np.searchsorted(after, silence)), 0)

@@ -43,6 +43,7 @@ from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coord
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import Arrivals, PointCloud, Signals, no_points
+from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.location.association import in_record, light_first
 from sonarsynth.ranging.received_window import ReceivedWindow
@@ -240,8 +241,7 @@ def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointClou
     if not in_record(estimates, signals, plan.windows.echo_start, plan.windows.echo_stop)[:1].any():
         return no_points()
     elements, sonar, choices = known_elements(plan, frame), plan.scene.sonar, plan.choices
-    pressure = signals.pressure
-    loudest = float(max(pressure.max(initial=0.0), -pressure.min(initial=0.0)))
+    loudest = ranging_kernels.peak(signals.pressure)
     window = ReceivedWindow(elements, sonar, image, beams, loudest, beamformed.signals, estimates)
     track = receiver_of(plan, frame).track
     return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile, track)

@@ -133,8 +133,7 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
         block = slice(first, first + BEAMS_AT_ONCE)
         sine = u[block] * (elements.face / c)
         face = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], f[0], spacing, len(f))
-        face /= np.sqrt(face**2 @ share)[:, None]
-        echo = ifft(received.beams.spectra(u[block]) * (face * matched).astype(np.complex64), length, axis=1)
+        echo = ifft(ranging_kernels.matched_to(received.beams.spectra(u[block]), face, share, matched), length, axis=1)
         ranging_kernels.powers(echo, power[block])
     spread = np.sum(taper**2)
     centre = f @ taper**2 / spread

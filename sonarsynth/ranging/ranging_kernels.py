@@ -33,6 +33,16 @@ def power_and_peak(pressure: Any, live: Any) -> Any:
 
 
 @compiled
+def peak(pressure: Any) -> float:
+    """The largest |pressure| (sensor, sample)."""
+    high = np.zeros(pressure.shape[1], pressure.dtype)
+    for q in range(pressure.shape[0]):
+        for n in range(pressure.shape[1]):
+            high[n] = max(high[n], abs(pressure[q, n]))
+    return float(high.max()) if len(high) > 0 else 0.0
+
+
+@compiled
 def powers(waves: Any, power: Any) -> None:
     """Write |.|^2 of the first samples of complex waves (beam, sample) into power (beam, sample), as many as it has."""
     for b in range(power.shape[0]):
@@ -56,10 +66,14 @@ def cut_out(pressure: Any, arrival: Any, half: int, gain: Any) -> Any:
         sample = np.floor(arrival[q])
         first, fraction = int(sample) - half, arrival[q] - sample
         c, s = np.cos(4 * np.pi / half * fraction), np.sin(4 * np.pi / half * fraction)
-        for i in range(max(1, -first), min(2 * half, samples - first)):
-            x = i - fraction
-            flat = 1.0 if 0.25 * half <= x <= 1.75 * half else 0.5 - 0.5 * (cosine[i] * c + sine[i] * s)
-            cut[q, i] = pressure[q, first + i] * flat * gain[q]
+        begin, end = max(1, -first), min(2 * half, samples - first)
+        for i in range(begin, end):
+            cut[q, i] = pressure[q, first + i] * gain[q]
+        low, high = int(np.ceil(0.25 * half + fraction)), int(np.floor(1.75 * half + fraction))  # flat from low to high
+        for i in range(begin, min(low, end)):
+            cut[q, i] *= 0.5 - 0.5 * (cosine[i] * c + sine[i] * s)
+        for i in range(max(high + 1, begin), end):
+            cut[q, i] *= 0.5 - 0.5 * (cosine[i] * c + sine[i] * s)
     return cut
 
 
@@ -101,6 +115,19 @@ def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int
             sy, cy = sy * turn_y + cy * step_y, cy * turn_y - sy * step_y
             sz, cz = sz * turn_z + cz * step_z, cz * turn_z - sz * step_z
     return response
+
+
+@compiled
+def matched_to(beams: Any, face: Any, share: Any, matched: Any) -> Any:
+    """beams (beam, bin) times face (beam, bin), over its root mean square by share (bin,), and times matched (bin,)."""
+    out = np.empty(beams.shape, beams.dtype)
+    for b in range(beams.shape[0]):
+        power = 0.0
+        for k in range(beams.shape[1]):
+            power += share[k] * face[b, k] * face[b, k]
+        for k in range(beams.shape[1]):
+            out[b, k] = beams[b, k] * (face[b, k] / np.sqrt(power) * matched[k])
+    return out
 
 
 @compiled

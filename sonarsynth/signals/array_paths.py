@@ -244,7 +244,7 @@ def reach(front: Wavefronts) -> Floats:
 def steered_spread(front: Wavefronts, rows: Ints) -> float:
     """Bound (s) on how much sooner or later some paths meet any hydrophone than one front from among them, which meets
     the array centre when they do."""
-    aperture, far = front.aperture, np.ptp(front.direction[rows], axis=0)
+    aperture, far = front.aperture, np.ptp(front.direction.T[:, rows], axis=1)
     spread = 2.0 * float(reach(front)[rows].max())
     if float(front.curvature[rows].max()) * aperture > 0.5:
         return spread

@@ -140,11 +140,10 @@ def _extent(
     spread = reach(front)
     early, late = front.delay - spread - before, front.delay + spread + after
     doubtful = np.flatnonzero((early < start) | (late > stop))
-    for rows in np.array_split(doubtful, doubtful.size // 1024 + 1):  # bounds the memory
-        if rows.size:
-            delay, _ = delay_and_gain(front.select(rows), elements.position)
-            early[rows] = front.delay[rows] + delay.min(axis=1) - before[rows]
-            late[rows] = front.delay[rows] + delay.max(axis=1) + after[rows]
+    for rows in (doubtful[i : i + 1024] for i in range(0, doubtful.size, 1024)):  # bounds the memory
+        delay, _ = delay_and_gain(front.select(rows), elements.position)
+        early[rows] = front.delay[rows] + delay.min(axis=1) - before[rows]
+        late[rows] = front.delay[rows] + delay.max(axis=1) + after[rows]
     return early, late
 
 

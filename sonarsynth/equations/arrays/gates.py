@@ -59,14 +59,17 @@ def gated_spectra(
     first_sample: int,
     count: int,
     band: tuple[float, float],
-) -> tuple[Floats, npt.NDArray[np.complex64]]:
-    """Frequencies (bin,) in Hz and rfft spectra (sensor, bin) in Pa of a gate, bins of the band (low, high) only.
+) -> tuple[Floats, npt.NDArray[np.complex64], Floats]:
+    """Frequencies (bin,) in Hz and rfft spectra (sensor, bin) in Pa of a gate, bins of the band (low, high) only; and
+    the power (sample,) in Pa2 of all sensors before it was tapered.
 
     pressure (sensor, sample) Pa. Phases refer to `first_sample`. The gate is tapered (`gate_taper`) and padded with
     zeros to a fast length (`frequency_spacing`). Raises ValueError when no frequency in band is below half the sampling
     frequency.
     """
     from scipy.fft import rfft
+
+    from sonarsynth.equations.kernels.tapers import taper_rows
 
     length = fast_length(count)
     low, high = (edge * length / sampling_frequency for edge in band)
@@ -77,11 +80,11 @@ def gated_spectra(
             f"a window of {count} samples resolves no frequency in {band[0]:g} to {band[1]:g} Hz: take a longer one"
         )
     taper = gate_taper(count, sampling_frequency)
-    gate = slice(first_sample, first_sample + count)
+    power = np.zeros(count, pressure.dtype)
     spectra = np.empty((len(pressure), highest + 1 - lowest), np.complex64)
     cut = np.zeros((SENSORS_AT_ONCE, length), np.result_type(pressure, taper))
     for low in range(0, len(pressure), SENSORS_AT_ONCE):
-        some = pressure[low : low + SENSORS_AT_ONCE, gate]
-        np.multiply(some, taper, out=cut[: len(some), :count])
+        some = pressure[low : low + SENSORS_AT_ONCE]
+        taper_rows(some, first_sample, taper, cut, power)
         spectra[low : low + len(some)] = rfft(cut[: len(some)], axis=1)[:, lowest : highest + 1]
-    return np.arange(lowest, highest + 1, dtype=float) * (sampling_frequency / length), spectra
+    return np.arange(lowest, highest + 1, dtype=float) * (sampling_frequency / length), spectra, power

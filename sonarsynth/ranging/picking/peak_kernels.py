@@ -8,6 +8,9 @@ import numpy as np
 
 from sonarsynth.compiling import compiled
 
+AT_ONCE = 64
+"""Delays that are first looked over for one of interest: few are."""
+
 
 @compiled
 def exceeded(power: Any, index: Any, i: int, j: int, t: int, about: int) -> Any:
@@ -37,15 +40,40 @@ def local_maxima(power: Any, index: Any, row: Any, column: Any, floor: Any, edge
     (2,) says that peaks are resolved: theirs may be outside.
     """
     rows, columns = index.shape
-    peaks = np.zeros(power.shape, np.bool_)
+    peaks, count = np.empty((2, power.size), np.int64), 0
     for b in range(len(power)):
         i, j = row[b], column[b]
         if (edge[0] and (i == 0 or i == rows - 1)) or (edge[1] and (j == 0 or j == columns - 1)):
             continue
-        for t in range(end, power.shape[1] - end):
-            top = power[b, t] > floor[b] and power[b, t] >= power[b, t + 1] and power[b, t] > power[b, t - 1]
-            peaks[b, t] = top and not exceeded(power, index, i, j, t, about)
-    return np.nonzero(peaks)
+        for first in range(end, power.shape[1] - end, AT_ONCE):
+            last, over = min(first + AT_ONCE, power.shape[1] - end), 0
+            for t in range(first, last):
+                over += power[b, t] > floor[b]
+            if over == 0:
+                continue
+            for t in range(first, last):
+                top = power[b, t] > floor[b] and power[b, t] >= power[b, t + 1] and power[b, t] > power[b, t - 1]
+                if top and not exceeded(power, index, i, j, t, about):
+                    peaks[0, count], peaks[1, count] = b, t
+                    count += 1
+    return peaks[0, :count].copy(), peaks[1, :count].copy()
+
+
+@compiled
+def beside(power: Any, index: Any, row: Any, column: Any, b: Any, t: Any) -> Any:
+    """Power (axis, before or after, peak) next to peaks, whose own stands where there is no beam; arrays as for
+    `power_centres`."""
+    rows, columns = index.shape
+    around = np.empty((3, 2, len(b)), power.dtype)
+    for p in range(len(b)):
+        own, i, j = b[p], row[b[p]], column[b[p]]
+        for side in range(2):
+            step = 2 * side - 1
+            above, aside = index[min(max(i + step, 0), rows - 1), j], index[i, min(max(j + step, 0), columns - 1)]
+            around[0, side, p] = power[above if above >= 0 else own, t[p]]
+            around[1, side, p] = power[aside if aside >= 0 else own, t[p]]
+            around[2, side, p] = power[own, t[p] + step]
+    return around
 
 
 @compiled

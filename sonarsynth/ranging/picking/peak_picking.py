@@ -15,7 +15,7 @@ from sonarsynth.equations.arrays.apertures import live_gain
 from sonarsynth.equations.arrays.noise_peaks import peak_level
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.picking.peak_kernels import farthest, local_maxima, over_lobes, power_centres
+from sonarsynth.ranging.picking.peak_kernels import beside, farthest, local_maxima, over_lobes, power_centres
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
 from sonarsynth.ranging.range_profiles import (
     OVERSAMPLING,
@@ -218,21 +218,10 @@ def _tops(
     Parabolas through peaks and their neighbours on each axis: through the cube roots of amplitudes, which the main lobe
     of a disc makes a parabola up to the fourth order (1 - y/2 + y^2/12 does).
     """
-    row, column = beams[0][b], beams[1][b]
     top = power[b, t].astype(float) ** SIXTH
-    offset, gain = np.zeros((len(b), 3)), np.ones(len(b))
-    for axis, (up, across, late) in enumerate(np.eye(3, dtype=int)):
-        sides = []
-        for step in (-1, 1):
-            i = np.clip(row + step * up, 0, index.shape[0] - 1)
-            j = np.clip(column + step * across, 0, index.shape[1] - 1)
-            neighbour = index[i, j]
-            beyond = np.where(neighbour >= 0, power[neighbour, t + step * late].astype(float) ** SIXTH, top)
-            sides.append(np.minimum(beyond, top))
-        if resolved[axis]:
-            offset[:, axis], height = pulse_times.parabola(sides[0], top, sides[1])
-            gain *= (height / top) ** 3
-    return offset, gain
+    sides = np.minimum(beside(power, index, *beams, b, t).astype(float) ** SIXTH, top)
+    offset, height = pulse_times.parabola(sides[:, 0], top, sides[:, 1])
+    return offset.T * resolved, np.prod((height[resolved] / top) ** 3, axis=0)
 
 
 def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats, noise: Floats) -> Bools:

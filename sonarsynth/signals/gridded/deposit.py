@@ -279,9 +279,9 @@ def _faces(tile: Tile, steering: Steering, stage: Stage) -> npt.NDArray[Any]:
     farther = reference.attenuation * reference.sound_speed * steering.delay  # dB
     decay = NEPER * float(np.abs(farther).max()) * stage.aim.steepest
     allowed = 0.1 * stage.aim.tolerance
-    axis = nodes_for(np.pi * scale * half * widest, (1.0,), allowed)
+    turning, sizes = np.pi * scale * half * widest, (1.0, decay, decay, decay)
+    axis = polynomials_for(turning, (1.0,), allowed, sizes) if decay else nodes_for(turning, (1.0,), allowed)
     if decay:
-        axis = polynomials_for(np.pi * scale * half * widest, (1.0,), allowed, (1.0, decay, decay, decay))
         axis = Axis(axis.nodes + max(int(np.ceil(np.log(decay / allowed) / RELAXING)) - DEGREES, 0))
     frequency = middle + half * chebyshev(axis.nodes)
     at = frequency * scale
