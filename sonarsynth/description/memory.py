@@ -16,6 +16,8 @@ SAMPLE_BYTES: Final = 24
 3000 to 40 000 samples of 508 hydrophones."""
 PROCESS_BYTES: Final = 300e6
 """Of memory that a process takes before it makes a frame; measured 250 MB."""
+SHARD_COPIES: Final = 3
+"""Times the bytes of a shard that a process takes to keep its frames and to write them; measured 2.3 to 2.9."""
 
 
 def frame_bytes(facets: int, samples: int) -> float:

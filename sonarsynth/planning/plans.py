@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Floats, counted
-from sonarsynth.description.memory import frame_bytes
+from sonarsynth.description.memory import SHARD_COPIES, frame_bytes
 from sonarsynth.environment.absorption import DepthAbsorption
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry.motion import pose
@@ -193,10 +193,13 @@ class Plan:
 
     @property
     def memory_bytes(self) -> float:
-        """Bytes of memory that a process takes to make its largest frame."""
-        return frame_bytes(
-            sum(len(mesh.faces) for mesh in self.scene.meshes), self.sizes["sensor"] * self.sizes["sample"]
+        """Bytes of memory that a process takes to make its largest frame and to write a shard."""
+        facets, samples = (
+            sum(len(mesh.faces) for mesh in self.scene.meshes),
+            self.sizes["sensor"] * self.sizes["sample"],
         )
+        shard = min(self.shard_frames, self.recipe.frames) * sum(stage.bytes for stage in self.stages)
+        return frame_bytes(facets, samples) + SHARD_COPIES * shard
 
     @property
     def predicted_bytes(self) -> int:

@@ -197,12 +197,12 @@ def _check(
 def _check_memory(
     plan: Plan, scheduler: str | None, workers: int | None, worker_memory: int | None, agreed: bool
 ) -> None:
-    """Raise TooLarge where a frame does not fit in the memory of a worker of this machine."""
+    """Raise TooLarge where a frame and a shard do not fit in the memory of a worker of this machine."""
     workers = usable_cores() if workers is None else max(workers, 1)
     share = free_bytes() / workers if worker_memory is None else worker_memory
     if scheduler is None and not agreed and plan.memory_bytes > share:
         raise TooLarge(
-            f"a frame takes up to {format_bytes(plan.memory_bytes)} of memory, and each of {workers} workers has "
+            f"a worker takes up to {format_bytes(plan.memory_bytes)} of memory, and each of {workers} has "
             f"{format_bytes(share)}: "
             "fewer --workers, or more --worker-memory (use --yes to build anyway)"
         )

@@ -197,10 +197,12 @@ def test_what_does_not_fit_is_refused_before_anything_is_written_unless_agreed(
     assert build(small_plan, tmp_path / "s.zarr", frames=[0], workers=0, agreed=True).ok
     monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**15, 0, 10**15))
     huge = replace(small_plan, stages=tuple(replace(s, bytes=10**12) for s in small_plan.stages))
-    with pytest.raises(TooLarge, match="TB"):
+    with pytest.raises(TooLarge, match=r"a worker takes up to [\d.]+ TB of memory, and each of 1 has"):
         build(huge, tmp_path / "h.zarr", workers=0)
+    with pytest.raises(TooLarge, match=r"needs up to [\d.]+ TB \("):
+        build(huge, tmp_path / "h.zarr", workers=0, worker_memory=10**15)
     long = replace(small_plan, sizes=small_plan.sizes | {"sample": 10**8})
-    with pytest.raises(TooLarge, match=r"a frame takes up to 48.3 GB of memory, and each of 2 workers has .*"):
+    with pytest.raises(TooLarge, match=r"a worker takes up to 48.3 GB of memory, and each of 2 has .*"):
         build(long, tmp_path / "l.zarr", workers=2)
     assert not (tmp_path / "l.zarr").exists()
     monkeypatch.setattr(disk_space.os, "statvfs", lambda place: SimpleNamespace(f_files=100, f_favail=3))
