@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Bytes, Floats, Ints
 from sonarsynth.products import ArrayExpansion, Arrivals
 from sonarsynth.products.array_expansion import QUANTITIES
 from sonarsynth.receiver import Elements
@@ -45,7 +45,9 @@ class Wavefronts:
     amplitude: Floats  # (path,)
     loss: Floats  # (path,) dB of absorption at the band centre, inside amplitude
     expansion: ArrayExpansion  # (path,)
-    occluded: Bools  # (path, sensor) hydrophones that a path does not reach; (path, 0): it reaches all
+    occluded: (
+        Bytes  # (path, byte) bits of hydrophones that a path does not reach, after one; (path, 0): all are reached
+    )
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
     sound_speed: float  # m/s
     aperture: float  # m: no hydrophone is farther out
@@ -55,6 +57,12 @@ class Wavefronts:
     def count(self) -> int:
         """Number of paths."""
         return self.delay.size
+
+    def hidden(self, sensors: int) -> Bools:
+        """(path, sensor) hydrophones that each path does not reach; (path, 0) where each reaches all."""
+        if not self.occluded.any():
+            return np.zeros((self.count, 0), bool)
+        return np.unpackbits(self.occluded, axis=1, count=1 + sensors)[:, 1:].astype(bool)
 
     def select(self, keep: Ints) -> Self:
         """The paths of these indices; the same where these are all, in order."""
@@ -66,19 +74,21 @@ class Wavefronts:
         }
         return type(self)(**rows)
 
-    def without_faint_shadows(self, tolerance: float) -> Self:
-        """The paths with some of those that miss a part of the hydrophones reaching all or none, whichever is nearer:
-        the faintest, as many as change the energy of all by `tolerance` squared at most, where no path counts as louder
-        than the loudest of those. Paths to none are left out."""
+    def without_faint_shadows(self, tolerance: float, sensors: int) -> Self:
+        """The paths with some of those that miss a part of so many hydrophones reaching all or none, as is nearer.
+
+        It is the faintest, as many as change the energy of all by `tolerance` squared at most, where no path counts as
+        louder than the loudest of those. Paths to none are left out.
+        """
         rows = np.flatnonzero(self.occluded.any(axis=1))
         if not len(rows):
             return self
-        missed, energy = self.occluded[rows].mean(axis=1), self.amplitude**2
+        missed, energy = np.bitwise_count(self.occluded[rows]).sum(axis=1) / sensors, self.amplitude**2
         change = energy[rows] * np.minimum(missed, 1.0 - missed)
         order = np.argsort(change, kind="stable")
         faint = order[np.cumsum(change[order]) <= tolerance**2 * np.minimum(energy, energy[rows].max()).sum()]
         occluded = self.occluded.copy()
-        occluded[rows[faint]] = False
+        occluded[rows[faint]] = 0
         none = rows[faint[missed[faint] > 0.5]]
         return replace(self, occluded=occluded).select(np.delete(np.arange(self.count), none))
 
@@ -141,11 +151,18 @@ def array_paths(
         corner_delays=corners,
         coherent_fraction=arrivals.coherent_fraction,
         height_delay_std=np.minimum(arrivals.height_delay_std, LONGEST_BLUR),
-        occluded=arrivals.hidden(elements.count),
+        occluded=_without_centre(arrivals),
         modes=np.zeros((count, 0)),
         centre=arrivals.centre,
         attenuation=attenuation,
     )
+
+
+def _without_centre(arrivals: Arrivals) -> Bytes:
+    """Which hydrophones (path, byte) paths do not reach, whether they reach the centre or not."""
+    occluded = arrivals.occluded.copy()
+    occluded[:, :1] &= 127
+    return occluded
 
 
 def _centred(arrivals: Arrivals) -> tuple[Floats, Floats]:
@@ -244,13 +261,14 @@ def reach(front: Wavefronts) -> Floats:
 def steered_spread(front: Wavefronts, rows: Ints) -> float:
     """Bound (s) on how much sooner or later some paths meet any hydrophone than one front from among them, which meets
     the array centre when they do."""
-    aperture, far = front.aperture, np.ptp(front.direction.T[:, rows], axis=1)
-    spread = 2.0 * float(reach(front)[rows].max())
+    aperture, far = front.aperture, np.array([np.ptp(along[rows]) for along in front.direction.T])
+    late = front.expansion.delay[rows]
+    spread = 2.0 * (aperture / front.sound_speed + float(np.abs(late).sum(axis=1).max()))
     if float(front.curvature[rows].max()) * aperture > 0.5:
         return spread
     # |R d - q| - R varies with d by at most 2 |q|, with 1/R by at most |q|^2
     apart = 2.0 * aperture * float(np.linalg.norm(far)) + aperture**2 * float(np.ptp(front.curvature[rows]))
-    return min(spread, apart / front.sound_speed + float(np.ptp(front.expansion.delay[rows], axis=0).sum()))
+    return min(spread, apart / front.sound_speed + float(sum(np.ptp(term) for term in late.T)))
 
 
 def reference_of(front: Wavefronts, middle: Floats, phase: Floats, variance: Floats) -> Wavefronts:
@@ -266,7 +284,7 @@ def reference_of(front: Wavefronts, middle: Floats, phase: Floats, variance: Flo
         amplitude=np.ones(1),
         loss=middle[4:5],
         expansion=ArrayExpansion(delay, none, phase[None], variance[None], zero, front.expansion.aperture),
-        occluded=np.zeros((1, 0), bool),
+        occluded=np.zeros((1, 0), np.uint8),
         modes=none,
         sound_speed=front.sound_speed,
         aperture=front.aperture,

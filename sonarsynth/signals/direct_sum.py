@@ -58,7 +58,7 @@ def exact_spectra(
             )
         if path.expansion.phase.any() or path.expansion.delay_variance.any():
             shape = shape * changed(path, elements.position, frequency)
-        gain_of_sensors = elements.gain * ~path.occluded[0] if path.occluded.shape[1] else elements.gain
+        gain_of_sensors = elements.gain * ~path.hidden(elements.count)[0] if path.occluded.any() else elements.gain
         total += (path.amplitude[0] * gain[0] * gain_of_sensors)[:, None] * (
             face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
         )

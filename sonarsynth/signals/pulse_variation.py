@@ -83,7 +83,8 @@ def with_changes(front: ArrayPaths) -> ArrayPaths:
     copies = [np.arange(front.count)]
     copies += [_loudest(loud * (spread > 0.0))] * 2 + [_loudest(loud * turn)]
     count = [rows.size for rows in copies]
-    every = front.select(np.concatenate(copies))
+    shapes = front.expansion.without("delay", "amplitude")
+    every = replace(front, occluded=front.occluded[:, :0], expansion=shapes).select(np.concatenate(copies))
     blur = np.repeat([0.0, 1.0, -1.0, 0.0], count)
     ahead = np.repeat([0.0, 0.0, 0.0, 1.0], count)
     size = np.where(ahead > 0.0, np.minimum(every.expansion.largest("phase"), 1.0), 1.0)

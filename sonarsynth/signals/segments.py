@@ -151,6 +151,9 @@ def _runs(rows: Ints, early: Floats, late: Floats) -> Iterator[Ints]:
     """Rows in runs that overlap in time; each run keeps the order of the arrivals."""
     if not rows.size:
         return
+    if early[rows].max() <= late[rows].min():  # all of them at one time
+        yield rows
+        return
     order = rows[np.argsort(early[rows], kind="stable")]
     silent = early[order[1:]] > np.maximum.accumulate(late[order])[:-1]
     for run in np.split(order, np.flatnonzero(silent) + 1):

@@ -68,13 +68,14 @@ def test_shadows_that_are_rounded_off_change_no_more_than_is_allowed() -> None:
     made = replace(made, choices=replace(made.choices, occlusion="sensors", negligible=0.0))
     front = array_paths(arrivals_of(made, made.recipe.frame(0)[1]), SNAPS, made.elements)
     front = replace(front, delay=np.arange(front.count, dtype=float))  # names them
+    sensors = made.elements.count
     rows = front.occluded.any(axis=1)
     energy, partly = front.amplitude**2, [rows.sum()]
     for tolerance in (2e-2, 6e-2, 0.2):
-        few = front.without_faint_shadows(tolerance)
-        occluded = np.ones_like(front.occluded)
-        occluded[few.delay.astype(int)] = few.occluded
-        changed = energy @ (occluded != front.occluded).mean(axis=1)
+        few = front.without_faint_shadows(tolerance, sensors)
+        hidden = np.ones((front.count, sensors), bool)
+        hidden[few.delay.astype(int)] = few.hidden(sensors)
+        changed = energy @ (hidden != front.hidden(sensors)).mean(axis=1)
         assert 0.0 < changed <= tolerance**2 * np.minimum(energy, energy[rows].max()).sum()  # not of the direct snap
         partly.append(few.occluded.any(axis=1).sum())
     assert (np.diff(partly) < 0).all()

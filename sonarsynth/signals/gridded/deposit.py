@@ -125,7 +125,7 @@ def add_segment(
     )
     wave = kernel(-8 * (-width // 8), samples * bins.step / highest, 2 * samples, dtype)  # as wide as its lanes
     stage = Stage(aim, bins, origin, segment, grid, wave, dtype)
-    front = front.without_faint_shadows(0.1 * tolerance)
+    front = front.without_faint_shadows(0.1 * tolerance, elements.count)
     for tile in tiles(front, aim) if front.count else ():
         _add_tile(out, tile, front.select(tile.paths), stage)
 
@@ -148,8 +148,8 @@ def _add_tile(out: npt.NDArray[Any], tile: Tile, paths: Wavefronts, stage: Stage
         some *= changed(tile.reference, steering.points, bins.frequency)
     delay, gain = delay_and_gain(tile.reference, elements.position)
     gain = gain[0] * elements.gain * (paths.amplitude[0] if alone else 1.0)
-    if alone and paths.occluded.shape[1]:
-        gain = gain * ~paths.occluded[0]
+    if alone and paths.occluded.any():
+        gain = gain * ~paths.hidden(elements.count)[0]
     onto, column, weight = to_sensors(elements, tile.axes, dtype)
     rate, centre = samples * bins.step, paths.delay - stage.origin
     spare = GUARD if stage.aim.tolerance > 10.0 * filters.SUPPORT_TOLERANCE else samples  # tails that absorption leaves
@@ -172,11 +172,11 @@ def _deposit(field: npt.NDArray[Any], tile: Tile, paths: Wavefronts, steering: S
     response = _responses(tile.modes.T[: mode.max() + 1], stage)
     _, pair = face_pairs(tile.terms)
     table = _packed(paths, tile, bins.changes, (paths.delay - stage.origin) * (grid.circle * bins.step))
-    group = max(1, LARGEST // (len(tile.terms) * grid.circle))
+    hidden, group = paths.hidden(stage.aim.elements.count), max(1, LARGEST // (len(tile.terms) * grid.circle))
     for first in range(0, len(field), group):
         rows = slice(first, first + group)
         some = steering.rows(rows)
-        deposits = _deposits(table, paths, tile, some, paths.occluded.T[rows], stage)
+        deposits = _deposits(table, paths, tile, some, hidden.T[rows], stage)
         spectra, faces = rfft(deposits[:, :, : grid.circle], axis=2), _faces(tile, some, stage)
         combine(spectra, bins.first, faces, pair, power, response, mode, field[rows])
 

@@ -258,7 +258,8 @@ def _tiles(front: Wavefronts, aim: TileSettings, missed: bool) -> list[Tile]:
 
 def _alone_pays(tile: Tile, front: Wavefronts, aim: TileSettings) -> bool:
     """Whether the paths of a tile cost less one by one, each steered to the hydrophones that it does not miss."""
-    steered = 0.7 * aim.circle * float(np.count_nonzero(~front.occluded[tile.paths]))
+    missed = int(np.bitwise_count(front.occluded[tile.paths]).sum())
+    steered = 0.7 * aim.circle * float(tile.paths.size * aim.elements.count - missed)
     return tile.paths.size > 1 and 2e5 * tile.paths.size + steered < tile.cost
 
 
