@@ -15,6 +15,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, evenly
 from sonarsynth.description.method import Demand
+from sonarsynth.planning import kept_choices
 from sonarsynth.planning.choices import OF_BEAMS, OWN_VIEW, Choices
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.image_errors import beamformer
@@ -56,7 +57,7 @@ DEGREE_TOLERANCE = 0.03
 """Error of the synthesis that measures, over what is allowed."""
 
 
-_CHOSEN: OrderedDict[object, tuple[Choices, Errors]] = OrderedDict()
+_CHOSEN: OrderedDict[str, tuple[Choices, Errors]] = OrderedDict()
 KEPT = 16
 """Plans whose choices this process remembers: a recipe that is read again, frame by frame, is not measured again."""
 
@@ -64,16 +65,21 @@ KEPT = 16
 def choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     """A plan whose windows are laid, with its choices made. Nothing in them depends on how fast this machine is."""
     try:
-        key = plan.digest, plan.products, tuple(frame.index for look in looks for frame in look.frames)
+        key = plan.digest, sorted(plan.products), tuple(frame.index for look in looks for frame in look.frames)
     except (OSError, ValueError):  # a file that is not there, which what reads it says better
         return _choose(plan, looks)
-    cached = _CHOSEN.get(key)
-    if cached is None:
+    name = repr(key)
+    found, recalled = _CHOSEN.get(name), ""
+    if found is None and (found := kept_choices.read(name)) is not None:
+        recalled = f"choices and their errors were measured before, and read from {kept_choices.folder()}"
+    if found is None:
         chosen = _choose(plan, looks)
-        cached = _CHOSEN[key] = chosen.choices, chosen.errors
-        while len(_CHOSEN) > KEPT:
-            _CHOSEN.popitem(last=False)
-    return replace(plan, choices=cached[0], errors=cached[1])
+        found = chosen.choices, chosen.errors
+        kept_choices.keep(name, *found)
+    _CHOSEN[name] = found
+    while len(_CHOSEN) > KEPT:
+        _CHOSEN.popitem(last=False)
+    return replace(plan, choices=found[0], errors=found[1], recalled=recalled)
 
 
 def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:

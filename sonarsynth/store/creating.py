@@ -19,6 +19,7 @@ from zarr.core.group import GroupMetadata
 from zarr.errors import ZarrUserWarning
 from zarr.storage import LocalStore
 
+from sonarsynth.description.code_version import code_digest
 from sonarsynth.pipeline import attributes, coordinates
 from sonarsynth.recipe.reading import RecipeError, dump
 from sonarsynth.recipe.reading.yaml_source import read_text
@@ -30,7 +31,7 @@ from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.layout import Layout, layout_of
 from sonarsynth.store.marks import LAYOUT, MANIFESTS, Damage, Mark, all_files, load_layout, marked, save_mark
 from sonarsynth.store.opening import check_format
-from sonarsynth.store.provenance import begun, code_digest, made_of, other_versions
+from sonarsynth.store.provenance import begun, made_of, other_versions
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan

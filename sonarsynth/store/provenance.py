@@ -14,12 +14,11 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from sonarsynth.conventions import finite_json
+from sonarsynth.description.code_version import versions
 from sonarsynth.description.named_files import digest
 from sonarsynth.environment.readers import files_of
 from sonarsynth.recipe import FILE_KINDS
@@ -27,30 +26,9 @@ from sonarsynth.recipe import FILE_KINDS
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
     from sonarsynth.recipe.reading import Source
-import hashlib
 
 PROVENANCE: Final = "provenance"
 """The attribute of the root that differs between two builds of one plan."""
-
-LIBRARIES: Final = (
-    "numpy",
-    "scipy",
-    "numba",
-    "llvmlite",
-    "trimesh",
-    "embreex",
-    "open3d",
-    "gsw",
-    "numcodecs",
-    "google-crc32c",
-    "zarr",
-    "xarray",
-    "dask",
-    "distributed",
-    "pydantic",
-    "ruamel.yaml",
-)
-"""What touches numbers on their way from the recipe to the disk; those that are not installed are left out."""
 
 NUMERIC: Final = ("python", "numpy", "scipy", "numba", "llvmlite", "trimesh", "embreex", "open3d", "gsw", "blas")
 """Those whose next version may change the last digits of a number: what sums and transforms, what compiles kernels
@@ -96,21 +74,6 @@ def begun(source: Source | None = None) -> dict[str, Any]:
             "git": git_state(),
         }
     }
-
-
-@cache  # reading the metadata of all libraries takes a quarter of the time in which a small store is laid out
-def versions() -> Mapping[str, str]:
-    """Versions of Python, of the libraries that touch numbers, and of the BLAS."""
-    numbers = {"python": f"{platform.python_implementation()} {platform.python_version()}"}
-    for name in LIBRARIES:
-        try:
-            numbers[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    import numpy as np
-
-    blas = np.show_config(mode="dicts").get("Build Dependencies", {}).get("blas", {})
-    return numbers | {"blas": f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip()}
 
 
 def numeric_versions() -> dict[str, str]:
@@ -220,29 +183,3 @@ def _leading_number(text: str) -> str:
     """A version without what a builder of kernels may have added, such as a name of a company or a host."""
     match = re.match(r"[\d.]+", text)
     return match[0].rstrip(".") if match else ""
-
-
-APART: Final = (
-    "frontiers",
-    "cli",
-    "evaluation",
-    "pictures",
-    "schedule",
-    "store/cards",
-    "validation",
-    "__main__.py",
-    "__init__.py",
-)
-"""Parts of the package that change no stored number."""
-
-
-@cache
-def code_digest() -> str:
-    """SHA-256 of the sources, with their paths within the package."""
-    package = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256()
-    for file in sorted(package.rglob("*.py")):
-        inside = file.relative_to(package).as_posix()
-        if not any(inside == folder or inside.startswith(f"{folder}/") for folder in APART):
-            digest.update(f"{inside}\n".encode() + hashlib.sha256(file.read_bytes()).digest())
-    return digest.hexdigest()
