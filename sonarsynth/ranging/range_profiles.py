@@ -7,6 +7,7 @@ the clock cancel: what is left is the delay.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -163,6 +164,7 @@ def _moments(f: Floats, echo: Floats, noise: Floats, spacing: float) -> Moments:
     return Moments(spread(echo, centre), spread(noise, centre), spread(noise, own), *frequencies)
 
 
+@lru_cache(maxsize=16)
 def half_width(elements: Elements, wavenumber: float) -> float:
     """Angle (rad) at which a beam of `wavenumber` (1/m) is down 3 dB, from the second moment of the aperture.
 
@@ -173,6 +175,7 @@ def half_width(elements: Elements, wavenumber: float) -> float:
     return min(0.808 / (2 * np.pi * wavenumber * extent), 1.0) if extent > 0 else 1.0
 
 
+@lru_cache(maxsize=16)
 def aperture_moments(elements: Elements) -> Floats:
     """Second moments (xyz, xyz) in m2 of the positions of live elements about their centre, by their gains."""
     weight = live_gain(elements.gain)

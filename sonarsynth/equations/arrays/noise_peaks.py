@@ -38,8 +38,9 @@ def _volumes(size: Floats) -> tuple[float, float, float, float]:
 def _expected(level: float, volumes: tuple[float, float, float, float]) -> float:
     """As `expected_peaks`, of a box of these volumes."""
     u = 2.0 * level
-    densities = 1.0, sqrt(u / (2 * pi)), (u - 1.0) / (2 * pi), (u**2 - 3 * u) / ((2 * pi) ** 1.5 * sqrt(u))
-    return exp(-level) * sum((v * d for v, d in zip(volumes, densities, strict=True)), 0.0)
+    one, length, area, volume = volumes
+    lines, planes = length * sqrt(u / (2 * pi)), area * (u - 1.0) / (2 * pi)
+    return exp(-level) * (one + lines + planes + volume * (u**2 - 3 * u) / ((2 * pi) ** 1.5 * sqrt(u)))
 
 
 def peak_level(false_alarms: float, size: Floats) -> float:
