@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from sonarsynth.casting.facet_tree import LEVELS
 from sonarsynth.casting.ray_casting import casting_mesh
+from sonarsynth.casting.shadows import nearest_first
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -190,10 +191,11 @@ def _closes(
 def _look(
     apex: Floats, frame: Floats, slope: float, reach: float, far: float, nodes: Floats, order: Int32s,
     vertices: Floats, faces: Int32s, first: Int32s, around: Int32s, stack: Ints, patch: Ints, corner: Floats,
+    verdict: int,
 ) -> int:  # fmt: skip
     """What is certain of one cone; see `look`."""
-    leaves, verdict, tried, depth, stack[0] = len(nodes) // 2, EMPTY, 0, 1, 1
-    wide = slope
+    leaves, tried, depth, stack[0] = len(nodes) // 2, 0, 1, 1
+    wide = slope if verdict == EMPTY else 0.0
     while depth > 0 and tried < TRIED:
         depth -= 1
         node = stack[depth]
@@ -227,14 +229,14 @@ def look(
     vertices: Floats, faces: Int32s, first: Int32s, around: Int32s, verdict: Ints,
 ) -> None:  # fmt: skip
     """Write what is certain of cones (cone,) with apex and axis (cone, xyz) up to `reach`: EMPTY, CLOSED by a surface
-    nearer than `far`, or UNKNOWN; first, around: facets round each vertex."""
+    nearer than `far`, or UNKNOWN, as those may be already; first, around: facets round each vertex."""
     stack, patch = np.empty(LEVELS, np.int64), np.empty(PATCH, np.int64)
     corner, frame = np.empty((3, 3)), np.empty((4, 3))
     for i in range(len(apex)):
         _frame(axis[i], frame)
         verdict[i] = _look(
             apex[i], frame, slope[i], reach[i], far[i], nodes, order, vertices, faces, first, around, stack, patch,
-            corner,
+            corner, verdict[i],
         )  # fmt: skip
 
 
@@ -248,15 +250,13 @@ def classify_cones(
     Holds for any line that stays in the cone, bent or not, from its apex to where it ends.
     """
     verdicts = np.full(len(apex), EMPTY)
-    for body in bodies:
-        open_cones = np.flatnonzero(verdicts != CLOSED)
-        if not len(body.mesh.faces) or not len(open_cones):
-            continue
+    for rows, body in nearest_first(bodies, apex):
+        open_cones = rows.start + np.flatnonzero(verdicts[rows] != CLOSED)
         mesh = casting_mesh(body.mesh)
         start = (body.pose.to_body(apex[open_cones]) - mesh.centre) / mesh.size
-        verdict = np.empty(len(open_cones), np.int64)
+        verdict = verdicts[open_cones]
         tree, towards = mesh.tree, np.ascontiguousarray(body.pose.turn_to_body(axis[open_cones]))
         limits = slope[open_cones], reach[open_cones] / mesh.size, far[open_cones] / mesh.size
         look(start, towards, *limits, *tree, mesh.vertices, mesh.faces, *mesh.around, verdict)
-        verdicts[open_cones] = np.where(verdict == CLOSED, CLOSED, np.maximum(verdicts[open_cones], verdict))
+        verdicts[open_cones] = verdict
     return verdicts

@@ -284,15 +284,3 @@ def occluded(
         facet, _ = ready.within(origin[:count], heading[:count], far[:count])
         hidden[segment[:count]] = facet >= 0
     return hidden
-
-
-def hide(bodies: tuple[PlacedTarget, ...], start: Floats, points: Floats, seen: Bools) -> None:
-    """Take from what is seen (row, point) all points (point, xyz) that a body hides from where rows start (row, xyz):
-    as `occluded`, of many points from each place."""
-    from sonarsynth.casting import facet_tree
-
-    for body in bodies:
-        if len(body.mesh.faces):
-            mesh = casting_mesh(body.mesh)
-            a, b = ((body.pose.to_body(place) - mesh.centre) / mesh.size for place in (start, points))
-            facet_tree.hide(a, b, *mesh.tree, mesh.vertices, mesh.faces, seen)

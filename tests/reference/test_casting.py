@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 from sonarsynth.casting import ray_casting
-from sonarsynth.casting.ray_casting import OFFSET, Backend, clear_of_own_body, first_hit, hide, occluded
+from sonarsynth.casting.ray_casting import OFFSET, Backend, clear_of_own_body, first_hit, occluded
+from sonarsynth.casting.shadows import hide
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.geometry.mesh import Mesh

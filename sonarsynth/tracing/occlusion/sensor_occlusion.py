@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sonarsynth.casting.cones import CLOSED, UNKNOWN, classify_cones
-from sonarsynth.casting.ray_casting import hide
+from sonarsynth.casting.shadows import hide
 from sonarsynth.conventions import Bools, Floats, Ints, picked
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.placed_target import PlacedTarget
