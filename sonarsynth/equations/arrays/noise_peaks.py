@@ -40,7 +40,7 @@ def _expected(level: float, volumes: tuple[float, float, float, float]) -> float
     u = 2.0 * level
     one, length, area, volume = volumes
     lines, planes = length * sqrt(u / (2 * pi)), area * (u - 1.0) / (2 * pi)
-    return exp(-level) * (one + lines + planes + volume * (u**2 - 3 * u) / ((2 * pi) ** 1.5 * sqrt(u)))
+    return exp(-level) * (one + lines + planes + volume * (u**2 - 3 * u) / (sqrt(2 * pi) ** 3 * sqrt(u)))
 
 
 def peak_level(false_alarms: float, size: Floats) -> float:

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.arrays.correlated_errors import correlated_error_factor
+from sonarsynth.equations.arrays.gates import short_spectra
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, wavefront_delays
 from sonarsynth.products import Signals
 from sonarsynth.ranging import ranging_kernels
@@ -182,17 +183,9 @@ def align(
     f = _frequencies(2 * half, rate)
     bins = slice(None) if whole else in_band(f, band)
     since = (arrival - np.floor(arrival) + half) / rate
-    spectrum = (cut @ _waves(2 * half, *bins.indices(len(f))[:2])).view(complex)
+    spectrum = short_spectra(cut, *bins.indices(len(f))[:2])
     spectrum = ranging_kernels.turned(spectrum, since, f[bins][0], f[1])
     return AlignedPulse(f[bins], spectrum, time, float(f[1]))
-
-
-@lru_cache(maxsize=16)
-def _waves(samples: int, first: int, stop: int) -> Floats:
-    """Factors (sample, 2 bins) that make the bins `first` to `stop` of `rfft`, real and imaginary part by turns, of
-    rows of samples: of few and short ones, whose lengths are not fast, in half of its time."""
-    turns = np.outer(np.arange(samples), np.arange(first, stop)) / samples
-    return np.exp(-2j * np.pi * turns).view(float)
 
 
 @dataclass(frozen=True, eq=False)
