@@ -57,7 +57,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 def _explain(error: Exception, shown: bool) -> int:
     """Say an error in one line; returns the exit status."""
     if hasattr(error, "format_message") and hasattr(error, "exit_code"):  # typer's own: wrong usage
-        return _say(error.format_message() or "sonarsynth --help says how", INPUT)
+        return _say(error.format_message() or "no command: sonarsynth --help lists them", INPUT)
     from sonarsynth.description import FieldError
 
     match type(error).__name__:

@@ -33,7 +33,7 @@ OVERSAMPLING = 8
 WIDEST_DEFOCUS = 40
 """Tables either side of the focus: what is further out of focus is taken for as far."""
 WHITENING = 0.03
-"""Share of the pulse's largest power density below which ranging flattens it no more (`ranging.beam_echoes`)."""
+"""Share of the pulse's largest power density below which ranging flattens it no more (`ranging.range_profiles`)."""
 FAINT = 1e-4
 """Of the power of all paths of a snap, target and way that the faintest may bring together, and are left out: 40 dB
 under echoes of which the loudest 25 dB are picked."""

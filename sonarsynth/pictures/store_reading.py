@@ -37,8 +37,6 @@ class NothingToDraw(ValueError):
 def opened(store: str | Folder) -> xr.DataTree:
     """The store as a DataTree. Raises NothingToDraw when it is not one."""
     path = folder_of(store)
-    if not path.is_dir():
-        raise NothingToDraw(f"{path}: there is no such store")
     try:
         tree = open_store(path)
         hold(tree, path)

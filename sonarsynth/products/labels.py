@@ -131,7 +131,7 @@ class LinkBudget:
     """Levels of each (snap, target, family) in dB that add up, and those of one path of it alone.
 
     The isolated path is the loudest of its family. Its level is predicted from the columns of `Arrivals`, over the band
-    like the others; what is measured in the signals of that path alone must agree (`verification`).
+    like the others; what is measured in the signals of that path alone must agree: `verify` compares the two.
     """
 
     level: Floats  # (snap, target + 1, family, term) dB; the last target is the direct path; NaN without paths

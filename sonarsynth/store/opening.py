@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.conventions import FORMAT_VERSION
 from sonarsynth.description import FieldError
 from sonarsynth.products import SPLITS
-from sonarsynth.store.files.place import Folder, absolute, opens
+from sonarsynth.store.files.place import Folder, absolute, opens, there
 from sonarsynth.store.files.within import Mismatch
 
 if TYPE_CHECKING:
@@ -27,6 +27,12 @@ def check_format(path: Folder, attributes: Mapping[Any, Any]) -> None:
         )
 
 
+def must_be_folder(path: Folder) -> None:
+    """Raise Mismatch where there is nothing, or a file."""
+    if not path.is_dir():
+        raise Mismatch(f"{path} is not a store: it is not a folder" if there(path) else f"{path}: no such store")
+
+
 def open_store(path: Folder | str) -> xr.DataTree:
     """A store as a DataTree, read lazily: what `xarray.open_datatree(path, engine="zarr")` gives, but no link in the
     store is followed, and counts of the converter decode to float32 (plain xarray: float64).
@@ -37,6 +43,7 @@ def open_store(path: Folder | str) -> xr.DataTree:
     import xarray as xr
 
     folder = absolute(path)
+    must_be_folder(folder)
     try:
         stored = xr.open_datatree(opens(folder), engine="zarr", decode_cf=False)
         check_format(folder, stored.attrs)

@@ -124,8 +124,8 @@ def test_drawing_what_is_not_there(command: Command, small_file: Path, tmp_path:
     store = tmp_path / "s.zarr"
     assert command("build", small_file, store, "--workers", "0", "--frames", "0:2")[0] == 0
     for arguments, message in (
-        ((tmp_path / "none.zarr",), "there is no such store"),
-        ((small_file,), "there is no such store"),
+        ((tmp_path / "none.zarr",), "none.zarr: no such store"),
+        ((small_file,), "is not a store: it is not a folder"),
         ((tmp_path / "empty.zarr",), "not a store that xarray can open"),
         ((store, "--frame", "7"), "frame 7 has not been built; there are 2, 0 to 1"),
     ):

@@ -249,7 +249,7 @@ def test_stores_that_do_not_fit_are_refused_in_one_line(
     assert "imageless.zarr: the store has no image" in refused(lobe, imageless)
     assert "no frame has been built in all of them" in refused(lobe, empty)
     assert "5 stores: from 2 to 4 fit" in refused(*[lobe] * 5)
-    assert "there is no such store" in refused(lobe, tmp_path / "none.zarr")
+    assert "no such store" in refused(lobe, tmp_path / "none.zarr")
     assert "frame 0 has not been built in all stores; 4 are, 1 to 4" in refused(lobe, stores["rough"], "--frame", 0)
     assert not (tmp_path / "out").exists()
 

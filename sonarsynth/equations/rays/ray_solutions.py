@@ -1,8 +1,8 @@
 """Eigenrays in horizontally layered water: the rays that join two points, found completely and to rounding.
 
 Sound speed is linear between nodes; two nodes at one depth are a jump, taken as the limit of a thin layer (a ray turns
-in it where the thin layer would turn it). Method: `rays_layers` (one layer), `rays_chain` (sums over layers),
-`rays_families` (which sums), `rays_search` (their roots).
+in it where the thin layer would turn it). Method: `ray_in_layer` (one layer), `ray_chain` (sums over layers),
+`ray_families` (which sums), `ray_search` (their roots).
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def eigenrays(
 
     vertices: most turning points and reflections together; reflections: most from surface and bottom together. The
     default is the direct family. A pair may have no ray (a shadow zone), one or several. Travel times are right to
-    about 1e-15 of themselves, and the search is complete (`rays_search`). A ray that turns exactly at an end counts
+    about 1e-15 of themselves, and the search is complete (`ray_search`). A ray that turns exactly at an end counts
     once; an end on a jump is on the side of the other end, on the lower one if both are level. Raises ValueError for
     ends outside the water, distances that are not finite or negative, and negative numbers of vertices.
     """

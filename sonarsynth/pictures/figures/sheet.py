@@ -139,12 +139,12 @@ def draw_cloud(axes: Axes, onto: Figure, view: View, errors: Errors, space: Wind
     axes.view_init(elev=24, azim=-160)  # from behind the sonar, a little to starboard: port is on the left
     axes.set_xlabel("forward, x (m)", fontsize=8)
     axes.set_ylabel("port, y (m)", fontsize=8)
-    axes.set_zlabel("up, z (m)", fontsize=8, labelpad=-3)
+    axes.zaxis.set_rotate_label(False)  # matplotlib would turn it upside down
+    axes.set_zlabel("up, z (m)", fontsize=8, labelpad=-3, rotation=90)
     axes.tick_params(labelsize=7)
     axes.locator_params(nbins=5)
-    outside = int((~inside).sum())
     counts = f"{counted(int(on.sum()), 'point')} on a target, {int(off.sum())} off target"
-    more = f", {outside} outside" if outside else ""
+    more = f", {outside} outside" if (outside := int((~inside).sum())) else ""
     axes.set_title(f"point cloud in the true hull, one scale: {counts}{more}", fontsize=10, color=INK, y=1.05)
 
 

@@ -24,7 +24,7 @@ from sonarsynth.store.marks import (
     marked,
     read_mark,
 )
-from sonarsynth.store.opening import check_format
+from sonarsynth.store.opening import check_format, must_be_folder
 
 Progress = Callable[[int, int, int], None]
 """What is told of frames: how many are done, of how many, and how many failed."""
@@ -95,8 +95,7 @@ def examine(path: Folder, progress: Progress | None = None) -> Findings:
 
 def must_be_store(path: Folder) -> None:
     """Raise Mismatch where there is no store of ours (no mark, no digest of a recipe), or one of another format."""
-    if not path.is_dir():
-        raise Mismatch(f"{path} is not a store: it is not a folder" if there(path) else f"{path}: no such store")
+    must_be_folder(path)
     manifest = any(there(path, name) for name in MANIFESTS)
     attributes = root_attributes(path)
     if not (manifest or "recipe_digest" in attributes or marked(path)):
