@@ -135,9 +135,17 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
     wave, pulse, elements = fitted
     if pulse.share > SHARED and pulse.noise > AUDIBLE * knowledge.quiet:
         return refused(UNRESOLVED)
-    c = sonar.assumed_sound_speed
+    row = _placed(wave, pulse, elements, knowledge, bend)
+    return replace(row, time_error=float(np.hypot(row.time_error, _cut_off(signals, elements, sonar, centre, half))))
+
+
+def _placed(
+    wave: Wavefront, pulse: Pulse, elements: Elements, knowledge: SonarKnowledge, bend: Bend | None
+) -> SourceFix:
+    """A row of a pulse with its wavefront, as `bend` says."""
     if bend is None:
         return place(wave, pulse, knowledge)
+    c = knowledge.sonar.assumed_sound_speed
     bent = _refit(pulse, wave, elements, bend.sound_speed, 0.0, c)
     row = place(wave, pulse, replace(knowledge, gradient=bend.gradient), bent)
     for _ in range(3):  # delays beyond straight ones change little with the place: this settles at once
@@ -146,6 +154,18 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
             break
         row = place(_refit(pulse, wave, elements, c, extra), pulse, knowledge, bent)
     return row
+
+
+def _cut_off(signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float) -> float:
+    """Standard error (s) that clipping adds to the time of a pulse: its peak may be anywhere in the samples at full
+    scale within `half` of `centre` (s), so many as a live sensor has of them on average."""
+    if sonar.converter is None or not signals.clipped:
+        return 0.0
+    largest = sonar.converter.full_scale - 1.5 * sonar.converter.quantum  # half a count below the highest
+    cut, _ = pulse_times.excerpt(signals, centre, half)
+    live = elements.gain != 0
+    clipped = np.count_nonzero(np.abs(cut[live]) > largest) / max(int(live.sum()), 1)
+    return float(clipped / (np.sqrt(12.0) * signals.sampling_frequency))
 
 
 def fit_pulse(
