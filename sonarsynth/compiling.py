@@ -20,6 +20,7 @@ from numba import njit
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import cpu_target
+from numba.core.runtime.nrt import rtsys
 from numba.core.targetconfig import ConfigStack
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -46,6 +47,13 @@ def compiled(function: Any = None, /, **options: Any) -> Any:
 
 class _Cache(FunctionCache):
     """Compiled code by the types of its arguments, the processor, and the code that it was made of."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What was compiled, or None. Numba first reads all that it can compile (0.2 s), as compiling does by itself;
+        what is loaded needs only the runtime."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
 
     def _index_key(self, *types_and_processor: Any) -> tuple[Any, ...]:
         made_of = [_digest(__file__), *sorted(set(_made_of(self._py_func, {self._py_func})))]

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.surfaces import shared_sides, weld
+from sonarsynth.geometry.surfaces import joined, shared_sides, weld
 
 CREASE: Final = 1.0
 """|n1 - n2| of the normals of two facets from which on their edge is one of the body itself: 60 degrees."""
@@ -99,10 +97,7 @@ def flat_pieces(mesh: Mesh) -> tuple[Ints, Neighbours]:
     """The flat piece (facet,) that each facet belongs to, numbered from 0, and the neighbours."""
     pairs = neighbours(mesh)
     flat = pairs.turn <= FLAT
-    number = len(mesh.faces)
-    ends = (pairs.facet[flat], pairs.neighbour[flat])
-    graph = coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(number, number))
-    return connected_components(graph, directed=False)[1].astype(np.int64), pairs
+    return joined(len(mesh.faces), pairs.facet[flat], pairs.neighbour[flat]), pairs
 
 
 def _smooth(mesh: Mesh, pairs: Neighbours) -> Neighbours:

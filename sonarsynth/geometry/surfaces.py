@@ -164,6 +164,15 @@ def sides(faces: Ints) -> tuple[Ints, npt.NDArray[np.intp]]:
     return pairs[first], edge.reshape(-1, 3)
 
 
+def joined(number: int, first: Ints, second: Ints) -> Ints:
+    """The part (thing,), counted from 0, of each of `number` things, of which those of each pair (pair,) are joined."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(number, number))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+
+
 def shared_sides(faces: Ints) -> tuple[Ints, Ints]:
     """Sides (pair,) and (pair,), 3 facet + corner, of two facets that share an edge with no third."""
     edge = sides(faces)[1].ravel()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from math import exp, pi, sqrt
 
-from scipy.optimize import brentq
-
 from sonarsynth.conventions import Floats
 
 LOWEST = 3.0
@@ -45,6 +43,8 @@ def _expected(level: float, volumes: tuple[float, float, float, float]) -> float
 
 def peak_level(false_alarms: float, size: Floats) -> float:
     """Level, over the mean power of noise, that so many peaks exceed on average (`expected_peaks`)."""
+    from scipy.optimize import brentq
+
     volumes = _volumes(size)
 
     def excess(level: float) -> float:

@@ -7,13 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import DOP853, OdeSolution
-from scipy.optimize import brentq
-from scipy.special import boxcox
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble.bubble_equations import (
@@ -27,6 +24,9 @@ from sonarsynth.equations.bubble.bubble_equations import (
     unrest,
 )
 from sonarsynth.equations.bubble.snap_pressure import Wall
+
+if TYPE_CHECKING:
+    from scipy.integrate import OdeSolution
 
 __all__ = ["Cavity", "Collapse", "ambient_pressure", "collapse", "energy", "hard_core", "pressure", "wall"]
 
@@ -98,6 +98,8 @@ def collapse(cavity: Cavity, rebounds: int = 0, tolerance: float = 1e-10) -> Col
     collapse. Raises ValueError for a cavity that cannot collapse or be followed; one that settles, or moves too fast
     for the theory, is flagged (`REASONS`). One that settles after a collapse ends there, with fewer turns.
     """
+    from scipy.integrate import DOP853, OdeSolution  # half the time of all that SciPy loads
+
     n = numbers(cavity)
 
     def derivative(_: float, y: Floats) -> tuple[float, float, float]:
@@ -134,6 +136,8 @@ def _march(solver: Any, wanted: int, n: Numbers, still: float) -> tuple[list[flo
 
 
 def _root(piece: Any, low: float, high: float) -> float:
+    from scipy.optimize import brentq
+
     return float(brentq(lambda s: float(piece(s)[1]), low, high, xtol=1e-15, rtol=1e-15))
 
 
@@ -165,6 +169,8 @@ def _solved(
 
 def _fastest(n: Numbers, steps: Floats, state: OdeSolution) -> float:
     """Largest |R'|/U: where R'' vanishes between two of many places, or at one of them."""
+    from scipy.optimize import brentq
+
     s = np.unique(np.linspace(steps[:-1], steps[1:], 9))
     q, W, _ = state(s)
     x, F, _ = force(q, W, n)
@@ -239,6 +245,8 @@ def pressure(time: npt.ArrayLike, collapse: Collapse) -> Floats:
 def energy(time: npt.ArrayLike, collapse: Collapse) -> Floats:
     """Energy (J) of the water's flow, the drive, the surface and the gas: constant for Rayleigh-Plesset without
     viscosity."""
+    from scipy.special import boxcox
+
     c, n = collapse.cavity, numbers(collapse.cavity)
     q, W, _ = collapse.state(stretched(time, collapse))
     R = c.radius * ratio(q, n)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
 from sonarsynth.equations.bubble.bubble_collapse import SETTLED, SINGULAR, Collapse, Motion, moving, stretched
@@ -30,6 +29,8 @@ def _pressure(s: float, collapse: Collapse) -> float:
 @lru_cache(maxsize=64)
 def _peak(collapse: Collapse) -> tuple[float, float]:
     """Place (of the stretched clock) and size (Pa) of the largest pressure at 1 m of the first collapse."""
+    from scipy.optimize import minimize_scalar
+
     s = np.unique(np.linspace(collapse.steps[:-1], collapse.steps[1:], 5))
     p = moving(s, collapse).pressure
     i = int(np.clip(np.argmax(p), 1, s.size - 2))

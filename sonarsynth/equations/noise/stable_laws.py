@@ -11,7 +11,6 @@ from itertools import accumulate, repeat
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import erfc, gamma
 
 from sonarsynth.conventions import Floats
@@ -86,6 +85,8 @@ def _near(x: Floats, alpha: float) -> Floats:
 @lru_cache(maxsize=1)
 def _quantiles() -> tuple[Floats, Floats, Floats]:
     """Exponents (row,), their ratio of 95 % to 75 % quantiles, and the latter, of scale 1."""
+    from scipy.optimize import brentq
+
     alphas = np.append(np.linspace(0.52, 1.98, 74), 2.0)
 
     def quantile(alpha: float, tail: float) -> float:

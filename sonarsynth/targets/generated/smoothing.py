@@ -11,12 +11,10 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description.memory import max_facets
-from sonarsynth.geometry.surfaces import MeshError, Surface, cut, require_possible, shared_sides, sides
+from sonarsynth.geometry.surfaces import MeshError, Surface, cut, joined, require_possible, shared_sides, sides
 
 FLAT: Final = 1e-6
 """Angle (rad) up to which two facets are one plane."""
@@ -76,8 +74,8 @@ def corner_normals(surface: Surface, crease: float) -> Floats:
     facet, neighbour, joint = _pairs(faces)
     turn = np.linalg.norm(normal[facet] - normal[neighbour], axis=1)  # 2 sin(angle/2)
     flat, smooth = turn <= FLAT, turn <= 2.0 * np.sin(0.5 * crease)
-    group = _parts(3 * len(faces), joint[smooth, :2].ravel(), joint[smooth, 2:].ravel())  # corners with one normal
-    sector = _parts(3 * len(faces), joint[flat, :2].ravel(), joint[flat, 2:].ravel())  # those in one plane besides
+    group = joined(3 * len(faces), joint[smooth, :2].ravel(), joint[smooth, 2:].ravel())  # corners with one normal
+    sector = joined(3 * len(faces), joint[flat, :2].ravel(), joint[flat, 2:].ravel())  # those in one plane besides
     weight = _weights(corners, group, sector, joint[flat])
     total = np.stack([np.bincount(group, weight * n) for n in np.repeat(normal, 3, axis=0).T], axis=1)
     length = np.linalg.norm(total, axis=1)[:, None]
@@ -110,11 +108,6 @@ def _weights(corners: Floats, group: Ints, sector: Ints, flat: Ints) -> Floats:
     # Of a straight side (180 degrees) the sine is 0, and a small share of the angle stands in for it.
     sine = np.maximum(np.sin(sector_angle), 0.0) + 1e-4 * sector_angle
     return np.asarray(sine * np.exp(np.bincount(sector, share.sum(axis=1)))[sector] * angle / sector_angle)
-
-
-def _parts(number: int, first: Ints, second: Ints) -> Ints:
-    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(number, number))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def _pairs(faces: Ints) -> tuple[Ints, Ints, Ints]:

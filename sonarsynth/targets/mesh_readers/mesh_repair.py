@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.description.memory import max_facets
-from sonarsynth.geometry.surfaces import MeshError, Surface, shared_sides, sides, weld
+from sonarsynth.geometry.surfaces import MeshError, Surface, joined, shared_sides, sides, weld
 
 SMALLEST, LARGEST = 1e-3, 10e3  # m, of the whole mesh
 SAME_VERTEX = 1e-7  # of the size: what single precision leaves of equal coordinates
@@ -120,12 +118,8 @@ def _winding(faces: Ints) -> tuple[Bools, Ints, int]:
     first_side, second_side = shared_sides(faces)
     first, second = first_side // 3, second_side // 3
     differ = number * (forward[first_side] == forward[second_side])
-    ends = (
-        np.concatenate([first, first + number]),
-        np.concatenate([second + differ, second + number - differ]),
-    )
-    graph = coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(2 * number, 2 * number))
-    label = connected_components(graph, directed=False)[1]
+    beside = np.concatenate([second + differ, second + number - differ])
+    label = joined(2 * number, np.concatenate([first, first + number]), beside)
     asis, turned = label[:number], label[number:]
     as_they_are = np.bincount(asis, minlength=label.max() + 1)
     turn = (as_they_are[turned] > as_they_are[asis]) | ((as_they_are[turned] == as_they_are[asis]) & (turned < asis))
