@@ -208,6 +208,13 @@ def picked(mask: Bools) -> Ints | slice:
     return slice(None) if len(rows) == len(mask) else rows
 
 
+def rows_of(column: np.ndarray, keep: Bools | Ints | slice) -> np.ndarray:
+    """The rows of a column (row, ...) that a mask, indices or a slice pick; wide ones are copied whole, to be fast."""
+    if isinstance(keep, slice):
+        return column[keep]
+    return column.take(np.flatnonzero(keep) if keep.dtype == bool else keep, axis=0)
+
+
 def evenly(count: int, limit: int) -> list[int]:
     """At most `limit` of the numbers 0 to count - 1, evenly spread, both ends among them."""
     return sorted({int(n) for n in np.linspace(0, count - 1, min(limit, count)).round()})

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints, rows_of
 
 QUANTITIES = ("delay", "amplitude", "phase", "delay_variance")
 """What varies over the aperture."""
@@ -73,7 +73,7 @@ class ArrayExpansion:
 
     def __getitem__(self, rows: Bools | Ints | slice) -> ArrayExpansion:
         """The paths picked by a mask, by indices or by a slice."""
-        columns: dict[str, Any] = {name: getattr(self, name)[rows] for name in (*QUANTITIES, "error")}
+        columns: dict[str, Any] = {name: rows_of(getattr(self, name), rows) for name in (*QUANTITIES, "error")}
         return ArrayExpansion(**columns, aperture=self.aperture)
 
     def without(self, *names: str) -> ArrayExpansion:

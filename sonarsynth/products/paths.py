@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Bools, Bytes, Floats, Ints
+from sonarsynth.conventions import Bools, Bytes, Floats, Ints, rows_of
 from sonarsynth.products.array_expansion import ArrayExpansion
 
 
@@ -134,10 +134,9 @@ class Arrivals:
     def select(self, keep: Bools | Ints) -> Arrivals:
         """The arrivals picked by a mask or by indices (path,)."""
         rows: dict[str, Any] = {
-            name: value[keep] if isinstance(value, np.ndarray | ArrayExpansion) else value
-            for name, value in vars(self).items()
+            name: rows_of(value, keep) if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
         }
-        return Arrivals(**rows)
+        return Arrivals(**rows | {"expansion": self.expansion[keep]})
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:

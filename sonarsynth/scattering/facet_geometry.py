@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints, rows_of
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.curvature import curvature_radius
 from sonarsynth.geometry.mesh import Mesh
@@ -36,7 +36,7 @@ class FacetGeometry:
 
 def _rows(column: Floats, rows: Ints | slice) -> Floats:
     if isinstance(rows, slice) or column.strides[0] or not len(column):
-        return column[rows]
+        return rows_of(column, rows)
     return np.broadcast_to(column[0], (len(rows), *column.shape[1:]))
 
 
@@ -77,7 +77,7 @@ class PulseResponse(NamedTuple):
 
     def select(self, rows: Bools | Ints) -> PulseResponse:
         """The rows picked by a mask or by indices."""
-        columns: Any = (value[rows] for value in self)
+        columns: Any = (rows_of(value, rows) for value in self)
         return PulseResponse(*columns)
 
     @staticmethod

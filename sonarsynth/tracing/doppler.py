@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.conventions import Bools, Floats, Ints, depth, rows_of
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.kernels import moving_ends
 from sonarsynth.equations.kernels.row_products import row_products
@@ -61,7 +61,7 @@ class MotionTerms:
 
     def select(self, rows: Bools | Ints | slice) -> MotionTerms:
         """The paths picked by a mask or by indices."""
-        return MotionTerms(**{name: value[rows] for name, value in vars(self).items()})
+        return MotionTerms(**{name: rows_of(value, rows) for name, value in vars(self).items()})
 
     @staticmethod
     def direct(count: int, snap: Emission) -> MotionTerms:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, depth, picked
+from sonarsynth.conventions import Bools, Floats, Ints, depth, picked, rows_of
 from sonarsynth.scattering import Component, Scatterers
 from sonarsynth.scattering.components import CoherentKirchhoff, DiffuseKirchhoff, Lobe
 from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse
@@ -38,7 +38,7 @@ class EchoBatch:
 
     def select(self, keep: Ints | slice) -> EchoBatch:
         """The echoes picked by indices."""
-        rows: dict[str, Any] = {k: v[keep] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
+        rows: dict[str, Any] = {k: rows_of(v, keep) for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         return replace(self, patch=self.patch.select(keep), **rows)
 
     def over(self, departure: Floats) -> Floats:
@@ -102,7 +102,7 @@ def echo_batches(
     for number, (surface, of_law) in enumerate(zip(context.scattering, components, strict=True)):
         owned = picked(owner == number)
         row, owned_leg, facet = np.arange(len(owner))[owned], leg[owned], facets.facet[out.facet[owned]]
-        arrival, departure = out.arrival[owned], array.legs.departure[owned_leg]
+        arrival, departure = rows_of(out.arrival, owned), rows_of(array.legs.departure, owned_leg)
         if carried is not None:
             moved = carried.select(owned)
             arrival = moved.turned_back(arrival)

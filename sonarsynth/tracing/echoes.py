@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, depth, picked
+from sonarsynth.conventions import Bools, Floats, Ints, depth, picked, rows_of
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind
@@ -65,9 +65,9 @@ class _EchoBlock:
         number = np.split(np.arange(len(row)), np.cumsum([len(g.row) for g in groups])[:-1])
         groups = [replace(g, row=rows) for g, rows in zip(groups, number, strict=True)]
         out, leg, factor = self.out.select(row), self.leg[row], self.factor[row]
-        terms, pulses = self.terms[loud], self.pulses.select(loud)
-        carried = None if self.carried is None else self.carried.select(row)
-        return _EchoBlock(self.array, groups, out, leg, factor, self.few[loud], self.gain[loud], terms, pulses, carried)
+        carried, kept = None if self.carried is None else self.carried.select(row), np.flatnonzero(loud)
+        few, gain, terms, pulses = rows_of(self.few, kept), self.gain[kept], self.terms[kept], self.pulses.select(kept)
+        return _EchoBlock(self.array, groups, out, leg, factor, few, gain, terms, pulses, carried)
 
     @property
     def amplitude(self) -> Floats:
@@ -198,7 +198,7 @@ def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -
     """Ways (pair,) when and where the sound meets what moves, and the remainder of the motion."""
     meeting, facets = array.meeting, array.facets
     assert meeting is not None
-    owner, point = facets.owner[out.facet], facets.point[out.facet]
+    owner, point = facets.owner[out.facet], rows_of(facets.point, out.facet)
     velocity, spin = velocities(array.context.scattering, owner, point)
     met = meeting.met[owner]
     met_out, late = meets(out, met, velocity, snap.time, array.context.medium.profile.at(depth(point)))
@@ -224,7 +224,7 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     medium, bodies, facets = array.context.medium, array.context.bodies, array.facets
     row = np.flatnonzero(may_face_receiver(facets, snap.position, array.propagation.bounces, medium))
     start = np.broadcast_to(snap.position, (len(row), 3))
-    paths = array.propagation.connect(medium.profile, medium.depth, start, facets.point[row])
+    paths = array.propagation.connect(medium.profile, medium.depth, start, rows_of(facets.point, row))
     facet = row[paths.pair]
     lit = usable(paths) & facets.lit(facet, paths.arrival)
     bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
@@ -232,7 +232,7 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     out = TransmitPaths.of(paths, bounced, facet, snap, speed)
     out = out.select(picked(lit & (out.spreading != 0.0)))
     own = facets.clear_of_own(bodies, out.facet, -out.arrival)
-    out = out.select(picked(~_hides(array, bodies, snap, out, facets.clear[out.facet], own)))
+    out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet), own)))
     for number, before in overlapping(bodies):
         owned = np.flatnonzero(facets.owner[out.facet] == number)
         of = out.facet[owned]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from sonarsynth.casting.ray_casting import OFFSET, clear_of_own_body
-from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth, picked
+from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth, picked, rows_of
 from sonarsynth.equations.kernels.placing import placed
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, TOLERANCE
 from sonarsynth.equations.scattering.lobes import dot
@@ -55,7 +55,7 @@ class ReceivePaths:
 
     def select(self, keep: Bools | Ints | slice) -> ReceivePaths:
         """The legs picked by a mask, by indices, or by a slice, which copies nothing."""
-        return ReceivePaths(**{name: value[keep] for name, value in vars(self).items()})
+        return ReceivePaths(**{name: rows_of(value, keep) for name, value in vars(self).items()})
 
     def numbered(self, row: Ints) -> ReceivePaths:
         """The legs with other numbers (leg,) for the points that they start from."""
@@ -100,9 +100,9 @@ class Facets:
     def side(self, row: Ints, departure: Floats) -> tuple[Floats, Floats]:
         """Where legs (leg, xyz) start clear of facets (row of each), and the normal of the side that they leave on:
         where a facet has none, their departure (leg, xyz)."""
-        normal = self.normal[row]
+        normal = rows_of(self.normal, row)
         sideless = self.sideless
-        return self.clear[row], np.where(sideless[row, None], departure, normal) if sideless.any() else normal
+        return rows_of(self.clear, row), np.where(sideless[row, None], departure, normal) if sideless.any() else normal
 
     def clear_of_own(self, bodies: tuple[PlacedTarget, ...], row: Ints, direction: Floats) -> Ints:
         """As `clear_of_own_body`, of straight paths to or from facets (row of each): direction (path, xyz) away."""
@@ -110,7 +110,7 @@ class Facets:
 
     def lit(self, row: Ints, arrival: Floats) -> Bools:
         """Whether paths that arrive along (path, xyz) light facets (row of each): from their side, if they have one."""
-        return np.asarray((dot(self.normal[row], arrival) < 0) | self.sideless[row])
+        return np.asarray((dot(rows_of(self.normal, row), arrival) < 0) | self.sideless[row])
 
     @property
     def sideless(self) -> Bools:
@@ -120,7 +120,7 @@ class Facets:
 
     def select(self, keep: Bools | Ints | slice) -> Facets:
         """The facets picked by a mask, by indices, or by a slice, which copies nothing."""
-        return Facets(**{name: value[keep] for name, value in vars(self).items()})
+        return Facets(**{name: rows_of(value, keep) for name, value in vars(self).items()})
 
 
 T = TypeVar("T", ReceivePaths, Facets)
@@ -205,7 +205,7 @@ def receive_paths(
     Or that may on their way to a point within `slack` (m) of the array centre.
     """
     legs = rays_to_centre(medium, facets.point, receiver, propagation)
-    ahead = dot(facets.normal[legs.row], legs.departure) * legs.length
+    ahead = dot(rows_of(facets.normal, legs.row), legs.departure) * legs.length
     if slack and propagation.bends:
         ahead += legs.swerve(medium, receiver, slack) * (legs.length + slack)
     return legs.select(picked((ahead > -slack) | facets.sideless[legs.row]))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints, rows_of
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind, Paths
 from sonarsynth.products.array_expansion import stacked
 from sonarsynth.propagation.reflections import Reflections, as_sign
@@ -57,7 +57,7 @@ class TransmitPaths:
 
     def select(self, keep: Bools | Ints | slice) -> TransmitPaths:
         """The ways picked by a mask or by indices."""
-        return TransmitPaths(**{name: value[keep] for name, value in vars(self).items()})
+        return TransmitPaths(**{name: rows_of(value, keep) for name, value in vars(self).items()})
 
     def merged(self) -> TransmitPaths:
         """The ways with those that coincide added up: from a snap on the bottom, say, and its image there."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints, depth
+from sonarsynth.conventions import Floats, Ints, depth, rows_of
 from sonarsynth.equations.kernels.unit_vectors import to_images
 from sonarsynth.geometry import Pose
 from sonarsynth.propagation.path_model import KnownRays
@@ -77,7 +77,7 @@ def image(legs: ReceivePaths, position: Floats, sonar_pose: Pose, rows: Ints | N
     chosen = slice(None) if rows is None else rows
     mirrored = (legs.surface[chosen] + legs.bottom[chosen]) % 2 == 1
     return np.asarray(
-        to_images(legs.length[chosen], legs.departure[chosen], mirrored, sonar_pose.turn_to_world(position))
+        to_images(legs.length[chosen], rows_of(legs.departure, chosen), mirrored, sonar_pose.turn_to_world(position))
     )
 
 
