@@ -69,6 +69,8 @@ def _explain(error: Exception, shown: bool) -> int:
             return _say(str(error), INPUT)
     if isinstance(error, (BadOption, FieldError)):
         return _say(str(error), INPUT)
+    if "computed checksum do not match" in str(error):  # of zarr's crc32c, which does not name the file
+        return _say("a file of the store is damaged: sonarsynth verify STORE names it, repair rebuilds it", STORE)
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""
         return _say(f"{file}{error.strerror}", OURS)

@@ -1,4 +1,4 @@
-"""Figures of the model of a sound, at what the measured ones are of; and both as numbers for programs."""
+"""What the model of a soundscape predicts, on the grids of the measured figures; and both as JSON."""
 
 from __future__ import annotations
 
