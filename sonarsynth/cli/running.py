@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import logging
 import os
 import signal
 import sys
@@ -70,6 +71,7 @@ def _explain(error: Exception, shown: bool) -> int:
     if isinstance(error, (BadOption, FieldError)):
         return _say(str(error), INPUT)
     if "computed checksum do not match" in str(error):  # of zarr's crc32c, which does not name the file
+        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # other files that were being read are of no interest
         return _say("a file of the store is damaged: sonarsynth verify STORE names it, repair rebuilds it", STORE)
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""

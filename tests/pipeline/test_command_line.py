@@ -76,6 +76,22 @@ def test_build_verify_and_build_again(command: Command, small_file: Path, tmp_pa
     assert "DAMAGE image/energy/c.0.0.0: the file is missing" in damaged.out
 
 
+def test_a_damaged_file_is_one_line_and_status_4(small_file: Path, tmp_path: Path) -> None:
+    """In processes of their own: what libraries say as they end counts too."""
+    path = tmp_path / "s.zarr"
+    assert run(app, ["build", str(small_file), str(path), "--workers", "0", "--frames", "0:8"]) == 0
+    (file,) = (path / "image/energy").glob("c.0*")
+    data = bytearray(file.read_bytes())
+    data[len(data) // 3] ^= 1
+    file.write_bytes(data)
+    for name in ("show", "card"):
+        command = [sys.executable, "-m", "sonarsynth", name, str(path)]
+        done = subprocess.run(command, cwd=HERE, capture_output=True, text=True, check=False)
+        answer = Answer(done.returncode, done.stdout, done.stderr)
+        assert answer.status == 4
+        assert "a file of the store is damaged: sonarsynth verify STORE names it" in one_line(answer)
+
+
 def test_failed_frames_are_status_3(
     command: Command, small_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
