@@ -108,7 +108,7 @@ def _spectrum(axes: Axes, both: list[_Curve], model: PredictedFigures) -> None:
     axes.plot(1e-3 * first.frequency, total, "--", color=MODEL, linewidth=1.4, label="model")
     axes.set_ylim(total.max() - SHOWN, None)
     off = float(np.mean(first.figures.octaves - model.octaves)) if len(model.octaves) else float("nan")
-    offset = f": {off:+.1f} dB re model (+- {model.scatter:.1f} by chance)" if np.isfinite(off) else ""
+    offset = f": {off:+z.1f} dB re model (+- {model.scatter:.1f} by chance)" if np.isfinite(off) else ""
     label(axes, "frequency (kHz)", "spectral level (dB re 1 uPa2/Hz)", f"spectrum, 1/3 octaves (squares){offset}")
 
 
