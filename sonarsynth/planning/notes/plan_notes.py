@@ -12,7 +12,7 @@ from sonarsynth.planning.measured.lost_echoes import lost_echoes
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.formula_validity import validity
 from sonarsynth.planning.notes.population_notes import once, population_notes
-from sonarsynth.planning.notes.source_notes import assumed_speed_notes, off_the_bottom
+from sonarsynth.planning.notes.source_notes import assumed_speed_notes, off_the_bottom, steering_notes
 from sonarsynth.planning.notes.target_notes import law_notes, mirror_notes, overlap_notes, view_notes, where_laws_hold
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import SUPPORT, extreme_waveforms
@@ -53,7 +53,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     if plan.propagation.bounces and not cancelled and plan.products & OF_BEAMS and plan.sizes["emission"]:
         lines.append("reflections of the snap itself enter the image: processing.cancelling removes them")
     if plan.products & OF_BEAMS:
-        lines += view_notes(noted(looks))
+        lines += view_notes(noted(looks)) + steering_notes(noted(looks))
     lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene)
     if plan.sizes["emission"] and plan.products & OF_BEAMS:
         lines += assumed_speed_notes(noted(looks))

@@ -1,9 +1,12 @@
-"""Where the sources of a recipe stand, as the sonar is told."""
+"""Where the sources of a recipe stand, as the sonar is told; and where it hears what, as it moves."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from sonarsynth.conventions import Floats
 from sonarsynth.description.method import Demand
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.ranging import LocatingMethod
@@ -14,6 +17,8 @@ OFF = 3.0
 OTHER_WATER = 2.0
 """A speed of sound so many standard errors from the water's is taken for another: with what else errs, places are then
 past three predicted errors in more than one of twenty frames."""
+STEERED = 0.25
+"""Part of the step between beams by which echoes may be off in images without a word."""
 
 
 def standing_off(scene: Scene) -> tuple[str, ...]:
@@ -50,3 +55,37 @@ def assumed_speed_notes(looks: Sequence[SampledScene]) -> list[str]:
                 f"{speed:.4g} m/s: places are further off than predicted (scene.sonar.assumed_sound_speed)"
             ]
     return lines
+
+
+def steering_notes(looks: Sequence[SampledScene]) -> list[str]:
+    """How far off echoes are at the edges of the images of a sonar that moves: beams are steered as at rest."""
+    worst, lines = STEERED, []
+    for look in looks:
+        beams = look.scene.sonar.beams
+        azimuth, elevation = np.meshgrid(beams.azimuth[[0, -1]], beams.elevation[[0, -1]])
+        step = max(beams.azimuth_span / max(beams.azimuths - 1, 1), beams.elevation_span / max(beams.elevations - 1, 1))
+        for frame in look.frames:
+            ahead, port, up = frame.sonar_pose.turn_to_body(frame.sonar_velocity)
+            across, level = np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation)
+            approach = level * ahead + across * port + np.sin(elevation) * up
+            speed = float(look.profile.at(-float(frame.sonar_pose.position[2])))
+            off = float(np.abs(shift(np.arccos(level), approach / speed)).max())
+            if off > worst * step:
+                worst, fast = off / step, np.linalg.norm(frame.sonar_velocity)
+                lines = [
+                    f"images are steered as for a sonar at rest: at {fast:.3g} m/s echoes at their edges are "
+                    f"{np.rad2deg(off):.2g} deg off their direction when they are heard, points are not"
+                ]
+    return lines
+
+
+def shift(off_axis: Floats, approach: Floats) -> Floats:
+    """Angle (rad) by which a flat array that moves hears a wave farther from its axis than it comes from.
+
+    A front passes the sensors sooner after each other by 1 + approach, so sin(heard) = sin(off_axis)/(1 + approach): an
+    echo of remus.yaml at 22 degrees is seen 0.14 degrees nearer to the axis at 10 m/s.
+
+    off_axis: rad, of where the wave comes from, below pi/2. approach: speed of the array towards there, of that of
+    sound.
+    """
+    return np.asarray(np.arcsin(np.clip(np.sin(off_axis) / (1.0 + approach), -1.0, 1.0)) - off_axis)
