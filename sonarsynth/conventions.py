@@ -208,11 +208,12 @@ def picked(mask: Bools) -> Ints | slice:
     return slice(None) if len(rows) == len(mask) else rows
 
 
-def rows_of(column: np.ndarray, keep: Bools | Ints | slice) -> np.ndarray:
+def rows_of(column: np.ndarray, keep: Bools | Ints | Sequence[int] | slice) -> np.ndarray:
     """The rows of a column (row, ...) that a mask, indices or a slice pick; wide ones are copied whole, to be fast."""
     if isinstance(keep, slice):
         return column[keep]
-    return column.take(np.flatnonzero(keep) if keep.dtype == bool else keep, axis=0)
+    rows = np.asarray(keep)
+    return column.take(np.flatnonzero(rows) if rows.dtype == bool else rows, axis=0)
 
 
 def evenly(count: int, limit: int) -> list[int]:

@@ -38,7 +38,7 @@ def test_a_build_is_the_same_with_choices_that_were_kept_and_without(
     assert len(list(kept.iterdir())) == 1 and not made.recalled
     monkeypatch.setattr(choosing, "_choose", refused)
     read = anew(small)
-    assert str(kept) in read.recalled and read.recalled in str(read)
+    assert str(kept) in read.recalled and "".join(read.recalled.split()) in "".join(str(read).split())  # in lines
     assert (read.choices, repr(read.errors), planned(read)) == (made.choices, repr(made.errors), planned(made))
     digests = []
     for plan, name in ((made, "a.zarr"), (read, "b.zarr")):
