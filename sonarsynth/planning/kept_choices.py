@@ -60,7 +60,10 @@ def keep(key: object, choices: Choices, errors: Errors) -> None:
         file.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=file.parent, suffix=file.suffix, delete=False) as scratch:
             scratch.write(_seal(file, body) + b"\n" + body)
-        os.replace(scratch.name, file)
+        try:
+            os.replace(scratch.name, file)
+        finally:
+            Path(scratch.name).unlink(missing_ok=True)
         for old in sorted(file.parent.glob(f"*{file.suffix}"), key=lambda one: -one.stat().st_mtime)[MOST_FILES:]:
             old.unlink()
     except OSError:

@@ -195,12 +195,9 @@ class Plan:
     @property
     def memory_bytes(self) -> float:
         """Bytes of memory that a process takes to make its largest frame and to write a shard."""
-        facets, samples = (
-            sum(len(mesh.faces) for mesh in self.scene.meshes),
-            self.sizes["sensor"] * self.sizes["sample"],
-        )
+        facets = sum(len(mesh.faces) for mesh in self.scene.meshes)
         shard = min(self.shard_frames, self.recipe.frames) * sum(stage.bytes for stage in self.stages)
-        return frame_bytes(facets, samples) + SHARD_COPIES * shard
+        return frame_bytes(facets, self.sizes["sensor"] * self.sizes["sample"]) + SHARD_COPIES * shard
 
     @property
     def predicted_bytes(self) -> int:
@@ -221,7 +218,8 @@ class Plan:
     def _printed(self) -> tuple[str, tuple[Stage, ...], tuple[Omission, ...], list[str]]:
         lines = [f"note: {warning}" for warning in self.warnings]
         lines.append(", ".join(counted(count, name) for name, count in self.sizes.items()))
-        lines += [self.recalled] * bool(self.recalled)
+        if self.recalled:
+            lines.append(self.recalled)
         if self.odds:
             lines.append(f"in frames that were tried: {self.odds}")
         elif "image" in self.products and self.scene.sound_parts:

@@ -45,9 +45,7 @@ class Wavefronts:
     amplitude: Floats  # (path,)
     loss: Floats  # (path,) dB of absorption at the band centre, inside amplitude
     expansion: ArrayExpansion  # (path,)
-    occluded: (
-        Bytes  # (path, byte) bits of hydrophones that a path does not reach, after one; (path, 0): all are reached
-    )
+    occluded: Bytes  # (path, byte) a bit for each hydrophone not reached, after one; (path, 0): all are reached
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
     sound_speed: float  # m/s
     aperture: float  # m: no hydrophone is farther out

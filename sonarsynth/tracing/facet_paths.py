@@ -84,15 +84,15 @@ class FacetPaths:
     def settled(self, leg: Ints) -> tuple[ReceivePaths, Bools]:
         """Those of some legs (row,) that a hydrophone sees, with the hydrophones that bodies hide them from, and which
         (row,) these are."""
-        number, row = np.unique(leg[self.legs.open[leg] > 0], return_inverse=True)
-        in_sight = np.ones(len(leg), bool)
+        doubtful, in_sight = self.legs.open[leg] > 0, np.ones(len(leg), bool)
+        number, row = np.unique(leg[doubtful], return_inverse=True)
         if not len(number):
             return self.legs.select(leg), in_sight
         pending = self.legs.select(number)
         side = self.facets.side(pending.row, pending.departure)
         pending = self.view(self.context.bodies).settled(pending.numbered(np.arange(len(number))), *side)
         found = np.isin(row, pending.row)
-        in_sight[self.legs.open[leg] > 0] = found
+        in_sight[doubtful] = found
         legs = self.legs.select(leg[in_sight])
         occluded = legs.occluded.copy()
         occluded[legs.open > 0] = pending.occluded[np.searchsorted(pending.row, row[found])]

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from sonarsynth.planning.measured.sampled_frames import sample_frames
-from sonarsynth.planning.notes.source_notes import shift, steering_notes
+from sonarsynth.planning.notes.source_notes import steering_error, steering_notes
 from sonarsynth.recipe import reading
 
 FAR, SPEED = 1e5, 1500.0
@@ -31,7 +31,7 @@ def test_a_front_passes_the_sensors_of_a_moving_array_as_one_from_where_it_is_he
     from_axis = np.arccos(towards[0])
     off = np.arcsin(SPEED * np.linalg.norm(slope)) - from_axis
     approach = float(np.dot(towards, velocity)) / SPEED
-    assert off == pytest.approx(float(shift(from_axis, np.asarray(approach))), abs=1e-6)
+    assert off == pytest.approx(float(steering_error(from_axis, np.asarray(approach))), abs=1e-6)
     assert abs(off) > 1e-4 or approach == 0.0
 
 
@@ -44,7 +44,7 @@ def test_what_is_off_by_a_part_of_a_beam_is_said() -> None:
 
     (line,) = lines(10.0)
     expected = np.rad2deg(
-        abs(float(shift(np.arccos(np.cos(np.deg2rad(25)) ** 2), np.cos(np.deg2rad(25)) ** 2 / 154.0)))
+        abs(float(steering_error(np.arccos(np.cos(np.deg2rad(25)) ** 2), np.cos(np.deg2rad(25)) ** 2 / 154.0)))
     )
-    assert f"at 10 m/s echoes at their edges are {expected:.2g} deg off their direction" in line
+    assert f"at 10 m/s echoes at their edges appear {expected:.2g} deg off where they come from" in line
     assert lines(3.0) == [] and lines(0.0) == []

@@ -63,29 +63,29 @@ def steering_notes(looks: Sequence[SampledScene]) -> list[str]:
     for look in looks:
         beams = look.scene.sonar.beams
         azimuth, elevation = np.meshgrid(beams.azimuth[[0, -1]], beams.elevation[[0, -1]])
+        across = np.cos(elevation) * np.sin(azimuth)
+        corners = np.stack([np.cos(elevation) * np.cos(azimuth), across, np.sin(elevation)], axis=-1)
         step = max(beams.azimuth_span / max(beams.azimuths - 1, 1), beams.elevation_span / max(beams.elevations - 1, 1))
         for frame in look.frames:
-            ahead, port, up = frame.sonar_pose.turn_to_body(frame.sonar_velocity)
-            across, level = np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation)
-            approach = level * ahead + across * port + np.sin(elevation) * up
+            approach = corners @ frame.sonar_pose.turn_to_body(frame.sonar_velocity)
             speed = float(look.profile.at(-float(frame.sonar_pose.position[2])))
-            off = float(np.abs(shift(np.arccos(level), approach / speed)).max())
+            off = float(np.abs(steering_error(np.arccos(corners[..., 0]), approach / speed)).max())
             if off > worst * step:
                 worst, fast = off / step, np.linalg.norm(frame.sonar_velocity)
                 lines = [
-                    f"images are steered as for a sonar at rest: at {fast:.3g} m/s echoes at their edges are "
-                    f"{np.rad2deg(off):.2g} deg off their direction when they are heard, points are not"
+                    f"images are steered as for a sonar at rest: at {fast:.3g} m/s echoes at their edges appear "
+                    f"{np.rad2deg(off):.2g} deg off where they come from (points do not)"
                 ]
     return lines
 
 
-def shift(off_axis: Floats, approach: Floats) -> Floats:
+def steering_error(off_axis: Floats, approach: Floats) -> Floats:
     """Angle (rad) by which a flat array that moves hears a wave farther from its axis than it comes from.
 
     A front passes the sensors sooner after each other by 1 + approach, so sin(heard) = sin(off_axis)/(1 + approach): an
     echo of remus.yaml at 22 degrees is seen 0.14 degrees nearer to the axis at 10 m/s.
 
-    off_axis: rad, of where the wave comes from, below pi/2. approach: speed of the array towards there, of that of
-    sound.
+    off_axis: rad, of where the wave comes from, below pi/2. approach: speed of the array towards there, over that of
+    sound. Both of any shape, that of the result.
     """
     return np.asarray(np.arcsin(np.clip(np.sin(off_axis) / (1.0 + approach), -1.0, 1.0)) - off_axis)

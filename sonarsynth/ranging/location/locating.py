@@ -136,7 +136,9 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
     if pulse.share > SHARED and pulse.noise > AUDIBLE * knowledge.quiet:
         return refused(UNRESOLVED)
     row = _placed(wave, pulse, elements, knowledge, bend)
-    return replace(row, time_error=float(np.hypot(row.time_error, _cut_off(signals, elements, sonar, centre, half))))
+    return replace(
+        row, time_error=float(np.hypot(row.time_error, _clipping_error(signals, elements, sonar, centre, half)))
+    )
 
 
 def _placed(
@@ -156,7 +158,7 @@ def _placed(
     return row
 
 
-def _cut_off(signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float) -> float:
+def _clipping_error(signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float) -> float:
     """Standard error (s) that clipping adds to the time of a pulse: its peak may be anywhere in the samples at full
     scale within `half` of `centre` (s), so many as a live sensor has of them on average."""
     if sonar.converter is None or not signals.clipped:

@@ -77,7 +77,7 @@ class Occlusion:
                 unseen = self._unseen(legs, start, normal, rows, first, swerve)
                 in_sight[rows] = ~unseen.all(axis=1)
                 mixed[rows] |= unseen.any(axis=1)
-        pending = mixed * SEEN + (mixed & ~in_sight & (certain == UNKNOWN)) * (DOUBTFUL - SEEN)
+        pending = np.where(mixed & ~in_sight & (certain == UNKNOWN), DOUBTFUL, np.where(mixed, SEEN, 0))
         rows = np.flatnonzero(in_sight | (pending == DOUBTFUL))
         none = np.zeros((len(rows), 1 + self.elements.count // 8), np.uint8)
         return legs.select(rows).seen(none, pending[rows])
