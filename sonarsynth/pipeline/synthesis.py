@@ -13,11 +13,11 @@ import numpy as np
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.geometry.motion import pose, velocity
 from sonarsynth.pipeline.stage_times import mark_stage
-from sonarsynth.planning import Plan, arrivals_of, context_of, frame_start
+from sonarsynth.planning import Plan, arrivals_of, behind_baffle, context_of, frame_start
 from sonarsynth.planning.noise_rows import ELECTRONICS, SENSORS, part_names
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.randomness import stream
-from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.receiver import Elements
 from sonarsynth.receiver.sensor_errors import DrawnErrors, SensorState, drawn_errors
 from sonarsynth.receiver.subarrays import Subarray, subarrays
 from sonarsynth.recipe.scene import Frame
@@ -56,7 +56,9 @@ def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Element
     """What hydrophones hear of arrivals, expanded over all of them; what comes from behind, through the baffle."""
     method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
     start = frame_start(plan, frame)
-    return method.signals(_behind(arrivals, sonar), snaps, sensors, sonar, plan.absorption, start, plan.windows.samples)
+    return method.signals(
+        behind_baffle(arrivals, sonar), snaps, sensors, sonar, plan.absorption, start, plan.windows.samples
+    )
 
 
 def errors_of(plan: Plan, frame: Frame) -> DrawnErrors | None:
@@ -136,17 +138,9 @@ def _with_noise_source(plan: Plan, frame: Frame, signals: Signals, source: Noise
     closing = (frame.sonar_velocity - velocity(source.motion, time)) @ apart / max(float(np.linalg.norm(apart)), 1e-9)
     random = stream(frame.seed, "noise source", frame.key, frame.step, number)
     sonar, sensors = plan.scene.sonar, true_elements(plan, frame)
-    arrivals = _behind(arrivals, sonar)
+    arrivals = behind_baffle(arrivals, sonar)
     moving = partial(add_noise_source, time=frame.time, closing=float(closing), random=random)
     return moving(signals, source, arrivals, instant, sensors, sonar, plan.absorption)
-
-
-def _behind(arrivals: Arrivals, sonar: Sonar) -> Arrivals:
-    """Arrivals, with what the baffle leaves of those from behind."""
-    if not sonar.baffle:
-        return arrivals
-    gain = np.where(arrivals.direction[:, 0] < 0.0, sonar.behind, 1.0)
-    return replace(arrivals, amplitude=arrivals.amplitude * gain)
 
 
 def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: float, hearing: Hearing) -> Signals:

@@ -13,7 +13,7 @@ from sonarsynth.planning.costs import machine_factor, stages
 from sonarsynth.planning.listening_windows import check_windows, frame_start, listening_windows
 from sonarsynth.planning.measured.path_counts import room_for_paths
 from sonarsynth.planning.measured.ray_bending import propagation
-from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, context_of, receiver_of, survey_of
+from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, behind_baffle, context_of, receiver_of, survey_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene, check_alike, sample_frames
 from sonarsynth.planning.measured.thinned_profile import thinned
 from sonarsynth.planning.notes.omissions import left_out
@@ -38,6 +38,7 @@ __all__ = [
     "Stage",
     "Windows",
     "arrivals_of",
+    "behind_baffle",
     "check_unsampled_frame",
     "choices_from",
     "chosen_products",

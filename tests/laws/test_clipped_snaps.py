@@ -1,18 +1,26 @@
-"""Snaps louder than the full scale of the converter: what is cut off moves their time, and predicted errors hold it."""
+"""Snaps louder than the full scale of the converter: plans forecast them; what is cut off moves their time, and
+predicted errors hold it."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from sonarsynth import plan, render
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.motion import Line
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.receiver import Converter, PlanarLattice, Sonar, elements
+from sonarsynth.receiver.sensor_errors import SensorErrors
+from sonarsynth.recipe import Recipe
 from sonarsynth.signals.electronics import convert
 from sonarsynth.state import Receiver, Survey
 from tests.heard import envelope_late, hear_direct
+from tests.scenes import remus
 
 C = 1540.0
 ARRAY = PlanarLattice(columns=12, rows=12, pitch=0.1, face=0.04953)
@@ -46,3 +54,26 @@ def test_what_is_not_clipped_adds_nothing() -> None:
     assert located(signals, 1.01).time_error[0] < 3e-9
     signals.pressure[0, -3:] = np.abs(signals.pressure).max() * 1.02
     assert located(signals, 0.99).time_error[0] < 3e-9
+
+
+def test_a_plan_forecasts_the_frames_that_clip() -> None:
+    """A sonar that comes nearer, with gains that err: frames that clip when rendered, and by how much they would."""
+    recipe = remus(3, sensor_errors=SensorErrors(gain=1.0))
+    approach = Line(start=(0.0, 0.0, -5.0), stop=(4.0, 0.0, -5.0), duration=6.3)
+    scene = replace(recipe.scene, trajectory=replace(recipe.scene.trajectory, sonar=approach))
+
+    def at(full_scale: float | None) -> Recipe:
+        converter = None if full_scale is None else Converter(bits=24, full_scale=full_scale)
+        return replace(recipe, scene=replace(scene, sonar=replace(scene.sonar, converter=converter)))
+
+    analog = [render(at(None), n)["signals/pressure"].values for n in range(3)]
+    peaks = np.sort([np.abs(pressure).max() for pressure in analog])
+    for n, full_scale in enumerate([0.99 * peaks[0], 0.5 * (peaks[0] + peaks[1]), 0.99 * peaks[2], 1.01 * peaks[2]]):
+        clipping, own = [3, 2, 1, 0][n], at(float(full_scale))
+        assert sum(int(render(own, frame)["signals/clipped"]) > 0 for frame in range(3)) == clipping
+        lines = [line for line in plan(own, ["signals"]).warnings if "clip" in line]
+        excess = 20.0 * np.log10(peaks[2] / full_scale)
+        assert len(lines) == (clipping > 0)
+        for line in lines:
+            assert f"in {clipping} of 3 frames" in line
+            assert float(line.split("up to ")[1].split(" dB")[0]) == pytest.approx(excess, abs=0.08)

@@ -8,7 +8,7 @@ import numpy as np
 
 from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.planning.listening_windows import frame_start
-from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, receiver_of, survey_of
+from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, behind_baffle, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Signals, SourceEstimates
@@ -68,7 +68,8 @@ def losses(plan: Plan, index: int) -> EchoLosses | None:
     with it hold more, after the removal, than signals without.
     """
     frame, sonar, windows = plan.recipe.frame(index)[1], plan.scene.sonar, plan.windows
-    arrivals, snaps, start = arrivals_of(plan, frame), frame.moment.snaps, frame_start(plan, frame)
+    arrivals = behind_baffle(arrivals_of(plan, frame), sonar)
+    snaps, start = frame.moment.snaps, frame_start(plan, frame)
     straight = arrivals.direct & (arrivals.surface + arrivals.bottom == 0)
     if not straight.any():
         return None

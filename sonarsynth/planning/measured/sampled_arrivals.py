@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Arrivals
 from sonarsynth.randomness import stream
+from sonarsynth.receiver import Sonar
 from sonarsynth.receiver.subarrays import Subarray
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.state import FrameContext, Receiver, Survey, Tolerances
@@ -63,6 +66,14 @@ def context_of(plan: Plan, frame: Frame, subarray: Subarray | None = None) -> Fr
     world = frame.moment
     everything = world.time, world.bodies, world.snaps, plan.medium, receiver, plan.scene.laws, tolerances
     return FrameContext(*everything, scatterers=world.scatterers)
+
+
+def behind_baffle(arrivals: Arrivals, sonar: Sonar) -> Arrivals:
+    """Arrivals, with what the baffle leaves of those from behind."""
+    if not sonar.baffle:
+        return arrivals
+    gain = np.where(arrivals.direction[:, 0] < 0.0, sonar.behind, 1.0)
+    return replace(arrivals, amplitude=arrivals.amplitude * gain)
 
 
 def receiver_of(plan: Plan, frame: Frame, subarray: Subarray | None = None) -> Receiver:
