@@ -61,7 +61,7 @@ def _table(elements: Elements, level: int) -> np.ndarray:
     y = (elements.columns - 1 - 2 * elements.column[live]) % size
     z = (elements.rows - 1 - 2 * elements.row[live]) % size
     weights[z, y] = live_gain(elements.gain)[live] * np.exp(-1j * bulge)
-    return (np.fft.ifft2(weights) * size**2).astype(np.complex64)
+    return np.pad((np.fft.ifft2(weights) * size**2).astype(np.complex64), (0, 2), mode="wrap")
 
 
 @lru_cache(maxsize=16)
@@ -195,8 +195,11 @@ def _spectra(arrivals: Arrivals, rows: Ints, elements: Elements, band: Band) -> 
         amplitude = amplitude * (1.0 - hidden / elements.count)
     sine = arrivals.direction[rows, 1:] * (elements.face / arrivals.sound_speed)
     frequency = band.frequency
-    phase, delay_std, loss = (column[rows] for column in (arrivals.phase, arrivals.delay_std, arrivals.absorption))
-    spectra = kernels.path_spectra(amplitude, phase, delay_std, loss, sine, frequency, band.relative)
+    delay_std, loss = arrivals.delay_std[rows], arrivals.absorption[rows]
+    decay = np.outer(np.log(10.0) / 20.0 * loss, -band.relative)
+    if delay_std.any():
+        decay -= np.outer(0.5 * (2.0 * np.pi * delay_std) ** 2, frequency**2)
+    spectra = kernels.path_spectra(amplitude, arrivals.phase[rows], np.exp(decay), sine, frequency)
     shaped = arrivals.coherent | arrivals.corner_delays.any(axis=1) | (arrivals.coherent_fraction > 0.0)
     if shaped.any():
         echo = arrivals.select(rows[shaped[rows]])

@@ -2,44 +2,40 @@
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import first_hit
-from sonarsynth.conventions import NO_TARGET, Floats, direction
+from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose
-from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.oriented_box import oriented_box
-from sonarsynth.labels.views.appearance import Appearance, Connect, appearance, finite, lit_fraction
+from sonarsynth.labels.views.appearance import Appearance, Connect, appearance, lit_fraction
+from sonarsynth.labels.views.beam_cells import beam_views
 from sonarsynth.labels.views.box_in_view import box_in_view, pixel_box, truncation
-from sonarsynth.labels.views.coverage import coverage
 from sonarsynth.products import Truth, View
 from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import BeamGrid
 from sonarsynth.state import FrameContext, meeting_times, positions
-
-MARGIN = 1e-9
-"""rad: how far beyond the box of a body beams are looked at."""
 
 
 def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -> Truth:
     """Truth of a frame, on the grid of beams of its sonar; snap_level: (snap,) dB re 1 uPa at 1 m.
 
     A beam's label is the first surface that a ray launched from the array centre in the beam's direction meets; its
-    range is the distance of that point from the array centre. `label` traces the bent ray by casting a straight one
-    against the bodies as they appear: each vertex moved to (its arrival direction) * (its distance); straight rays show
-    them as they are. A target's `image_box` bounds what the array sees of it within the spans of the beams; NaN where
-    that is nothing, and `view` says why (`views.View`).
+    range is the distance of that point from the array centre. `label` traces the bent ray by a straight one to the
+    bodies as they appear: each vertex moved to (its arrival direction) * (its distance); of straight rays, where it is.
+    A target's `image_box` bounds what the array sees of it within the spans of the beams; NaN where that is nothing,
+    and `view` says why (`views.View`).
     """
     bodies, sonar_pose, beams = context.bodies, context.receiver.pose, context.receiver.sonar.beams
     medium = context.medium
     connect = partial(propagation.direct.connect, medium.profile, medium.depth)
     bent = connect if propagation.bends else None
     appearances = [appearance(body, bodies, sonar_pose, bent) for body in bodies]
-    target, facet, distance = _label_beams(bodies, appearances, beams, sonar_pose)
+    seen = [(a.corners, b.mesh.faces, a.boxes, b.mesh.closed) for b, a in zip(bodies, appearances, strict=True)]
+    met_first = beam_views(seen, beams)
     tracks = [body.track if context.receiver.track else body.frozen.track for body in bodies]
     by_lines = medium.profile.uniform and propagation.straight(medium.profile)
     travel = partial(_straight_times, 1.0 / medium.profile.speed[0]) if by_lines else partial(_direct_times, connect)
@@ -63,12 +59,10 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
         snap_position=_rows([s.position for s in context.snaps], 3),
         snap_time=np.array([s.time for s in context.snaps]),
         snap_level=np.asarray(snap_level, float),
-        beam_target=target,
-        beam_facet=facet,
-        beam_range=distance,
-        beam_coverage=coverage(
-            [(a.corners, b.mesh.faces, a.boxes, b.mesh.closed) for b, a in zip(bodies, appearances, strict=True)], beams
-        ),
+        beam_target=met_first.target,
+        beam_facet=met_first.facet,
+        beam_range=met_first.range,
+        beam_coverage=met_first.coverage,
     )
 
 
@@ -127,41 +121,3 @@ def _straight_times(slowness: float, start: Floats, end: Floats) -> Floats:
 
 def _rows(rows: list[Floats], width: int) -> Floats:
     return np.array(rows, float).reshape(-1, width)
-
-
-@lru_cache(maxsize=4)
-def _rays_of(beams: BeamGrid) -> Floats:
-    """Directions (elevation, azimuth, xyz) of the beams."""
-    return direction(beams.azimuth[None, :], beams.elevation[:, None])
-
-
-def _label_beams(
-    bodies: tuple[PlacedTarget, ...], appearances: list[Appearance], beams: BeamGrid, sonar_pose: Pose
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Target, facet and range (elevation, azimuth) of each beam."""
-    rays = _rays_of(beams)
-    shape = rays.shape[:2]
-    target = np.full(shape, NO_TARGET, np.int16)
-    facet = np.full(shape, NO_TARGET, np.int32)
-    nearest = np.full(shape, np.inf)
-    for index, (body, apparent) in enumerate(zip(bodies, appearances, strict=True)):
-        left, right, low, high = apparent.full_box + [-MARGIN, MARGIN, -MARGIN, MARGIN]
-        near = tuple(
-            slice(*angles.searchsorted(ends))  # none where they are NaN
-            for angles, ends in ((beams.elevation, (low, high)), (beams.azimuth, (left, right)))
-        )
-        look = rays[near].reshape(-1, 3)
-        if not len(look):
-            continue
-        if not apparent.bent:  # in the frame of the mesh, which is made ready for casting once
-            origin = np.broadcast_to(body.pose.to_body(sonar_pose.position), look.shape)
-            hit, distance = first_hit(body.mesh, origin, body.pose.turn_to_body(sonar_pose.turn_to_world(look)))
-        else:
-            valid = np.flatnonzero(finite(apparent.corners, body.mesh.faces))
-            seen = Mesh(np.nan_to_num(apparent.corners), body.mesh.faces[valid])
-            hit, distance = first_hit(seen, np.zeros_like(look), look)
-            hit = np.where(hit >= 0, valid[hit], hit)
-        hit, distance = hit.reshape(rays[near].shape[:2]), distance.reshape(rays[near].shape[:2])
-        closer = (hit >= 0) & (distance < nearest[near])
-        target[near][closer], facet[near][closer], nearest[near][closer] = index, hit[closer], distance[closer]
-    return target, facet, np.where(np.isfinite(nearest), nearest, np.nan).astype(np.float32)

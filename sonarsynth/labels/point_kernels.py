@@ -19,7 +19,8 @@ RIM_STEP = 0.35
 class Pattern(NamedTuple):
     """The pattern of an array: tabulated over the slowness across a lattice, or the sensors themselves."""
 
-    table: npt.NDArray[np.complex64]  # (defocus, row step, column step) over twice the period of the lattice; (0, 0, 0)
+    table: npt.NDArray[np.complex64]  # (defocus, row step, column step) over twice the period of the lattice, and the
+    # first two steps again; (0, 0, 0)
     first: int  # defocus of the first table, in steps
     step: float  # defocus (1/m times Hz) of one step
     pitch: float  # s: of the lattice, over the sound speed
@@ -28,28 +29,27 @@ class Pattern(NamedTuple):
 
 
 @compiled
-def path_spectra(
-    amplitude: Floats, phase: Floats, delay_std: Floats, loss: Floats, sine: Floats, frequency: Floats, relative: Floats
-) -> Complexes:
+def path_spectra(amplitude: Floats, phase: Floats, lost: Floats, sine: Floats, frequency: Floats) -> Complexes:
     """Spectra (path, bin) of paths as an element of the array hears them, over that of the snap at 1 m; no delay.
 
-    phase rad, blur s, loss dB at the centre of the band, relative (bin,) more at the others; sine (path, 2): those of
-    the direction along y and z times the side of the square face over the sound speed (s).
+    phase rad; lost (path, bin): factor on the amplitude; sine (path, 2): those of the direction along y and z times the
+    side of the square face over the sound speed (s).
     """
     bins, spacing = len(frequency), frequency[1] - frequency[0] if len(frequency) > 1 else 0.0
-    spectrum = np.empty((len(amplitude), bins), np.complex128)
+    spectrum, gain = np.empty((len(amplitude), bins), np.complex128), np.empty(bins)
     for e in range(len(amplitude)):
-        turn = complex(math.cos(phase[e]), math.sin(phase[e])) * amplitude[e]
-        blur, decay = 0.5 * (2.0 * math.pi * delay_std[e]) ** 2, math.log(10.0) / 20.0 * loss[e]
         for k in range(bins):
-            spectrum[e, k] = turn * math.exp(-blur * frequency[k] ** 2 - decay * relative[k])
+            gain[k] = amplitude[e] * lost[e, k]
         for axis in range(2):
             x, step = math.pi * frequency[0] * sine[e, axis], math.pi * spacing * sine[e, axis]
             phasor, turned = complex(math.cos(x), math.sin(x)), complex(math.cos(step), math.sin(step))
             for k in range(bins):
                 if abs(x) > 1e-6:
-                    spectrum[e, k] *= phasor.imag / x
+                    gain[k] *= phasor.imag / x
                 x, phasor = x + step, phasor * turned
+        cosine, sine_of_phase = math.cos(phase[e]), math.sin(phase[e])
+        for k in range(bins):
+            spectrum[e, k] = complex(cosine * gain[k], sine_of_phase * gain[k])
     return spectrum
 
 
@@ -82,20 +82,18 @@ def _tabulated(
     response: Complexes, apart: Floats, curvature: float, focus: float, frequency: Floats, pattern: Pattern
 ) -> None:
     """Response (bin,) on a lattice: bilinear in tables of the nearest defocus."""
-    levels, size = pattern.table.shape[0], pattern.table.shape[1]
+    table, levels, size = pattern.table, pattern.table.shape[0], pattern.table.shape[1] - 2
+    bulge, y, z = (curvature - focus) / pattern.step, 0.5 * pattern.pitch * apart[1], 0.5 * pattern.pitch * apart[2]
     for k in range(len(frequency)):
-        level = round(frequency[k] * (curvature - focus) / pattern.step) - pattern.first
-        level = min(max(level, 0), levels - 1)
-        across = frequency[k] * pattern.pitch * apart[1] * (0.5 * size)
-        up = frequency[k] * pattern.pitch * apart[2] * (0.5 * size)
-        i, j = math.floor(up), math.floor(across)
-        y, x = up - i, across - j
-        i, j = i % size, j % size
-        below, beside = (i + 1) % size, (j + 1) % size
-        table = pattern.table[level]
-        response[k] = (1.0 - y) * ((1.0 - x) * table[i, j] + x * table[i, beside]) + y * (
-            (1.0 - x) * table[below, j] + x * table[below, beside]
-        )
+        level = min(max(round(frequency[k] * bulge) - pattern.first, 0), levels - 1)
+        across, up = frequency[k] * y, frequency[k] * z
+        across, up = (across - math.floor(across)) * size, (up - math.floor(up)) * size
+        i, j = int(up), int(across)
+        v, u = up - i, across - j
+        a, b, c, d = table[level, i, j], table[level, i, j + 1], table[level, i + 1, j], table[level, i + 1, j + 1]
+        real = (1.0 - v) * ((1.0 - u) * a.real + u * b.real) + v * ((1.0 - u) * c.real + u * d.real)
+        imag = (1.0 - v) * ((1.0 - u) * a.imag + u * b.imag) + v * ((1.0 - u) * c.imag + u * d.imag)
+        response[k] = complex(real, imag)
 
 
 @compiled

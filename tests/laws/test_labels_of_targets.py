@@ -11,8 +11,8 @@ from sonarsynth.geometry import Pose, quaternion, rotation_matrix
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import label
+from sonarsynth.labels.views.beam_cells import cells_of
 from sonarsynth.labels.views.box_in_view import truncation
-from sonarsynth.labels.views.coverage import cells_of
 from sonarsynth.products import Truth, View
 from sonarsynth.propagation import Refracted, Straight
 from sonarsynth.receiver import BeamGrid, Romanis, Sonar, elements
