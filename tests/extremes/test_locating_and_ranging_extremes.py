@@ -74,8 +74,8 @@ def locate(signals, array, depth, snaps=1, **sonar):
 @pytest.mark.parametrize(
     ("positions", "reason"),
     [
-        (((0.0, 0.0, 0.0),), "1 live sensor:"),
-        (((0.0, 0.1, 0.0), (0.0, 0.1, 0.0)), "2 live sensors:"),
+        (((0.0, 0.0, 0.0),), "1 live hydrophone:"),
+        (((0.0, 0.1, 0.0), (0.0, 0.1, 0.0)), "2 live hydrophones:"),
         (((0.0, 0.1, 0.0),) * 5, "one place"),
         (tuple((0.0, 0.1 * i, 0.0) for i in range(8)), "one line"),
     ],

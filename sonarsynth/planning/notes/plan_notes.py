@@ -13,7 +13,13 @@ from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.clipping_notes import clipping_notes
 from sonarsynth.planning.notes.formula_validity import validity
 from sonarsynth.planning.notes.population_notes import once, population_notes
-from sonarsynth.planning.notes.source_notes import assumed_speed_notes, off_the_bottom, steering_notes
+from sonarsynth.planning.notes.source_notes import (
+    assumed_speed_notes,
+    lobe_notes,
+    off_the_bottom,
+    steering_notes,
+    unlocated,
+)
 from sonarsynth.planning.notes.target_notes import law_notes, mirror_notes, overlap_notes, view_notes, where_laws_hold
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import SUPPORT, extreme_waveforms
@@ -57,7 +63,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         lines += view_notes(noted(looks)) + steering_notes(noted(looks))
     lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene) + clipping_notes(plan, looks)
     if plan.sizes["emission"] and plan.products & OF_BEAMS:
-        lines += assumed_speed_notes(noted(looks))
+        lines += unlocated(scene) or lobe_notes(noted(looks)) + assumed_speed_notes(noted(looks))
     for look in noted(looks):
         lines += mirror_notes(look) + overlap_notes(look)
         lines += _extent(look.scene, look.profile)

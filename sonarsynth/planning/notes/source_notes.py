@@ -1,4 +1,4 @@
-"""Where the sources of a recipe stand, as the sonar is told; and where it hears what, as it moves."""
+"""Where the sources of a recipe stand, as the sonar is told; and where it hears what, as it moves, and twice."""
 
 from __future__ import annotations
 
@@ -8,15 +8,23 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description.method import Demand
+from sonarsynth.equations.arrays.grating_lobes import loudest_lobe
 from sonarsynth.planning.measured.sampled_frames import SampledScene
+from sonarsynth.planning.pulse_durations import extreme_waveforms
 from sonarsynth.ranging import LocatingMethod
+from sonarsynth.receiver import elements
 from sonarsynth.recipe.scene import Scene
+from sonarsynth.signals.filtered_pulse import pulse_spectrum
 
 OFF = 3.0
 """A source this many standard errors of the bottom's depth above the bottom stands off it."""
 OTHER_WATER = 2.0
 """A speed of sound so many standard errors from the water's is taken for another: with what else errs, places are then
 past three predicted errors in more than one of twenty frames."""
+LOBE = 0.1
+"""Energy of a grating lobe over that of the main lobe, up to which nothing is said: no shipped snap has one as loud."""
+PULSE_SAMPLES = 4096
+"""Of the spectra of pulses whose lobes are looked at."""
 STEERED = 0.25
 """Part of the step between beams by which echoes may be off in images without a word."""
 
@@ -40,6 +48,12 @@ def off_the_bottom(scene: Scene) -> list[str]:
     """Which sources the sonar does not find where it may look for them."""
     names, note = standing_off(scene), scene.processing.locating.off_bottom_note()
     return [f"{', '.join(names)}: not on the bottom; {note}"] if names and note else []
+
+
+def unlocated(scene: Scene) -> list[str]:
+    """Why nothing is located, where that is known beforehand."""
+    why = locator(scene).locates_nothing(elements(scene.sonar.array), scene.sonar.band)
+    return [f"no snap is located, so there are no images and no points: {why}"] if why else []
 
 
 def assumed_speed_notes(looks: Sequence[SampledScene]) -> list[str]:
@@ -76,6 +90,32 @@ def steering_notes(looks: Sequence[SampledScene]) -> list[str]:
                     f"images are steered as for a sonar at rest: at {fast:.3g} m/s echoes at their edges appear "
                     f"{np.rad2deg(off):.2g} deg off where they come from (points do not)"
                 ]
+    return lines
+
+
+def lobe_notes(looks: Sequence[SampledScene]) -> list[str]:
+    """How loud grating lobes of echoes are in images, where points may be found in them: of the worst sequence."""
+    worst, lines = LOBE, []
+    for look in looks:
+        sonar = look.scene.sonar
+        array, c = elements(sonar.array), sonar.assumed_sound_speed
+        if not array.on_lattice:
+            continue
+        live = array.gain != 0.0
+        for waveform in extreme_waveforms(look.scene):
+            f, spectrum = pulse_spectrum(waveform, sonar.antialias, sonar.sampling_frequency, PULSE_SAMPLES)
+            band = (f >= sonar.band.low) & (f <= sonar.band.high)
+            for place, span in ((array.column, sonar.beams.azimuth_span), (array.row, sonar.beams.elevation_span)):
+                apart = 2.0 * float(np.sin(0.5 * span))
+                pulse = f[band], np.abs(spectrum[band]) ** 2
+                sine, level = loudest_lobe(np.bincount(place[live]), array.pitch, *pulse, c, apart)
+                if level > worst:
+                    worst, degrees = level, np.rad2deg(2.0 * np.arcsin(0.5 * sine))
+                    lines = [
+                        f"hydrophones are {array.pitch * 1e3:.3g} mm apart: images have a grating lobe of each echo "
+                        f"about {degrees:.0f} deg beside it, {max(-10.0 * np.log10(level), 0.0):.1f} dB below it, and "
+                        "points may be found in it (origin 'grating lobe')"
+                    ]
     return lines
 
 

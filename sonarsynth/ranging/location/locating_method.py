@@ -6,7 +6,7 @@ import numpy as np
 
 from sonarsynth.description.method import FrameSize, Method
 from sonarsynth.products import Signals, SourceEstimates
-from sonarsynth.receiver import Elements
+from sonarsynth.receiver import Band, Elements
 from sonarsynth.state import Emission, Receiver, Survey, Trigger
 
 
@@ -26,6 +26,10 @@ class LocatingMethod(Method):
 
     def off_bottom_note(self) -> str:
         """What it does of sources that are not on the bottom, in a few words; empty where that is nothing special."""
+        return ""
+
+    def locates_nothing(self, elements: Elements, band: Band) -> str:
+        """Why it can locate nothing by these hydrophones, heard in this band; empty where it can."""
         return ""
 
     def nearest(self, elements: Elements) -> float:

@@ -11,7 +11,7 @@ from sonarsynth.description.method import UNSTATED, Demand
 from sonarsynth.environment.sound_speed import kink, mean_gradient
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location.locating_method import LocatingMethod
-from sonarsynth.receiver import Elements
+from sonarsynth.receiver import Band, Elements
 from sonarsynth.state import Receiver, Survey
 
 
@@ -49,6 +49,15 @@ class SensorDelays(LocatingMethod):
     def nearest(self, elements: Elements) -> float:
         """As `LocatingMethod.nearest`: there is no wavefront over an array that its source is in."""
         return elements.aperture
+
+    def locates_nothing(self, elements: Elements, band: Band) -> str:
+        """As `LocatingMethod.locates_nothing`."""
+        from sonarsynth.ranging.location.locating import unlocatable
+        from sonarsynth.ranging.location.pulse_times import LONGEST_HALF, half_length
+
+        if half_length(band) > LONGEST_HALF:
+            return f"a band of {band.high - band.low:.3g} Hz tells no direct pulse from its echoes"
+        return unlocatable(elements) or ""
 
     def off_bottom_note(self) -> str:
         """As `LocatingMethod.off_bottom_note`."""

@@ -168,7 +168,7 @@ def _silence() -> CaseResult:
 def _few_sensors() -> CaseResult:
     position, results = (9.0, 2.0, -3.0), []
     snaps, start = (snap(position),), 0.004
-    for array, reason in ((ONE, "1 live sensor"), (TWO, "2 live sensors")):
+    for array, reason in ((ONE, "1 live hydrophone"), (TWO, "2 live hydrophones")):
         signals = synthesised(methods()[0], traced(snaps, array), snaps, array, start, 1000)
         results.append(_against(signals, direct(array, position, times(start, 1000))))
         estimates = SensorDelays().locate(signals, Receiver(POSE, array, SONAR), Survey(100.0, PROFILE), 1)
