@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter, maximum_filter1d, minimum_filter, uniform_filter
+from scipy.special import diric
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.arrays.apertures import live_gain
@@ -254,7 +255,10 @@ def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: F
 @lru_cache(maxsize=8)
 def _lobe_table(low: float, high: float, rate: float, steps: int) -> Floats:
     """Sum (2, delay) over the band low to high (Hz), tapered, at delays in steps of 1/rate (Hz), `steps` either way."""
-    taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
-    turns = np.arange(-steps, steps + 1) / rate
-    response = np.exp(2j * np.pi * np.outer(np.linspace(low, high, LOBE_BINS), turns)).T @ (taper / taper.sum())
-    return np.ascontiguousarray([response.real, response.imag])
+    delay = np.arange(-steps, steps + 1) / rate
+    bin_angle, taper_angle = 2.0 * np.pi * delay * (high - low) / (LOBE_BINS - 1), 2.0 * np.pi / LOBE_BINS
+    # sin^2 is a constant and a cosine: three sums of a geometric series
+    size = diric(bin_angle, LOBE_BINS)
+    size += 0.5 * (diric(bin_angle + taper_angle, LOBE_BINS) + diric(bin_angle - taper_angle, LOBE_BINS))
+    turn = np.pi * (low + high) * delay
+    return np.ascontiguousarray([size * np.cos(turn), size * np.sin(turn)])
