@@ -1,35 +1,39 @@
 """Laying a store out: all of it at once, in a folder beside the place, which is then moved there.
 
-At a URL nothing is moved: it is laid out on this machine, and sent, the mark of the layout first and the metadata of
+At a URL nothing is moved: all is sent, the mark of the layout first and the metadata of
 the root last. What has the mark and neither metadata nor marks of shards was never finished, and is laid out anew.
 """
 
 from __future__ import annotations
 
+import json
 import os
-import tempfile
-import warnings
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
-
-import zarr
-from zarr.core.group import GroupMetadata
-from zarr.errors import ZarrUserWarning
-from zarr.storage import LocalStore
 
 from sonarsynth.description.code_version import code_digest
 from sonarsynth.pipeline import attributes, coordinates
 from sonarsynth.recipe.reading import RecipeError, dump
 from sonarsynth.recipe.reading.yaml_source import read_text
-from sonarsynth.store.array_metadata import fixed_array, framed_array
-from sonarsynth.store.files.place import Folder, Opened, absolute, read_json, record, records, upload
+from sonarsynth.store.array_metadata import documents, fixed_array, framed_array
+from sonarsynth.store.encoding import encoded_whole
+from sonarsynth.store.files.place import (
+    Folder,
+    Opened,
+    absolute,
+    read_json,
+    record_of,
+    records,
+    upload,
+    write_each,
+)
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.scratch import clear, hidden, made, sweep
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.layout import Layout, layout_of
-from sonarsynth.store.marks import LAYOUT, MANIFESTS, Damage, Mark, all_files, load_layout, marked, save_mark
+from sonarsynth.store.marks import LAYOUT, MANIFESTS, Damage, Mark, encoded_mark, load_layout, marked, save_mark
 from sonarsynth.store.opening import check_format
 from sonarsynth.store.provenance import begun, made_of, other_versions
 
@@ -64,8 +68,10 @@ def create(
             return layout
     with made(path) as scratch:
         new = scratch / "new"
-        lay_out(new, plan, layout, {**described(plan), **begun(source)})
-        save_mark(new, layout_mark(new, sync=True))
+        new.mkdir()
+        files = laid_out(plan, layout, {**described(plan), **begun(source)})
+        write_each(new, files)
+        save_mark(new, layout_mark(files))
         if exists:
             os.rename(path, scratch / "old")
         os.rename(new, path)
@@ -98,19 +104,16 @@ def _create_there(
                 return layout
         (path / "zarr.json").unlink(missing_ok=True)
         path.unlink_each(path.sizes())
-    with tempfile.TemporaryDirectory(prefix="sonarsynth-") as folder:
-        scratch = Path(folder) / "new"
-        lay_out(scratch, plan, layout, {**described(plan), **begun(source)})
-        save_mark(scratch, layout_mark(scratch))
-        files = {name: (scratch / name).read_bytes() for name in (*all_files(scratch), *MANIFESTS)}
-        upload(path, files, MANIFESTS, "zarr.json")
+    files = laid_out(plan, layout, {**described(plan), **begun(source)})
+    mark = encoded_mark(layout_mark(files))
+    upload(path, files | dict.fromkeys(MANIFESTS, mark), MANIFESTS, "zarr.json")
     return layout
 
 
-def layout_mark(path: Path, *, sync: bool = False) -> Mark:
-    """The mark of a store that was just laid out: everything in it, and its attributes; with `sync`, on the disk."""
-    files = {name: record(path, name, sync=sync) for name in sorted(all_files(path))}
-    return Mark(LAYOUT, (), "", files, root_attributes(path))
+def layout_mark(files: Mapping[str, bytes]) -> Mark:
+    """The mark of a store that is laid out in these files: all of them, and its attributes."""
+    records_of_files = {name: record_of(files[name]) for name in sorted(files)}
+    return Mark(LAYOUT, (), "", records_of_files, json.loads(files["zarr.json"])["attributes"])
 
 
 def _check_layout(path: Folder) -> None:
@@ -224,28 +227,22 @@ def _flat(value: Any, path: str = "") -> dict[str, Any]:
     return {k: v for key, inner in items for k, v in _flat(inner, f"{path}.{key}" if path else str(key)).items()}
 
 
-def lay_out(path: Path, plan: Plan, layout: Layout, attrs_of_root: Mapping[str, Any]) -> None:
-    """Write everything but frames: metadata and the arrays that no frame changes."""
+def laid_out(plan: Plan, layout: Layout, attrs_of_root: Mapping[str, Any]) -> dict[str, bytes]:
+    """Everything but frames, as files by their names: metadata and the arrays that no frame changes."""
     static = coordinates(plan)
     framed = {a.variable.group for a in layout.arrays}
+    named = {PurePosixPath(group) for group in framed.union(group for group, _ in static)}
     groups: dict[str, dict[str, Any]] = {"": dict(attrs_of_root)}
-    for group in sorted({g for g, _ in static} | framed):
+    for group in sorted(path.as_posix() for inner in named for path in (inner, *inner.parents)):
         extra = sorted(name for g, name in static if g == group and static[g, name][0] != (name,))
         attrs = {"coordinates": " ".join(extra)} if extra and group in framed else {}
         groups.setdefault(group.strip("/"), {}).update(attrs)
     fixed = {f"{group}/{name}".strip("/"): content for (group, name), content in static.items()}
-    nodes: dict[str, Any] = (
-        {name: GroupMetadata(attributes=attrs) for name, attrs in groups.items()}
-        | {array.path: framed_array(array) for array in layout.arrays}
-        | {name: fixed_array(*content) for name, content in fixed.items()}
-    )
-    with warnings.catch_warnings(), zarr.config.set({"array.write_empty_chunks": True}):
-        created = dict(zarr.create_hierarchy(store=LocalStore(path), nodes=nodes))  # at once: one by one takes a second
-        for name, (_, values, _) in fixed.items():
-            array = created[name]
-            if values.size and isinstance(array, zarr.Array):
-                array[...] = values.astype(object) if values.dtype.kind == "U" else values
-        # zarr-python: "Consolidated metadata is currently not part in the Zarr format 3 specification". Readers that
-        # do not know it use the metadata of each array; xarray warns without it.
-        warnings.simplefilter("ignore", ZarrUserWarning)
-        zarr.consolidate_metadata(path)
+    arrays = {array.path: framed_array(array) for array in layout.arrays}
+    arrays |= {name: fixed_array(*content) for name, content in fixed.items()}
+    chunks = {
+        f"{name}/{'.'.join(['c', *['0'] * values.ndim])}": encoded_whole(values)
+        for name, (_, values, _) in fixed.items()
+        if values.size
+    }
+    return documents(groups, arrays) | chunks

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import google_crc32c
 import numpy as np
 from numcodecs import blosc
+from numcodecs.vlen import VLenUTF8
 
 if TYPE_CHECKING:
     from sonarsynth.store.layout import ArrayLayout
@@ -62,7 +63,18 @@ def _chunk(array: ArrayLayout, frames: np.ndarray) -> bytes:
     if len(numbers) < array.chunk:
         fill = np.full((array.chunk - len(numbers), *numbers.shape[1:]), array.variable.fill, numbers.dtype)
         numbers = np.concatenate([numbers, fill])
-    how = compression(array)
+    return _compressed(numbers, compression(array))
+
+
+def encoded_whole(values: np.ndarray) -> bytes:
+    """The file of an array in one chunk that no frame changes: numbers, or text as UTF-8."""
+    if values.dtype.kind == "U":
+        return _checked(bytes(VLenUTF8().encode(values.astype(object))))
+    return _compressed(np.ascontiguousarray(values, values.dtype.newbyteorder("<")), PLAIN)
+
+
+def _compressed(numbers: np.ndarray, how: dict[str, Any]) -> bytes:
+    """Numbers as blosc packs them, in one of the ways above."""
     packed: Any = blosc.compress(numbers, how["cname"].encode(), how["clevel"], _SHUFFLES[how["shuffle"]], 0)
     return _checked(bytes(packed))
 

@@ -65,7 +65,7 @@ class Mark:
 def save_mark(store: Opened, mark: Mark) -> None:
     """Write a mark: all of it or nothing, on the disk when this returns. That of the layout is written twice."""
     for file in MANIFESTS if mark.name == LAYOUT else (f"{MARKS}/{mark.name}.json",):
-        write_in(store, file, _encode(mark))
+        write_in(store, file, encoded_mark(mark))
 
 
 def load_mark(store: Folder, name: str | int) -> Mark | None:
@@ -101,7 +101,7 @@ def parsed(file: str, name: str, text: bytes | OSError) -> Mark | None:
         body: dict[str, Any] = json.loads(text)
         files = {path: (int(size), str(digest)) for path, (size, digest) in body["files"].items()}
         mark = Mark(body["name"], tuple(body["frames"]), body["content"], files, body.get("attributes", {}))
-        if mark.name == name and _encode(mark) == text and _plain(mark):  # to the byte, its seal included
+        if mark.name == name and encoded_mark(mark) == text and _plain(mark):  # to the byte, its seal included
             return mark
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         pass
@@ -184,7 +184,7 @@ class ContentDigest:
         return (_CRC if self._crc else "") + self._sum.hexdigest()
 
 
-def _encode(mark: Mark) -> bytes:
+def encoded_mark(mark: Mark) -> bytes:
     """A mark as it lies in the store, with its digest."""
     body = {"name": mark.name, "frames": mark.frames, "content": mark.content, "files": mark.files}
     if mark.attributes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,8 @@ import pytest
 import zarr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from zarr.core.buffer import default_buffer_prototype
+from zarr.errors import ZarrUserWarning
 
 from sonarsynth import store
 from sonarsynth.planning import Plan
@@ -34,6 +37,27 @@ def by_zarr(path: Path, array: ArrayLayout, shard: int, block: np.ndarray) -> by
     written = file.read_bytes() if file.exists() else None
     file.unlink(missing_ok=True)
     return written
+
+
+def test_what_no_frame_changes_is_as_zarr_writes_it(laid_out: Path, tmp_path: Path) -> None:
+    path = shutil.copytree(laid_out, tmp_path / "again.zarr", ignore=shutil.ignore_patterns(".marks"))
+    root = zarr.open_group(path, mode="r+", use_consolidated=False)
+    for name, array in root.members(max_depth=None):
+        metadata = array.metadata.to_buffer_dict(default_buffer_prototype())["zarr.json"].to_bytes()
+        assert metadata == (path / name / "zarr.json").read_bytes(), name
+        for file in (path / name).glob("c*") if isinstance(array, zarr.Array) else ():
+            values = array[...]
+            file.unlink()
+            with zarr.config.set({"array.write_empty_chunks": True}):
+                zarr.open_array(path / name, mode="r+")[...] = values
+    with pytest.warns(ZarrUserWarning, match="Consolidated"):
+        zarr.consolidate_metadata(path)
+    for file in laid_out.rglob("*"):
+        assert (
+            file.is_dir()
+            or ".marks" in file.parts
+            or file.read_bytes() == (path / file.relative_to(laid_out)).read_bytes()
+        ), file
 
 
 def in_chunks(array: ArrayLayout, block: np.ndarray) -> list[np.ndarray]:

@@ -159,7 +159,7 @@ def test_a_layout_that_was_cut_short_leaves_no_store(
 ) -> None:
     path = tmp_path / "s.zarr"
     with monkeypatch.context() as patch:
-        patch.setattr("zarr.consolidate_metadata", lambda path: (_ for _ in ()).throw(OSError("disk full")))
+        patch.setattr("sonarsynth.store.creating.save_mark", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
         with pytest.raises(OSError, match="disk full"):
             store.create(path, small_plan)
     assert not path.exists()

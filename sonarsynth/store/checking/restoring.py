@@ -4,32 +4,31 @@ from __future__ import annotations
 
 import os
 import stat
-import tempfile
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import zarr
 
 from sonarsynth.pipeline import attributes
 from sonarsynth.store.checking.examining import Findings
-from sonarsynth.store.creating import described, identity, lay_out, layout_mark, root_attributes
+from sonarsynth.store.creating import described, identity, laid_out, layout_mark, root_attributes
 from sonarsynth.store.files.place import Folder, opens, record, there, write_in
 from sonarsynth.store.files.remote import Remote
-from sonarsynth.store.files.scratch import made
 from sonarsynth.store.files.within import Mismatch, parts_of, status
 from sonarsynth.store.layout import ArrayLayout, layout_of
 from sonarsynth.store.marks import Mark, save_mark
 
 if TYPE_CHECKING:
+    import zarr
+
     from sonarsynth.planning import Plan
 
 
 def restore(path: Folder, findings: Findings, plan: Plan | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Put back laid-out files and the mark of the layout. Returns their names, and where what was in the way is now.
 
-    A plan is needed unless only a copy of the mark is damaged. Files are laid out again beside the store, and moved in
+    A plan is needed unless only a copy of the mark is damaged. Files are laid out again, and put in
     only where they are what they were, to the byte: raises Mismatch, with nothing changed, where they are not (other
     versions of libraries).
     """
@@ -40,23 +39,20 @@ def restore(path: Folder, findings: Findings, plan: Plan | None) -> tuple[tuple[
         if findings.manifests:
             save_mark(path, findings.layout)
         return tuple(sorted(findings.manifests)), moved
-    workspace = tempfile.TemporaryDirectory(prefix="sonarsynth-") if isinstance(path, Remote) else made(path)
-    with workspace as folder:
-        scratch = Path(folder) / "new"
-        attrs = findings.attributes or {
-            **described(plan),
-            **root_attributes(path),  # how it was begun, and as what was planned then
-            **attributes(plan),
-            **identity(plan),
-        }
-        lay_out(scratch, plan, layout_of(plan), attrs)
-        laid = layout_mark(scratch)
-        bad = _to_put_back(path, findings, laid)
-        moved = move_out(path, obstacles(path, [*bad, *findings.manifests]))
-        for name in bad:
-            write_in(path, name, (scratch / name).read_bytes())
-        if findings.manifests:
-            save_mark(path, findings.layout or laid)
+    attrs = findings.attributes or {
+        **described(plan),
+        **root_attributes(path),  # how it was begun, and as what was planned then
+        **attributes(plan),
+        **identity(plan),
+    }
+    files = laid_out(plan, layout_of(plan), attrs)
+    laid = layout_mark(files)
+    bad = _to_put_back(path, findings, laid)
+    moved = move_out(path, obstacles(path, [*bad, *findings.manifests]))
+    for name in bad:
+        write_in(path, name, files[name])
+    if findings.manifests:
+        save_mark(path, findings.layout or laid)
     return (*bad, *sorted(findings.manifests)), moved
 
 
@@ -83,6 +79,8 @@ def frames_written(path: Folder, plan: Plan, shard: int) -> tuple[int, ...]:
     A frame that is there always has its step, time and place of the sonar. Where these are there and none can be read,
     all frames of the shard.
     """
+    import zarr
+
     layout = layout_of(plan)
     if shard >= layout.shards:
         return ()
@@ -104,9 +102,9 @@ def frames_written(path: Folder, plan: Plan, shard: int) -> tuple[int, ...]:
 def _rows(root: zarr.Group, array: ArrayLayout, region: range) -> np.ndarray:
     """Frames of a region in which an array has numbers; none where it cannot be decoded."""
     try:
-        stored = root[array.path]
-        assert isinstance(stored, zarr.Array)
-        block = np.asarray(stored[region.start : region.stop]).reshape(len(region), -1)
+        block = np.asarray(cast("zarr.Array[Any]", root[array.path])[region.start : region.stop]).reshape(
+            len(region), -1
+        )
     except Exception:  # whatever a codec raises on what it cannot decode
         return np.zeros(len(region), bool)
     return np.array([not array.is_fill(row) for row in block])

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from sonarsynth.store.files import within
-from sonarsynth.store.files.guarded import GuardedReads
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import OpenedFolder
 
@@ -114,6 +113,8 @@ def opens(folder: Folder) -> Any:
     """What zarr and xarray open, to read: Zarr 3 alone, and of a disk no link."""
     if isinstance(folder, Remote):
         return folder.zarr_store()
+    from sonarsynth.store.files.guarded import GuardedReads  # zarr: 0.3 s, which writing and comparing do not need
+
     return GuardedReads(folder, read_only=True)
 
 
@@ -149,17 +150,15 @@ def read_each(folder: Folder, names: Iterable[str]) -> Iterator[tuple[str, bytes
             yield name, error
 
 
-def record(folder: Folder, name: str, *, sync: bool = False, size: int | None = None) -> FileRecord:
-    """Size and SHA-256 of a file of a store; with `sync`, it is on the disk first. A file of another size than `size`
-    is not read: its digest is "". Raises OSError."""
+def record(folder: Folder, name: str, *, size: int | None = None) -> FileRecord:
+    """Size and SHA-256 of a file of a store. A file of another size than `size` is not read: its digest is "". Raises
+    OSError."""
     if isinstance(folder, Remote):
         return record_of((folder / name).read_bytes())
     with within.opened(folder, name) as file:
         actual_size = os.fstat(file.fileno()).st_size
         if size is not None and actual_size != size:
             return actual_size, ""
-        if sync:
-            os.fsync(file.fileno())
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         return os.fstat(file.fileno()).st_size, digest
 
