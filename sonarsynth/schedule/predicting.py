@@ -38,7 +38,7 @@ PER_FRAME: Final = 3e-3
 """Seconds of one core for the scheduler to see to the tasks of a frame."""
 CLOSING: Final = 0.3
 """Seconds that nothing happens in while processes start and end."""
-LAYING_OUT: Final = 0.35
+LAYING_OUT: Final = 0.1
 """Seconds of one core to lay a store out, where that was not tried."""
 COMPRESSED: Final = 0.4
 """Bytes after compression over those before, where that was not tried."""
