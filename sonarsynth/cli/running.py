@@ -64,15 +64,15 @@ def _explain(error: Exception, shown: bool) -> int:
     match type(error).__name__:
         case "StoreLocked" | "BuildEnded" | "Damage":
             return _say(str(error), STORE)
+        case "DamagedFile":
+            logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # other files that were read are of no interest
+            return _say(str(error), STORE)
         case "RecipeError" | "Mismatch" | "NothingToDraw" | "TooLarge" | "Unreachable" | "NoScheduler":
             return _say(str(error), INPUT)
         case "RecordingError" | "TrackError" | "DetectionsError":
             return _say(str(error), INPUT)
     if isinstance(error, (BadOption, FieldError)):
         return _say(str(error), INPUT)
-    if "computed checksum do not match" in str(error):  # of zarr's crc32c, which does not name the file
-        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # other files that were being read are of no interest
-        return _say("a file of the store is damaged: sonarsynth verify STORE names it, repair rebuilds it", STORE)
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""
         return _say(f"{file}{error.strerror}", OURS)

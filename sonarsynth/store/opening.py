@@ -10,6 +10,7 @@ import numpy as np
 from sonarsynth.conventions import FORMAT_VERSION
 from sonarsynth.description import FieldError
 from sonarsynth.products import SPLITS
+from sonarsynth.store.files.decoding import NAMING
 from sonarsynth.store.files.place import Folder, absolute, opens, there
 from sonarsynth.store.files.within import Mismatch
 
@@ -38,19 +39,23 @@ def open_store(path: Folder | str) -> xr.DataTree:
     store is followed, and counts of the converter decode to float32 (plain xarray: float64).
 
     path: a folder or a URL. Returns the tree. Raises Mismatch where there is no store that xarray can open, or one of
-    another format.
+    another format. Reading a variable of the tree raises DamagedFile where a file cannot be decoded.
     """
     import xarray as xr
+    import zarr
 
     folder = absolute(path)
     must_be_folder(folder)
     try:
-        stored = xr.open_datatree(opens(folder), engine="zarr", decode_cf=False)
+        with zarr.config.set(NAMING):
+            stored = xr.open_datatree(opens(folder), engine="zarr", decode_cf=False)
         check_format(folder, stored.attrs)
         tree = stored.map_over_datasets(_decoded)
     except Mismatch:
         raise
     except (OSError, ValueError, KeyError) as error:
+        if type(error).__name__ == "GroupNotFoundError":
+            raise Mismatch(f"{folder} is not a store of sonarsynth") from None
         first = (str(error).splitlines() or [type(error).__name__])[0]
         raise Mismatch(f"{folder}: not a store that xarray can open ({first})") from None
     tree.set_close(stored.close)

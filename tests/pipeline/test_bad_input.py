@@ -126,7 +126,7 @@ def test_drawing_what_is_not_there(command: Command, small_file: Path, tmp_path:
     for arguments, message in (
         ((tmp_path / "none.zarr",), "none.zarr: no such store"),
         ((small_file,), "is not a store: it is not a folder"),
-        ((tmp_path / "empty.zarr",), "not a store that xarray can open"),
+        ((tmp_path / "empty.zarr",), "empty.zarr is not a store of sonarsynth"),
         ((store, "--frame", "7"), "frame 7 has not been built; there are 2, 0 to 1"),
     ):
         status, out, err = command("show", *arguments)

@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from sonarsynth import pipeline, schedule, store
+from sonarsynth import pipeline, planning, schedule, store
 from sonarsynth.cli import app
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import frame_numbers, product_names
@@ -84,12 +84,35 @@ def test_a_damaged_file_is_one_line_and_status_4(small_file: Path, tmp_path: Pat
     data = bytearray(file.read_bytes())
     data[len(data) // 3] ^= 1
     file.write_bytes(data)
-    for name in ("show", "card"):
+    for name in ("show", "card", "report", "detect"):
         command = [sys.executable, "-m", "sonarsynth", name, str(path)]
         done = subprocess.run(command, cwd=HERE, capture_output=True, text=True, check=False)
         answer = Answer(done.returncode, done.stdout, done.stderr)
         assert answer.status == 4
-        assert "a file of the store is damaged: sonarsynth verify STORE names it" in one_line(answer)
+        assert f"{file}: the file is damaged: 'sonarsynth repair' rebuilds it" in one_line(answer)
+
+
+def test_a_folder_that_is_no_store_is_said_alike_by_every_command(command: Command, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("no store")
+    for name in ("show", "card", "report", "detect", "verify", "repair", "export"):
+        answer = command(name, tmp_path)
+        assert answer.status == 2
+        assert one_line(answer) == f"{tmp_path} is not a store of sonarsynth"
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_planned(
+    command: Command, small_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither below a file nor in /proc; and nothing is left behind where it can."""
+    monkeypatch.setattr(planning, "plan", lambda *_: 1 / 0)
+    file = tmp_path / "file"
+    file.write_text("")
+    for place, nearest in ((file / "s.zarr", file), (Path("/proc/nope/s.zarr"), Path("/proc"))):
+        answer = command("build", small_file, place)
+        assert answer.status == 2
+        assert one_line(answer).startswith(f"{place}: nothing can be written in {nearest} (")
+    store.try_writing(tmp_path / "new" / "s.zarr")
+    assert not list(tmp_path.glob(".*"))
 
 
 def test_failed_frames_are_status_3(
@@ -139,13 +162,6 @@ def test_our_own_fault_is_status_1_and_names_the_traceback(
     shown = command("--debug", "build", small_file, tmp_path / "s.zarr")
     assert shown.status == 1
     assert "Traceback (most recent call last)" in shown.err
-
-
-def test_a_folder_that_cannot_be_written_is_one_line(command: Command, small_file: Path, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    answer = command("build", small_file, tmp_path / "file" / "s.zarr", "--workers", "0")
-    assert answer.status == 1
-    assert one_line(answer) == f"{tmp_path / 'file'}: File exists"
 
 
 @pytest.mark.parametrize(

@@ -12,13 +12,14 @@ import json
 import os
 import re
 import stat
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 from sonarsynth.store.files import within
-from sonarsynth.store.files.remote import Remote
+from sonarsynth.store.files.remote import Remote, Unreachable
 from sonarsynth.store.files.within import OpenedFolder
 
 Folder = Path | Remote
@@ -102,11 +103,18 @@ def held(folder: Folder) -> Iterator[Opened]:
 
 
 def try_writing(folder: Folder) -> None:
-    """Raise Unreachable where nothing can be written at a URL; on a disk nothing is tried."""
-    probe = beside(folder, "probe") if isinstance(folder, Remote) else None
-    if isinstance(probe, Remote):
+    """Raise Unreachable where a store cannot be written: at a URL, or in the nearest folder that there is."""
+    if isinstance(folder, Remote):
+        probe = beside(folder, "probe")
+        assert isinstance(probe, Remote)
         probe.write_bytes(b"")
         probe.unlink(missing_ok=True)
+    elif not folder.exists():
+        nearest = next(above for above in folder.absolute().parents if above.exists())
+        try:
+            Path(tempfile.mkdtemp(prefix=".sonarsynth-", dir=nearest)).rmdir()
+        except OSError as error:
+            raise Unreachable(f"{folder}: nothing can be written in {nearest} ({error.strerror})") from None
 
 
 def opens(folder: Folder) -> Any:
