@@ -256,7 +256,7 @@ def reach(front: Wavefronts) -> Floats:
     return np.asarray(front.aperture / front.sound_speed + front.expansion.largest("delay"))
 
 
-def steered_spread(front: Wavefronts, rows: Ints) -> float:
+def steered_spread(front: Wavefronts, rows: Ints | slice) -> float:
     """Bound (s) on how much sooner or later some paths meet any hydrophone than one front from among them, which meets
     the array centre when they do."""
     aperture, far = front.aperture, np.array([np.ptp(along[rows]) for along in front.direction.T])

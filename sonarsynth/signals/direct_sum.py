@@ -57,7 +57,7 @@ def exact_spectra(
                 frequency, path.coherent, path.corner_delays, path.coherent_fraction, path.height_delay_std, path.centre
             )
         if path.expansion.phase.any() or path.expansion.delay_variance.any():
-            shape = shape * changed(path, elements.position, frequency)
+            shape = shape * changed(path, elements.position, frequency)[0]
         gain_of_sensors = elements.gain * ~path.hidden(elements.count)[0] if path.occluded.any() else elements.gain
         total += (path.amplitude[0] * gain[0] * gain_of_sensors)[:, None] * (
             face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)

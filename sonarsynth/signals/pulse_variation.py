@@ -46,10 +46,10 @@ def turn_and_spread(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:
 
 
 def changed(front: Wavefronts, points: Floats, frequency: Floats) -> ComplexArray:
-    """Factor (point, bin) on the pulse of one path at points (point, xyz), over that at the centre."""
+    """Factor (path, point, bin) on the pulses of paths at points (point, xyz), over those at the centre."""
     turn, spread = turn_and_spread(front, points)
-    soft = 0.5 * np.multiply.outer(spread[0], (2.0 * np.pi * frequency) ** 2)
-    return np.asarray(np.exp(1j * turn[0][:, None] - soft))
+    soft = 0.5 * np.multiply.outer(spread, (2.0 * np.pi * frequency) ** 2) if spread.any() else 0.0
+    return np.asarray(np.exp(1j * turn)[:, :, None] * np.exp(-soft))
 
 
 def aperture_gradient(front: Wavefronts, points: Floats) -> Floats:

@@ -35,7 +35,7 @@ class Segment:
     coherent: bool  # all pulses are differentiated, or none
     first: int  # sample of the window where it begins; may be negative
     samples: int  # even
-    before: float  # s: no pulse begins sooner before it arrives at the centre, where others may be steered to it
+    before: float  # s: no pulse begins sooner before it arrives
     after: float  # s: none ends later
 
 
@@ -88,10 +88,10 @@ def layout(
         for coherent, direct in ((False, True), (False, False), (True, True), (True, False)):
             rows = np.flatnonzero(same & (front.coherent == coherent) & (arrivals.direct == direct))
             for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
-                sooner, later = longer[:, chosen].max(axis=1) + steered_spread(front, chosen)
-                delay = front.delay[chosen] - start
-                first = int(np.floor((delay.min() - sooner) * fs)) - GUARD
-                length = fast_length(int(np.ceil((delay.max() + later) * fs)) + GUARD + 1 - first)
+                sooner, later = longer[:, chosen].max(axis=1)
+                delay, spread = front.delay[chosen] - start, steered_spread(front, chosen)
+                first = int(np.floor((delay.min() - sooner - spread) * fs)) - GUARD
+                length = fast_length(int(np.ceil((delay.max() + later + spread) * fs)) + GUARD + 1 - first)
                 stretches.append(Segment(chosen, waveform, coherent, first, length, float(sooner), float(later)))
     return Layout(tuple(stretches), audible, int((cut & (arrivals.kind != Kind.REVERBERATION)).sum()), support)
 

@@ -51,6 +51,13 @@ class Bins(NamedTuple):
         frequency, spectrum, relative = self.frequency[first], self.spectrum[first], self.relative[first]
         return self._replace(frequency=frequency, spectrum=spectrum, relative=relative, modes=self.modes[:, first])
 
+    def every(self, share: int) -> Bins:
+        """One in so many of them: those of a stretch as much shorter."""
+        some = slice(-self.first % share, None, share)
+        frequency, spectrum, relative = self.frequency[some], self.spectrum[some], self.relative[some]
+        first, modes = -(-self.first // share), self.modes[:, some]
+        return Bins(first, frequency, spectrum, relative, share * self.step, modes, self.changes)
+
 
 def audible(spectrum: ComplexArray, tolerance: float) -> slice:
     """The bins of a spectrum without its ends, which hold no more than 0.03 `tolerance` of its modulus each."""

@@ -21,6 +21,9 @@ from sonarsynth.signals.pulse_variation import PulseVariation, aperture_gradient
 MOST_TERMS = 24
 """A tile that needs more terms, of one mode of its pulses, is split."""
 
+FEW = 4
+"""So many paths are each steered to itself."""
+
 
 @dataclass(frozen=True, eq=False)
 class TileSettings:
@@ -35,6 +38,7 @@ class TileSettings:
     changes: PulseVariation  # of pulses over the aperture
     bins: int
     circle: int  # samples of the deposit grid
+    lasting: float  # samples of a pulse
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,13 +46,18 @@ class Tile:
     """Paths, the front that they are steered to, and the nodes and terms that represent them."""
 
     paths: Ints  # (path,)
-    reference: Wavefronts  # one front: the middle of the tile
+    reference: Wavefronts  # one front, the middle of the tile; or the paths, each steered to itself
     axes: Axes | None  # nodes along x, y, z; None where the hydrophones themselves are the nodes
     terms: tuple[Term, ...]
     deviation: tuple[float, float, float]  # half range of direction y and z, and of absorption (dB)
     changes: Ints  # (some,) which of the changes of pulses over the aperture count, beside the reference
     modes: Floats  # (mode, mode) turn of the modes of all paths to those of the tile; (0, 0) where there are none
     cost: float  # ns, predicted
+
+    @property
+    def alone(self) -> bool:
+        """Whether each path is its own reference: nothing is deposited."""
+        return self.reference.count == self.paths.size
 
     def nodes(self, elements: Elements) -> Floats:
         """Positions (node, xyz) where the field is synthesised, x slowest."""
@@ -162,7 +171,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     extent = _Extent(
         paths=paths.size,
         phase=tuple(phase.tolist()),
-        drift=_drift(reference, aim),
+        drift=tuple(_drift(reference, aim).tolist()),
         degrees=degrees(views.amplitude if all_paths else np.take(views.amplitude, paths, axis=1)),
         turn=turn,
         decay=NEPER * (loss * aim.steepest + farther * aim.fading),
@@ -172,21 +181,21 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     return _Trial(Tile(paths, reference, axes, terms, (dy, dz, loss + farther), over.which, modes, cost), extent)
 
 
-def _drift(front: Wavefronts, aim: TileSettings) -> tuple[float, ...]:
-    """Half range (xyz, rad) of the phase that is left over a face, along each axis of the box: du_j/dq_i is
-    -(e_i - u_i u)_j k/n; and of what absorption varies by (Np). inf about the source."""
+def _drift(front: Wavefronts, aim: TileSettings) -> Floats:
+    """Half range (xyz, rad) of the phase that is left over a face, along each axis of the box, the largest of fronts:
+    du_j/dq_i is -(e_i - u_i u)_j k/n; and of what absorption varies by (Np). inf about the source."""
     _, _, size = _probes(aim.elements, False)
-    k = float(front.curvature[0])
+    k = front.curvature
     nearest = 1.0 - k * float(np.linalg.norm(np.abs(aim.elements.position).max(axis=0)))
-    if not nearest > 0.2:
-        return (np.inf,) * 3
+    if not nearest.min() > 0.2:
+        return np.full(3, np.inf)
     scale = np.pi * aim.highest * aim.elements.face / front.sound_speed * k / nearest
-    x, y, z = np.abs(front.direction[0]).tolist()
+    x, y, z = np.abs(front.direction.T)
     slack = 3.0 * (1.0 - nearest) / nearest  # u itself turns by a third of it
-    change = x * (y + z), 1.0 - y * y + y * z, 1.0 - z * z + y * z
+    change = np.array([x * (y + z), 1.0 - y * y + y * z, 1.0 - z * z + y * z])
     faded = NEPER * front.attenuation * aim.steepest
-    faded += np.sqrt(faded * k)  # a wave that bends as much as what a curved front loses
-    return tuple((scale * min(c + slack, 1.21) + faded) * s for c, s in zip(change, size.tolist(), strict=True))
+    faded = faded + np.sqrt(faded * k)  # a wave that bends as much as what a curved front loses
+    return np.asarray((scale * np.minimum(change + slack, 1.21) + faded).max(axis=1) * size)
 
 
 def _cheapest(extent: _Extent, aim: TileSettings) -> tuple[Axes | None, tuple[Term, ...], float]:
@@ -239,42 +248,37 @@ def tiles(front: Wavefronts, aim: TileSettings) -> list[Tile]:
 
 def _tiles(front: Wavefronts, aim: TileSettings, missed: bool) -> list[Tile]:
     """The tiles of paths of one kind."""
-    if front.count == 1:
-        return [_alone(np.arange(1), front, aim)]
+    if front.count <= FEW:
+        return [_alone(np.arange(front.count), front, aim)]
     views = _views(front, aim, missed)
     trial = _try(np.arange(front.count), views, aim)
     if not missed:
         return _best(trial, views, aim, patient=True)
     best = [trial.tile] if _alone_pays(trial.tile, front, aim) else _best(trial, views, aim, patient=True)
-    gradient = aperture_gradient(front, _probes(aim.elements, True).points)
-    chosen: list[Tile] = []
-    for tile in best:  # halving seldom leads to single paths
-        alone = (
-            [_alone(path[None], front, aim, gradient) for path in tile.paths] if _alone_pays(tile, front, aim) else []
-        )
-        chosen += alone or [tile]
-    return chosen
+    return [  # halving seldom leads to single paths
+        _alone(tile.paths, front, aim) if _alone_pays(tile, front, aim) else tile for tile in best
+    ]
 
 
 def _alone_pays(tile: Tile, front: Wavefronts, aim: TileSettings) -> bool:
     """Whether the paths of a tile cost less one by one, each steered to the hydrophones that it does not miss."""
     missed = int(np.bitwise_count(front.occluded[tile.paths]).sum())
-    steered = 0.7 * aim.circle * float(tile.paths.size * aim.elements.count - missed)
-    return tile.paths.size > 1 and 2e5 * tile.paths.size + steered < tile.cost
+    return _cost_alone(tile.paths.size, missed, aim) < tile.cost
 
 
-def _alone(paths: Ints, front: Wavefronts, aim: TileSettings, gradient: Floats | None = None) -> Tile:
-    """One path is its own reference: nothing is deposited, and its directivity is all that varies; gradient: of the
-    aperture terms at all hydrophones."""
+def _cost_alone(paths: int, missed: int, aim: TileSettings) -> float:
+    """Predicted time (ns) of paths each steered to itself; missed: hydrophones that they do not reach, all together."""
+    return 2e5 + 3e4 * paths + 1.2 * aim.lasting * (paths * aim.elements.count - missed)
+
+
+def _alone(paths: Ints, front: Wavefronts, aim: TileSettings) -> Tile:
+    """Paths that are each their own reference: nothing is deposited, and their directivity is all that varies."""
     reference, size = front.select(paths), _probes(aim.elements, False).size
-    if gradient is None:
-        gradient = aperture_gradient(reference, _probes(aim.elements, True).points)
-    bend = slopes(reference, gradient, aim.weights[0] * aim.highest, aim.highest)[:, 0] * size
-    x, y, z = (
-        nodes_for(d + b, aim.weights, aim.tolerance) for d, b in zip(_drift(reference, aim), bend.tolist(), strict=True)
-    )
+    gradient = aperture_gradient(reference, _probes(aim.elements, True).points)
+    bend = slopes(reference, gradient, aim.weights[0] * aim.highest, aim.highest).max(axis=1) * size
+    x, y, z = (nodes_for(p, aim.weights, aim.tolerance) for p in (_drift(reference, aim) + bend).tolist())
     axes = (x, y, z) if 2 * x.nodes * y.nodes * z.nodes < aim.elements.count else None
-    cost, modes = 2e5 + 0.7 * aim.elements.count * aim.circle, np.eye(reference.modes.shape[1])
+    cost, modes = _cost_alone(paths.size, 0, aim), np.eye(reference.modes.shape[1])
     return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.zeros(0, int), modes, cost)
 
 
