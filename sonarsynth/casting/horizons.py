@@ -92,17 +92,18 @@ def _horizon(
 
 @compiled
 def clear_of_body(
-    facet: Ints, direction: Floats, normal: Floats, nodes: Floats, order: Int32s, vertices: Floats, faces: Int32s,
-    horizon: Floats,
+    facet: Ints, direction: Floats, slope: Floats, normal: Floats, nodes: Floats, order: Int32s, vertices: Floats,
+    faces: Int32s, horizon: Floats,
 ) -> Bools:  # fmt: skip
-    """Which rays (ray,) from the middles of facets in directions (ray, xyz), of length one, surely meet no other facet
-    of a mesh. horizon (facet,) is what is known of each facet, NaN where it is not yet; the tree is that of
-    `facet_tree`, the normals (facet, xyz) are those of the mesh."""
+    """Which cones of rays (ray,) from the middles of facets about directions (ray, xyz), of length one, surely meet no
+    other facet of a mesh; slope (ray,): radius of each over the distance along it. horizon (facet,) is what is known of
+    each facet, NaN where it is not yet; the tree is that of `facet_tree`, the normals (facet, xyz) are those of the
+    mesh."""
     stack, corner, axes = np.empty(LEVELS, np.int64), np.empty((3, 3)), np.empty((4, 3))
     out = np.zeros(len(facet), np.bool_)
     for i in range(len(facet)):
         n, f = normal[facet[i]], facet[i]
-        sine = direction[i, 0] * n[0] + direction[i, 1] * n[1] + direction[i, 2] * n[2] - MARGIN
+        sine = direction[i, 0] * n[0] + direction[i, 1] * n[1] + direction[i, 2] * n[2] - slope[i] - MARGIN
         if sine <= LOWEST:
             continue
         if math.isnan(horizon[f]):

@@ -234,25 +234,29 @@ def first_hit(
     return facet, distance * ready.size
 
 
-def clear_of_own_body(bodies: tuple[PlacedTarget, ...], owner: Ints, facet: Ints, direction: Floats) -> Ints:
+def clear_of_own_body(
+    bodies: tuple[PlacedTarget, ...], owner: Ints, facet: Ints, direction: Floats, slope: Floats | float = 0.0
+) -> Ints:
     """Body (ray,) that rays from the middles of facets (owner and facet of each) in directions (ray, xyz), world, of
-    length one, come from and surely do not meet again; -1 where that is not certain."""
+    length one, come from and surely do not meet again; -1 where that is not certain. Nor do others of a cone about each
+    of them, of some slope (ray,)."""
+    slope = np.broadcast_to(slope, len(owner))
     own = np.full(len(owner), NO_TARGET)
     for number, body in enumerate(bodies):
         rows = slice(None) if len(bodies) == 1 and (owner == 0).all() else np.flatnonzero(owner == number)
-        far = clear_of_body(body.mesh, facet[rows], body.pose.turn_to_body(direction[rows]))
+        far = clear_of_body(body.mesh, facet[rows], body.pose.turn_to_body(direction[rows]), slope[rows])
         own[rows] = np.where(far, number, NO_TARGET)
     return own
 
 
-def clear_of_body(mesh: Mesh, facet: Ints, direction: Floats) -> Bools:
+def clear_of_body(mesh: Mesh, facet: Ints, direction: Floats, slope: Floats) -> Bools:
     """Which rays (ray,) from the middles of facets in directions (ray, xyz), of length one, in the frame of the mesh,
-    surely do not meet it again."""
+    surely do not meet it again, nor do others of a cone about each of them, of that slope (ray,)."""
     from sonarsynth.casting import horizons
 
     ready = casting_mesh(mesh)
     tables = mesh.normal, *ready.tree, ready.vertices, ready.faces, ready.horizon
-    return np.asarray(horizons.clear_of_body(facet, direction, *tables))
+    return np.asarray(horizons.clear_of_body(facet, direction, slope, *tables))
 
 
 def occluded(

@@ -22,7 +22,7 @@ from sonarsynth.tracing.facet_paths import FacetPaths, facet_paths
 from sonarsynth.tracing.meetings import hearing_times, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
 from sonarsynth.tracing.path_absorption import path_loss
-from sonarsynth.tracing.receive_paths import rays_to_centre
+from sonarsynth.tracing.receive_paths import Starts, rays_to_centre
 from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, directed, join, no_arrivals
 
 if TYPE_CHECKING:
@@ -102,8 +102,8 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     legs = rays_to_centre(medium, snap.position[None, :], receiver, array.propagation)
     legs = legs.select(np.flatnonzero(directed(snap, legs.departure)[0] * legs.spreading))
     view = array.view(blocking_bodies(context, snap.position))
-    legs = view.visible(legs, legs.point, None)
-    legs = view.settled(legs, legs.point, None)
+    legs = view.visible(legs, Starts(legs.point))
+    legs = view.settled(legs, Starts(legs.point))
     count = len(legs.row)
     over = aperture_paths(legs, np.zeros(count, int), array.bending, receiver, array.propagation)
     one, none, none_out = np.ones(count), np.full(count, NO_TARGET), TransmitPaths.none(count)

@@ -89,8 +89,8 @@ class FacetPaths:
         if not len(number):
             return self.legs.select(leg), in_sight
         pending = self.legs.select(number)
-        side = self.facets.side(pending.row, pending.departure)
-        pending = self.view(self.context.bodies).settled(pending.numbered(np.arange(len(number))), *side)
+        starts = self.facets.starts(pending.row, pending.departure)
+        pending = self.view(self.context.bodies).settled(pending.numbered(np.arange(len(number))), starts)
         found = np.isin(row, pending.row)
         in_sight[doubtful] = found
         legs = self.legs.select(leg[in_sight])
@@ -136,8 +136,7 @@ def facet_paths(
             facing = may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack)
             every = every.select(picked(facing))
         leaving = receive_paths(every, medium, receiver, propagation, slack)
-        own = every.clear_of_own(bodies, leaving.row, leaving.departure)
-        leaving = view.visible(leaving, *every.side(leaving.row, leaving.departure), own)
+        leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
         reached, row = np.unique(leaving.row, return_inverse=True)
         columns[0].append(leaving.numbered(count + row))
         columns[1].append(every.select(reached))

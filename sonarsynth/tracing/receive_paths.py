@@ -97,12 +97,13 @@ class Facets:
     clear: Floats  # (facet, xyz) m: the centroid moved off its facet
     normal: Floats  # (facet, xyz)
 
-    def side(self, row: Ints, departure: Floats) -> tuple[Floats, Floats]:
-        """Where legs (leg, xyz) start clear of facets (row of each), and the normal of the side that they leave on:
-        where a facet has none, their departure (leg, xyz)."""
+    def starts(self, row: Ints, departure: Floats) -> Starts:
+        """Where legs (leg, xyz) that depart so start, of facets (row of each): one without a normal has their
+        departure."""
         normal = rows_of(self.normal, row)
         sideless = self.sideless
-        return rows_of(self.clear, row), np.where(sideless[row, None], departure, normal) if sideless.any() else normal
+        normal = np.where(sideless[row, None], departure, normal) if sideless.any() else normal
+        return Starts(rows_of(self.clear, row), normal, self.owner[row], self.facet[row])
 
     def clear_of_own(self, bodies: tuple[PlacedTarget, ...], row: Ints, direction: Floats) -> Ints:
         """As `clear_of_own_body`, of straight paths to or from facets (row of each): direction (path, xyz) away."""
@@ -121,6 +122,29 @@ class Facets:
     def select(self, keep: Bools | Ints | slice) -> Facets:
         """The facets picked by a mask, by indices, or by a slice, which copies nothing."""
         return Facets(**{name: rows_of(value, keep) for name, value in vars(self).items()})
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Where legs start; without normals, owners and facets: anywhere in the water."""
+
+    point: Floats  # (leg, xyz) m, world: clear of the facet that it is on
+    normal: Floats | None = None  # (leg, xyz) of the side of it that the leg leaves on
+    owner: Ints | None = None  # (leg,) index into the bodies that are looked at
+    facet: Ints | None = None  # (leg,) index among those of its owner
+
+    def select(self, rows: Ints) -> Starts:
+        """Those of some legs."""
+        columns = {name: rows_of(column, rows) for name, column in vars(self).items() if column is not None}
+        return Starts(**columns)
+
+    def clear_of_own(
+        self, bodies: tuple[PlacedTarget, ...], direction: Floats, slope: Floats | float = 0.0
+    ) -> Ints | None:
+        """(leg,) as `clear_of_own_body`, of rays from there in directions (leg, xyz), and cones about them."""
+        if self.owner is None or self.facet is None:
+            return None
+        return clear_of_own_body(bodies, self.owner, self.facet, direction, slope)
 
 
 T = TypeVar("T", ReceivePaths, Facets)

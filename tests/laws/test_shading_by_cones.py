@@ -74,9 +74,8 @@ def shaded(bodies: tuple[PlacedTarget, ...], array: Elements, rays: Propagation,
     side = facets.clear[legs.row], facets.normal[legs.row]
     alone = np.stack([seen_alone(view, legs, *side, sensor) for sensor in range(array.count)], axis=1)
     numbered = replace(legs, caustics=np.arange(len(legs.row)))
-    seen = view.visible(numbered, *side)
-    side = facets.clear[seen.row], facets.normal[seen.row]
-    seen = view.settled(seen, *side)
+    seen = view.visible(numbered, facets.starts(legs.row, legs.departure))
+    seen = view.settled(seen, facets.starts(seen.row, seen.departure))
     assert not seen.open.any()
     found = np.ones_like(alone)
     found[seen.caustics] = np.unpackbits(seen.occluded, axis=1, count=1 + array.count)[:, 1:]

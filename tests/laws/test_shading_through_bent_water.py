@@ -42,7 +42,7 @@ def seen_by(
     water, receiver = Medium(WATER, profile), Receiver(pose, ARRAY)
     legs = receive_paths(facets, water, receiver, rays)
     view = Occlusion(bodies, water, receiver, rays, Tolerances())
-    return names(view.visible(legs, facets.clear[legs.row], facets.normal[legs.row]))
+    return names(view.visible(legs, facets.starts(legs.row, legs.departure)))
 
 
 def seen_by_all(
@@ -52,8 +52,8 @@ def seen_by_all(
     water, receiver = Medium(WATER, profile), Receiver(SONAR, array)
     legs = receive_paths(facets, water, receiver, rays, array.aperture)
     view = Occlusion(bodies, water, receiver, rays, Tolerances(occlusion="sensors"))
-    legs = view.visible(legs, facets.clear[legs.row], facets.normal[legs.row])
-    legs = view.settled(legs, facets.clear[legs.row], facets.normal[legs.row])
+    legs = view.visible(legs, facets.starts(legs.row, legs.departure))
+    legs = view.settled(legs, facets.starts(legs.row, legs.departure))
     hidden = np.unpackbits(legs.occluded, axis=1, count=1 + array.count)[:, 1:]
     return names(legs), hidden.astype(bool)
 

@@ -121,11 +121,18 @@ def test_rays_that_leave_their_own_body_meet_it_nowhere(mesh: Mesh, least: float
     for _ in range(40):
         towards = unit(rng.normal(size=(count, 3)))
         towards *= np.sign(np.sum(towards * mesh.normal, axis=1))[:, None]
-        own = clear_of_own_body(bodies, np.ones(count, int), np.arange(count), bodies[1].pose.turn_to_world(towards))
+        of = np.ones(count, int), np.arange(count)
+        own = clear_of_own_body(bodies, *of, bodies[1].pose.turn_to_world(towards))
         assert set(own) == {-1, 1}
         share.append(np.mean(own == 1))
         facet, _ = first_hit(mesh, mesh.centroid + 1e-6 * mesh.radius * mesh.normal, towards)
         assert (facet[own == 1] < 0).all()
+        slope = rng.uniform(0.0, 0.3, count)
+        cone = clear_of_own_body(bodies, *of, bodies[1].pose.turn_to_world(towards), slope) == 1
+        across = unit(np.cross(towards, rng.normal(size=(count, 3))))
+        facet, _ = first_hit(mesh, mesh.centroid + 1e-6 * mesh.radius * mesh.normal, towards + slope[:, None] * across)
+        assert (facet[cone] < 0).all()
+        assert (own[cone] == 1).all()
     assert np.mean(share) > least
 
 

@@ -79,7 +79,7 @@ def _leaving(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], rows: Ints, t
         rows, mesh.centroid, mesh.normal, _offset(body), pose.rotation, pose.position, to, facet, start, towards
     )
     facet, start = facet[:count], start[:count]
-    own = np.where(clear_of_body(mesh, facet, towards[:count]), 0, NO_TARGET)
+    own = np.where(clear_of_body(mesh, facet, towards[:count], np.zeros(count)), 0, NO_TARGET)
     others = tuple(other for other in bodies if other is not body)
     return facet, ~occluded((body, *others), start, np.broadcast_to(to, start.shape), own)
 

@@ -22,7 +22,7 @@ from sonarsynth.scattering import Component, FacetLaw
 from sonarsynth.scattering.components import Shadow
 from sonarsynth.state import FrameContext
 from sonarsynth.tracing.expansion.aperture_paths import expansion_source
-from sonarsynth.tracing.receive_paths import facets_of, rays_to_centre
+from sonarsynth.tracing.receive_paths import Starts, facets_of, rays_to_centre
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
@@ -56,8 +56,8 @@ def forward_paths(array: FacetPaths) -> FacetPaths | None:
     every = every.select(scatters[every.owner])
     legs = rays_to_centre(context.medium, every.point, receiver, propagation)
     view = array.view(solid)
-    legs = view.visible(legs, every.clear[legs.row], None)
-    legs = view.settled(legs, every.clear[legs.row], None)
+    legs = view.visible(legs, Starts(every.clear[legs.row]))
+    legs = view.settled(legs, Starts(every.clear[legs.row]))
     reached, row = np.unique(legs.row, return_inverse=True)
     legs, facets = legs.numbered(row), every.select(reached)
     over = expansion_source(legs, facets.owner[legs.row], array.bending, receiver, propagation)

@@ -18,7 +18,7 @@ from sonarsynth.receiver import Elements
 from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation
 from sonarsynth.tracing.occlusion.ray_cones import hidden, ray_cones
-from sonarsynth.tracing.receive_paths import DOUBTFUL, SEEN, ReceivePaths
+from sonarsynth.tracing.receive_paths import DOUBTFUL, SEEN, ReceivePaths, Starts
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
@@ -54,27 +54,27 @@ class Occlusion:
         """Those who look; None: the array centre looks for all."""
         return self.receiver.elements if self.tolerances.occlusion == "sensors" else None
 
-    def visible(
-        self, legs: ReceivePaths, start: Floats, normal: Floats | None, own: Ints | None = None
-    ) -> ReceivePaths:
+    def visible(self, legs: ReceivePaths, starts: Starts) -> ReceivePaths:
         """The legs that no body hides from the array centre; or, with elements, from every hydrophone, some of them
         open for `settled`, which finds those that are hidden from every one after all.
 
-        start (leg, xyz): of the legs, moved off their facets; normal (leg, xyz): of these, which legs leave on their
-        outer side; None where they have none; own (leg,): as of `hidden`.
+        starts (leg,): of the legs.
         """
         if self.elements is None or self.elements.count == 1 or not self.bodies:
-            end = np.broadcast_to(self.receiver.pose.position, start.shape)
-            ray = start, end, legs.departure, legs.length
+            end = np.broadcast_to(self.receiver.pose.position, starts.point.shape)
+            ray, own = (
+                (starts.point, end, legs.departure, legs.length),
+                starts.clear_of_own(self.bodies, legs.departure),
+            )
             hides = hidden(self.bodies, self.bending, *ray, bounces=legs.bounces, turning=legs.turning, own=own)
             return legs.select(picked(~hides))
-        certain = self._certain(legs, start, normal)
+        certain = self._certain(legs, starts)
         in_sight, mixed = certain != CLOSED, certain == UNKNOWN
         first = np.append(0, 1 + rim(self.elements))
         for kind in (UNKNOWN, NO_CONE):
             for rows in self._parts(legs, np.flatnonzero(certain == kind), len(first)):
                 swerve = self._swerve(legs.select(rows), first) if kind == NO_CONE else None  # others stay open
-                unseen = self._unseen(legs, start, normal, rows, first, swerve)
+                unseen = self._unseen(legs, starts, rows, first, swerve)
                 in_sight[rows] = ~unseen.all(axis=1)
                 mixed[rows] |= unseen.any(axis=1)
         pending = np.where(mixed & ~in_sight & (certain == UNKNOWN), DOUBTFUL, np.where(mixed, SEEN, 0))
@@ -82,7 +82,7 @@ class Occlusion:
         none = np.zeros((len(rows), 1 + self.elements.count // 8), np.uint8)
         return legs.select(rows).seen(none, pending[rows])
 
-    def settled(self, legs: ReceivePaths, start: Floats, normal: Floats | None) -> ReceivePaths:
+    def settled(self, legs: ReceivePaths, starts: Starts) -> ReceivePaths:
         """The same legs, none of them open: those that are, looked at from each hydrophone, and left out where none
         sees them; arguments as above.
 
@@ -93,7 +93,7 @@ class Occlusion:
             return legs
         occluded, in_sight = legs.occluded.copy(), np.ones(len(legs.row), bool)
         for block in self._parts(legs, rows, len(self._points)):
-            dark = self._dark(legs, start, normal, block)
+            dark = self._dark(legs, starts, block)
             occluded[block], in_sight[block] = np.packbits(dark, axis=1), ~dark.all(axis=1)
         return legs.seen(occluded, np.zeros_like(legs.open)).select(picked(in_sight))
 
@@ -102,14 +102,14 @@ class Occlusion:
         """(1 + sensor, xyz) the array centre, and the hydrophones."""
         return np.concatenate([np.zeros((1, 3)), self.elements.position if self.elements else np.empty((0, 3))])
 
-    def _certain(self, legs: ReceivePaths, start: Floats, normal: Floats | None) -> Ints:
+    def _certain(self, legs: ReceivePaths, starts: Starts) -> Ints:
         """(leg,) EMPTY where all hydrophones see it, CLOSED where none does; elsewhere UNKNOWN or NO_CONE."""
-        points = self._points
-        spread = np.full(len(start), 1.001 * float(np.linalg.norm(points, axis=1).max()))
-        middle = np.zeros((len(start), 3))
+        points, normal = self._points, starts.normal
+        spread = np.full(len(legs.row), 1.001 * float(np.linalg.norm(points, axis=1).max()))
+        middle = np.zeros((len(legs.row), 3))
         swerve = legs.swerve(self.bending, self.receiver, spread)
         if normal is None:
-            return self._cones(legs, start, middle, spread, None, swerve)
+            return self._cones(legs, starts, middle, spread, None, swerve)
         least, most = _within(legs, normal, spread, swerve)
         rows = np.flatnonzero((least <= 0.0) & (most >= 0.0))
         flip = np.where(legs.bounces[rows] % 2 == 1, -1.0, 1.0)  # of the mirrored array
@@ -119,22 +119,23 @@ class Occlusion:
         margin = 1e-9 * legs.length[rows] + (swerve * (legs.length + spread))[rows]
         margin += 0.5 * (np.abs(across) @ (high - low))
         least[rows], most[rows] = ahead - margin, ahead + margin
-        return self._cones(legs, start, middle, spread, (least, most), swerve)
+        return self._cones(legs, starts, middle, spread, (least, most), swerve)
 
     def _cones(
-        self, legs: ReceivePaths, start: Floats, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None,
+        self, legs: ReceivePaths, starts: Starts, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None,
         swerve: Floats,
     ) -> Ints:  # fmt: skip
         """(leg,) as `_certain`, of the hydrophones within `spread` (leg,) of places beside the centre (leg, xyz); ahead
         (leg,): how far (m) they are on the outer side of the facet, at least and at most; swerve (leg,) rad: by how
         much rays to them leave beside their images, at most."""
         away, length = _towards(legs, offset)
-        verdict, rows = np.full(len(start), UNKNOWN), np.arange(len(start))
+        verdict, rows = np.full(len(away), UNKNOWN), np.arange(len(away))
         if ahead is not None:
             verdict[ahead[1] < 0.0] = CLOSED
             rows = np.flatnonzero(ahead[0] > 0.0)
         end = (self.receiver.pose.position + offset)[rows]
-        ray = start[rows], end, away[rows], length[rows]
+        leaving = starts.select(rows)
+        ray = leaving.point, end, away[rows], length[rows]
         slope, reach, far = ray_cones(
             self.bodies,
             self.bending,
@@ -145,19 +146,21 @@ class Occlusion:
             swerve=swerve[rows],
         )
         sure = np.flatnonzero(np.isfinite(slope))
-        verdict[rows], rows = NO_CONE, rows[sure]
-        verdict[rows] = classify_cones(self.bodies, start[rows], away[rows], slope[sure], reach[sure], far[sure])
+        verdict[rows], leaving, along, slope = NO_CONE, leaving.select(sure), away[rows[sure]], slope[sure]
+        own = leaving.clear_of_own(self.bodies, along, slope)
+        verdict[rows[sure]] = classify_cones(self.bodies, leaving.point, along, slope, reach[sure], far[sure], own)
         return verdict
 
-    def _dark(self, legs: ReceivePaths, start: Floats, normal: Floats | None, rows: Ints) -> Bools:
+    def _dark(self, legs: ReceivePaths, starts: Starts, rows: Ints) -> Bools:
         """(row, 1 + sensor) from where some legs are hidden: the array centre, each hydrophone. Parts of the array that
         see alike are looked at together."""
         every = np.arange(len(self._points))
         swerve = self._swerve(legs.select(rows), every)
         array_cells = cells(self.elements)
         row, cell = np.repeat(rows, len(array_cells.radius)), np.tile(np.arange(len(array_cells.radius)), len(rows))
-        repeated, offset, spread = (
+        repeated, places, offset, spread = (
             legs.select(row),
+            starts.select(row),
             self.receiver.pose.turn_to_world(array_cells.centre)[cell],
             array_cells.radius[cell],
         )
@@ -166,10 +169,10 @@ class Occlusion:
             order = np.argsort(array_cells.cell, kind="stable")
             first = np.searchsorted(array_cells.cell[order], np.arange(len(array_cells.radius)))
             beside = np.maximum.reduceat(np.sqrt(dot(swerve, swerve))[:, order], first, axis=1).ravel()
-        ahead = None if normal is None else _within(repeated, normal[row], spread, beside, offset)
-        verdict = self._cones(repeated, start[row], offset, spread, ahead, beside)
+        ahead = None if places.normal is None else _within(repeated, places.normal, spread, beside, offset)
+        verdict = self._cones(repeated, places, offset, spread, ahead, beside)
         verdict = verdict.reshape(len(rows), len(array_cells.radius))[:, array_cells.cell]
-        unseen = self._unseen(legs, start, normal, rows, every, swerve, verdict >= UNKNOWN)
+        unseen = self._unseen(legs, starts, rows, every, swerve, verdict >= UNKNOWN)
         return np.asarray((verdict == CLOSED) | unseen)
 
     def _swerve(self, legs: ReceivePaths, point: Ints) -> Floats | None:
@@ -189,7 +192,7 @@ class Occlusion:
         return np.array_split(rows, max(1, len(rows) * points // most))
 
     def _unseen(
-        self, legs: ReceivePaths, start: Floats, normal: Floats | None, rows: Ints, point: Ints, swerve: Floats | None,
+        self, legs: ReceivePaths, starts: Starts, rows: Ints, point: Ints, swerve: Floats | None,
         look: Bools | None = None,
     ) -> Bools:  # fmt: skip
         """(row, point) which of some legs leave the back of their facets, or meet a body, on the way to some points:
@@ -199,11 +202,12 @@ class Occlusion:
         rays; bent ones off that by `swerve` (row, point, xyz).
         """
         look = np.ones((len(rows), len(point)), bool) if look is None else look
+        normal = starts.normal
         if self._straight(legs):
             points, seen = self.receiver.pose.to_world(self._points[point]), look.copy()
             if normal is not None:
                 seen &= normal[rows] @ points.T > dot(normal[rows], legs.point[rows])[:, None]
-            hide(self.bodies, start[rows], points, seen)
+            hide(self.bodies, starts.point[rows], points, seen)
             return look & ~seen
         row, column = np.nonzero(look)
         leg, offset = rows[row], self.receiver.pose.turn_to_world(self._points[point])[column]
@@ -215,9 +219,10 @@ class Occlusion:
         if normal is not None:
             unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
         ray = np.flatnonzero(~unseen)
-        away = start[leg[ray]], self.receiver.pose.position + offset[ray], ahead[ray], length[ray]
-        turns = beside.bounces[ray], beside.turning[ray]
-        unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=turns[0], turning=turns[1])
+        leaving, towards, turns = starts.select(leg[ray]), ahead[ray], (beside.bounces[ray], beside.turning[ray])
+        away = leaving.point, self.receiver.pose.position + offset[ray], towards, length[ray]
+        own = leaving.clear_of_own(self.bodies, towards)
+        unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=turns[0], turning=turns[1], own=own)
         look[row, column] = unseen
         return look
 
