@@ -230,7 +230,7 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
     speed = float(medium.profile.at(depth(snap.position)))
     out = TransmitPaths.of(paths, bounced, facet, snap, speed)
-    out = out.select(picked(lit & (out.spreading != 0.0)))
+    out = out.select(picked(lit & (out.spreading != 0.0))).merged()
     own = facets.clear_of_own(bodies, out.facet, -out.arrival)
     out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet), own)))
     for number, before in overlapping(bodies):
@@ -238,7 +238,7 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
         of = out.facet[owned]
         again = _hides(array, before, snap, out.select(owned), 2.0 * facets.point[of] - facets.clear[of])  # from under
         out = out.select(np.delete(np.arange(len(out.facet)), owned[again]))
-    return out.merged()
+    return out
 
 
 def _hides(

@@ -78,17 +78,17 @@ class ExpansionSource:
         count, aperture = len(legs.row), self.place.probe.aperture
         if self.plain:
             return AperturePaths(ArrayExpansion.none(count, aperture), legs, self.place, None, None)
-        samples = ApertureSamples.room(count, *self.place.probe.basis.shape)
+        straight = self.place.propagation.straight(self.place.medium.profile)
+        samples = ApertureSamples.room(count, *self.place.probe.basis.shape, straight=straight)
         for members, model in self.families:
             first, last = np.searchsorted(members, (block.start, block.stop))
             rows = members[first:last] - block.start
             if model is None:
-                samples.put(rows, traced(legs.select(rows), self.place))
+                samples.put(rows, traced(legs.select(rows), self.place).known)
             elif isinstance(model, _FacetInterpolant):
                 samples.put(rows, model.at(legs.point[rows]))
             else:
-                samples.put(rows, ApertureSamples(**{name: value[first:last] for name, value in vars(model).items()}))
-        straight = self.place.propagation.straight(self.place.medium.profile)
+                samples.put(rows, {name: value[first:last] for name, value in model.known.items()})
         alike = [name for name in ("phase", "delay_variance") if not getattr(samples, name).any()]
         alike += ["delay"] if straight and not samples.delay.any() else []
         columns = samples.delay, np.empty((count, 0)), samples.phase, samples.delay_variance, samples.error
@@ -154,16 +154,16 @@ class _FacetInterpolant:
 
     middle: Floats  # (xyz) m
     half: Floats  # (xyz) m
-    coefficients: Floats  # (cubic, value): of the terms, gains and departures
-    parts: Ints  # (4,) where phases, blurs, gains and departures begin among them
+    coefficients: dict[str, Floats]  # (cubic, value): of what varies
     error: float  # s
 
-    def at(self, point: Floats) -> ApertureSamples:
-        """Legs from points (point, xyz), some of the family."""
-        values = row_products(aperture_terms((point - self.middle) / self.half, 1.0), self.coefficients)
-        delay, phase, variance, gain, away = np.split(values, self.parts, axis=1)
-        towards = away.reshape(*gain.shape, 3)
-        return ApertureSamples(delay, phase, variance, gain, towards, np.full(len(point), self.error))
+    def at(self, point: Floats) -> dict[str, Floats]:
+        """What is known of legs from points (point, xyz), some of the family."""
+        cubics = aperture_terms((point - self.middle) / self.half, 1.0)
+        known = {name: row_products(cubics, solved) for name, solved in self.coefficients.items()}
+        if "departure" in known:
+            known["departure"] = known["departure"].reshape(len(point), -1, 3)
+        return known | {"error": np.full(len(point), self.error)}
 
 
 def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: float) -> _FacetInterpolant | None:
@@ -171,19 +171,22 @@ def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: floa
     rate (rad/s): of the upper edge of the band."""
     middle, half = 0.5 * (point.min(axis=0) + point.max(axis=0)), np.maximum(0.5 * np.ptp(point, axis=0), 1e-9)
     at = aperture_terms((sample - middle) / half, 1.0)
-    degrees, sensors = exact.delay.shape[1], exact.gain.shape[1]
-    towards = exact.departure.reshape(len(sample), -1)
-    values = np.concatenate([exact.delay, exact.phase, exact.delay_variance, exact.gain, towards], axis=1)
-    splits = np.cumsum([degrees, degrees, degrees, sensors])
-    if not np.isfinite(values).all():
+    values = {name: value.reshape(len(sample), -1) for name, value in exact.known.items() if name != "error"}
+    if not all(np.isfinite(value).all() for value in values.values()):
         return None
     held_out = np.arange(len(sample)) % 4 == 3
-    coefficients = np.linalg.pinv(at[~held_out], rcond=1e-10) @ values[~held_out]
-    misfit = np.abs(at[held_out] @ coefficients - values[held_out]).max(axis=0)
-    wrong = np.split(misfit, splits)
-    late, turned, softer = (float(w.sum()) for w in wrong[:3])  # monomials over the aperture are at most 1
+    solve = np.linalg.pinv(at[~held_out], rcond=1e-10)
+    varying = {name: value for name, value in values.items() if (value != (name == "gain")).any()}
+    coefficients = {name: solve @ value[~held_out] for name, value in varying.items()}
+    wrong = dict.fromkeys(("delay", "phase", "delay_variance", "gain", "departure"), np.zeros(1))
+    wrong |= {
+        name: np.abs(at[held_out] @ solved - values[name][held_out]).max(axis=0)
+        for name, solved in coefficients.items()
+    }
+    # monomials over the aperture are at most 1
+    late, turned, softer = (float(wrong[name].sum()) for name in ("delay", "phase", "delay_variance"))
     smooth = late <= SMOOTH_TIME and turned <= SMOOTH_PHASE and softer <= SMOOTH_BLUR
-    if not (smooth and wrong[3].max() <= SMOOTH_GAIN and wrong[4].max() <= SMOOTH_DIRECTION):
+    if not (smooth and wrong["gain"].max() <= SMOOTH_GAIN and wrong["departure"].max() <= SMOOTH_DIRECTION):
         return None
     error = late + turned / rate + 0.5 * rate * softer + float(exact.error.max())
-    return _FacetInterpolant(middle, half, coefficients, splits, error)
+    return _FacetInterpolant(middle, half, coefficients, error)

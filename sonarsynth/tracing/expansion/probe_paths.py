@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,37 +38,44 @@ class ApertureSamples:
     phase: Floats
     delay_variance: Floats
     gain: Floats  # (leg, probe)
-    departure: Floats  # (leg, probe, xyz)
+    departure: Floats | None  # (leg, probe, xyz); None: towards the images of the probes
     error: Floats  # (leg,) s
 
     @staticmethod
-    def room(count: int, sensors: int, terms: int) -> ApertureSamples:
-        """Room for so many, at so many probes, with so many terms."""
+    def room(count: int, sensors: int, terms: int, *, straight: bool) -> ApertureSamples:
+        """Room for so many, at so many probes, with so many terms; straight: towards images."""
         delay, phase, variance = np.zeros((3, count, terms))
-        gain, departure = np.ones((count, sensors)), np.zeros((count, sensors, 3))
-        return ApertureSamples(delay, phase, variance, gain, departure, np.zeros(count))
+        departure = None if straight else np.zeros((count, sensors, 3))
+        return ApertureSamples(delay, phase, variance, np.ones((count, sensors)), departure, np.zeros(count))
 
-    def put(self, rows: Ints, samples: ApertureSamples) -> None:
-        """Write some of them."""
-        for name, value in vars(samples).items():
+    @property
+    def known(self) -> dict[str, Floats]:
+        """What there is, by name."""
+        return {name: value for name, value in vars(self).items() if value is not None}
+
+    def put(self, rows: Ints, values: dict[str, Floats]) -> None:
+        """Write what is known of some of them; the rest stays as it is in room."""
+        for name, value in values.items():
             getattr(self, name)[rows] = value
 
 
 def traced(legs: ReceivePaths, geometry: ReceiverGeometry) -> ApertureSamples:
     """Legs at the probes, each of them traced."""
-    samples = ApertureSamples.room(len(legs.row), *geometry.probe.basis.shape)
-    if geometry.propagation.straight(geometry.medium.profile):
+    straight = geometry.propagation.straight(geometry.medium.profile)
+    samples = ApertureSamples.room(len(legs.row), *geometry.probe.basis.shape, straight=straight)
+    if straight:
+        if not legs.bounces.any():
+            return samples
         departure = image(legs, geometry.probe.position, geometry.receiver.pose)
         residual, gain = np.zeros(samples.gain.shape), samples.gain
-        if not legs.bounces.any():
-            return replace(samples, departure=departure)
     else:
         residual, gain, departure = rays_to_probes(legs, geometry)
     probe, rate = geometry.probe, 2.0 * np.pi * geometry.receiver.band[1]
     turned, loss, softer = _boundaries(legs, departure, geometry.medium, geometry.receiver.centre)
     turned, softer = (np.where(np.isnan(residual), np.nan, value) for value in (turned, softer))
     (delay, late), (phase, off), (variance, soft) = (probe.expand(value) for value in (residual, turned, softer))
-    return ApertureSamples(delay, phase, variance, gain * loss, departure, late + off / rate + soft * 0.5 * rate)
+    error = late + off / rate + soft * 0.5 * rate
+    return ApertureSamples(delay, phase, variance, gain * loss, None if straight else departure, error)
 
 
 def image(legs: ReceivePaths, position: Floats, sonar_pose: Pose, rows: Ints | None = None) -> Floats:
