@@ -48,12 +48,18 @@ def bounces(
     sound_speed (m/s) is the water's at the boundary; frequency (Hz) as for `coefficient`. The blur of several bounces
     adds up by squares: they meet different pieces of the boundary. A reflection at an angle that is NaN gives NaN.
     """
-    times = np.asarray(count)
-    q = np.where(times > 0, np.asarray(grazing, float), 0.0)
+    times, angle = np.broadcast_arrays(np.asarray(count), np.asarray(grazing, float))
+    modulus, (phase, spread) = np.ones(times.shape), np.zeros((2, *times.shape))
+    met = times > 0
+    times, q = times[met], angle[met]
     once = coefficient(boundary, q, frequency) + 0.0  # no negative zeros: the phase of -1 is pi
-    modulus, phase = np.abs(once) ** times, np.angle(once) * times
-    spread = np.where(times > 0, np.sqrt(times) * delay_std(boundary, q, sound_speed), 0.0)
-    return Bounces(*(np.where(np.isnan(q), np.nan, x) for x in (modulus, phase, spread)))
+    none = np.where(np.isnan(q), np.nan, 1.0)
+    modulus[met], phase[met] = none * np.abs(once) ** times, none * np.angle(once) * times
+    if rms_height(boundary) != 0.0:
+        speed = np.broadcast_to(sound_speed, met.shape)[met]
+        spread[met] = np.sqrt(times) * delay_std(boundary, q, speed)
+    spread[met] *= none
+    return Bounces(modulus, phase, spread)
 
 
 def coefficient(boundary: SeaSurface | SeaBottom, grazing: npt.ArrayLike, frequency: float | None = None) -> Complexes:

@@ -38,6 +38,8 @@ def images(start: Floats, end: Floats, bottom_depth: float, bounces: int) -> lis
     return paths
 
 
-def order(pair: Ints, time: Floats) -> Ints:
-    """Indices that sort paths by pair, then by travel time; paths of one time stay as they are."""
-    return np.lexsort((time, pair))
+def order(time: Floats) -> Ints:
+    """Indices that sort the paths of all pairs, family after family with times (family, pair), by pair, then by travel
+    time; paths of one time stay as they are."""
+    family = np.argsort(time.T, axis=1, kind="stable")
+    return np.asarray((family * time.shape[1] + np.arange(time.shape[1])[:, None]).ravel())

@@ -93,5 +93,5 @@ class Straight(PathModel):
         if len(columns) == 1:
             return Paths(**columns[0])
         joined = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
-        rows = order(joined["pair"], joined["travel_time"])
+        rows = order(joined["travel_time"].reshape(len(columns), -1))
         return Paths(**{name: value[rows] for name, value in joined.items()})

@@ -30,6 +30,8 @@ from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arriva
 if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
 
+FEW = slice(QUADRATIC_PROBES)
+"""Probes that all echoes are followed to at first."""
 MAX_PHASE_CHANGE = 1.0
 """rad: a phase of reflection that varies by more over the aperture is not followed."""
 
@@ -89,12 +91,15 @@ class _EchoBlock:
         """Amplitude of the law (echo, probe) at all probes or the first few, and the gain of the legs there."""
         if few is not None:
             return self.few, self.gain
-        law = np.concatenate([g.over(self.departure(g.row)) for g in self.groups])
-        return law, self.array.fronts.gain(self.leg[_columns(self.groups, "row")[0]])
+        more = slice(QUADRATIC_PROBES, None)
+        law = np.concatenate([g.over(self.departure(g.row, more)) for g in self.groups])
+        return np.concatenate([self.few, law], axis=1), self.array.fronts.gain(
+            self.leg[_columns(self.groups, "row")[0]]
+        )
 
-    def departure(self, rows: Ints, few: int | None = None) -> Floats:
-        """Where each probe, or the first few, is seen from the facets of pairs (row, probe, xyz), as `_departure`."""
-        return _departure(self.array, self.leg[rows], None if self.carried is None else self.carried.select(rows), few)
+    def departure(self, rows: Ints, some: slice = slice(None)) -> Floats:
+        """Where some probes are seen from the facets of pairs (row, probe, xyz), as `_departure`."""
+        return _departure(self.array, self.leg[rows], None if self.carried is None else self.carried.select(rows), some)
 
     def seen(self) -> EchoLevels:
         """What decides which of them are kept."""
@@ -186,7 +191,7 @@ def _found(array: FacetPaths, snap: Emission, components: tuple[tuple[Component,
         out, carried = _carried(array, snap, out, leg)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
     groups = echo_batches(array, out, leg, components, carried, factor)
-    away = [_departure(array, leg[g.row], carried and carried.select(g.row), QUADRATIC_PROBES) for g in groups]
+    away = [_departure(array, leg[g.row], carried and carried.select(g.row), FEW) for g in groups]
     few = np.concatenate([g.over(of) for g, of in zip(groups, away, strict=True)])
     pulses = PulseResponse.join([g.pulses(array.context.receiver.centre) for g in groups])
     rows = leg[_columns(groups, "row")[0]]
@@ -205,10 +210,10 @@ def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -
     return met_out, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
 
 
-def _departure(array: FacetPaths, leg: Ints, carried: MotionTerms | None, few: int | None) -> Floats:
-    """Where each probe, or the first few, is seen from facets (row, probe, xyz): world, in axes that turn with what
+def _departure(array: FacetPaths, leg: Ints, carried: MotionTerms | None, some: slice) -> Floats:
+    """Where some probes are seen from facets (row, probe, xyz): world, in axes that turn with what
     turns."""
-    away = array.fronts.departure(leg, few)
+    away = array.fronts.departure(leg, some)
     if carried is None:
         return away
     return carried.turned_back(carried.departure(array.legs.length[leg], away))

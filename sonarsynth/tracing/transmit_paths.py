@@ -69,8 +69,7 @@ class TransmitPaths:
         if first.all():
             return self
         number = np.cumsum(first) - 1
-        value = np.zeros(number[-1] + 1, complex)
-        np.add.at(value, number, self.spreading * self.boundary * np.exp(1j * self.phase))
+        value = np.add.reduceat(self.spreading * self.boundary * np.exp(1j * self.phase), np.flatnonzero(first))
         order = np.lexsort((self.bounces, number))
         merged = self.select(order[np.flatnonzero(np.diff(number[order], prepend=-1))])  # by the fewest bounces
         return replace(merged, boundary=np.abs(value) / merged.spreading, phase=np.angle(value + 0.0))

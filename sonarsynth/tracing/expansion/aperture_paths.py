@@ -48,11 +48,11 @@ class AperturePaths:
     probe_departure: Floats | None  # (leg, probe, xyz) world; None: towards the images of the probes
     probe_gain: Floats | None  # (leg, probe); None: 1
 
-    def departure(self, rows: Ints, few: int | None = None) -> Floats:
-        """Where each probe, or the first few, is seen from the points of some legs: (row, probe, xyz), world."""
+    def departure(self, rows: Ints, some: slice = slice(None)) -> Floats:
+        """Where some probes are seen from the points of some legs: (row, probe, xyz), world."""
         if self.probe_departure is not None:
-            return self.probe_departure[:, :few][rows]
-        return image(self.legs, self.place.probe.position[:few], self.place.receiver.pose, rows)
+            return self.probe_departure[:, some][rows]
+        return image(self.legs, self.place.probe.position[some], self.place.receiver.pose, rows)
 
     def gain(self, rows: Ints, few: int | None = None) -> Floats:
         """Amplitude at each probe, or the first few, over that of the sphere (row, probe); 1 in uniform water."""

@@ -62,18 +62,18 @@ class Occlusion:
         """
         if self.elements is None or self.elements.count == 1 or not self.bodies:
             end = np.broadcast_to(self.receiver.pose.position, starts.point.shape)
-            ray, own = (
-                (starts.point, end, legs.departure, legs.length),
+            own, ray = (
                 starts.clear_of_own(self.bodies, legs.departure),
+                (starts.point, end, legs.departure, legs.length),
             )
             hides = hidden(self.bodies, self.bending, *ray, bounces=legs.bounces, turning=legs.turning, own=own)
             return legs.select(picked(~hides))
         certain = self._certain(legs, starts)
         in_sight, mixed = certain != CLOSED, certain == UNKNOWN
-        first = np.append(0, 1 + rim(self.elements))
-        for kind in (UNKNOWN, NO_CONE):
+        centre = np.zeros(1, int)  # of those that stay open
+        for kind, first in ((UNKNOWN, centre), (NO_CONE, np.append(centre, 1 + rim(self.elements)))):
             for rows in self._parts(legs, np.flatnonzero(certain == kind), len(first)):
-                swerve = self._swerve(legs.select(rows), first) if kind == NO_CONE else None  # others stay open
+                swerve = self._swerve(legs.select(rows), first) if kind == NO_CONE else None
                 unseen = self._unseen(legs, starts, rows, first, swerve)
                 in_sight[rows] = ~unseen.all(axis=1)
                 mixed[rows] |= unseen.any(axis=1)
