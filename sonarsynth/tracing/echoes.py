@@ -30,8 +30,8 @@ from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arriva
 if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
 
-FEW = slice(QUADRATIC_PROBES)
-"""Probes that all echoes are followed to at first."""
+FEW, MORE = slice(QUADRATIC_PROBES), slice(QUADRATIC_PROBES, None)
+"""Probes that all echoes are followed to at first, and the others."""
 MAX_PHASE_CHANGE = 1.0
 """rad: a phase of reflection that varies by more over the aperture is not followed."""
 
@@ -91,11 +91,9 @@ class _EchoBlock:
         """Amplitude of the law (echo, probe) at all probes or the first few, and the gain of the legs there."""
         if few is not None:
             return self.few, self.gain
-        more = slice(QUADRATIC_PROBES, None)
-        law = np.concatenate([g.over(self.departure(g.row, more)) for g in self.groups])
-        return np.concatenate([self.few, law], axis=1), self.array.fronts.gain(
-            self.leg[_columns(self.groups, "row")[0]]
-        )
+        (row,) = _columns(self.groups, "row")
+        more = np.concatenate([g.over(self.departure(g.row, MORE)) for g in self.groups])
+        return np.concatenate([self.few, more], axis=1), self.array.fronts.gain(self.leg[row])
 
     def departure(self, rows: Ints, some: slice = slice(None)) -> Floats:
         """Where some probes are seen from the facets of pairs (row, probe, xyz), as `_departure`."""
@@ -211,8 +209,7 @@ def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -
 
 
 def _departure(array: FacetPaths, leg: Ints, carried: MotionTerms | None, some: slice) -> Floats:
-    """Where some probes are seen from facets (row, probe, xyz): world, in axes that turn with what
-    turns."""
+    """Where some probes are seen from facets (row, probe, xyz): world, in axes that turn with what turns."""
     away = array.fronts.departure(leg, some)
     if carried is None:
         return away
