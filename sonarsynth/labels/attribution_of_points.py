@@ -112,7 +112,8 @@ def attribution(
     gate, reach = GATE / width, elements.aperture / listening.sound_speed
     clock = _clock(arrivals, listening.clock, gate)
     moment = clock + late
-    longer = np.abs(arrivals.corner_delays).max(axis=1, initial=0.0)
+    corners = np.abs(arrivals.corner_delays).T
+    longer = np.maximum(np.maximum(corners[0], corners[1]), corners[2])
     slowness = listening.sound_speed / arrivals.sound_speed
     across = gate + reach * kernels.farthest(arrivals.direction, slowness, beam)
     window = np.array([[-1.0], [1.0]]) * (across + longer.max(initial=0.0))
@@ -148,7 +149,7 @@ def attribution(
         longer[rows],
         group,
         arrivals.direct[example],
-        _spectra(arrivals, rows, elements, fine),
+        _spectra(arrivals, rows, longer > 0.0, elements, fine),
         _matched(fine)[groups[1]],
         pulse,
         fine.frequency,
@@ -186,8 +187,9 @@ def _clock(arrivals: Arrivals, clock: float, gate: float) -> float:
     return near if abs(near - clock) < gate else clock
 
 
-def _spectra(arrivals: Arrivals, rows: Ints, elements: Elements, band: Band) -> kernels.Complexes:
-    """Spectra (path, bin) that elements hear of some paths (path,), over that of the snap at 1 m, without delay."""
+def _spectra(arrivals: Arrivals, rows: Ints, wide: Bools, elements: Elements, band: Band) -> kernels.Complexes:
+    """Spectra (path, bin) that elements hear of some paths (path,), over that of the snap at 1 m, without delay; wide
+    (path of all,): whose facets are heard for some time."""
     amplitude = arrivals.amplitude[rows]
     if arrivals.occluded.shape[1]:  # of the array, as much as sees it
         occluded = arrivals.occluded[rows]
@@ -200,13 +202,13 @@ def _spectra(arrivals: Arrivals, rows: Ints, elements: Elements, band: Band) -> 
     if delay_std.any():
         decay -= np.outer(0.5 * (2.0 * np.pi * delay_std) ** 2, frequency**2)
     spectra = kernels.path_spectra(amplitude, arrivals.phase[rows], np.exp(decay), sine, frequency)
-    shaped = arrivals.coherent | arrivals.corner_delays.any(axis=1) | (arrivals.coherent_fraction > 0.0)
+    shaped = (arrivals.coherent | wide | (arrivals.coherent_fraction > 0.0))[rows]
     if shaped.any():
-        echo = arrivals.select(rows[shaped[rows]])
+        echo = arrivals.select(rows[shaped])
         shape = facet_response(
             frequency, echo.coherent, echo.corner_delays, echo.coherent_fraction, echo.height_delay_std, echo.centre
         )
-        spectra[shaped[rows]] *= shape
+        spectra[shaped] *= shape
     return spectra
 
 

@@ -19,11 +19,11 @@ def echo_levels(arrivals: Arrivals, powers: Powers, targets: int, snap_level: Fl
     alone = np.flatnonzero(~arrivals.direct & ~arrivals.coherent)
     path = np.concatenate([alone, powers.part])
     cell = arrivals.target[path] * len(FAMILIES) + arrivals.arrives_by[path]
-    loud = 10.0 ** (np.asarray(snap_level, float)[arrivals.snap[path]] / 10.0)
-    power = np.concatenate([powers.steps[-1, alone], powers.part_power])
-    along = np.concatenate([powers.steps[-1, alone, None] * arrivals.direction[alone], powers.part_direction])
-    total = np.bincount(cell, power * loud, size)
-    sums = [np.bincount(cell, component * loud, size) for component in along.T]
+    loud = (10.0 ** (np.asarray(snap_level, float) / 10.0))[arrivals.snap[path]]
+    own = powers.steps[-1, alone]
+    total = np.bincount(cell, np.concatenate([own, powers.part_power]) * loud, size)
+    columns = zip(arrivals.direction.T, powers.part_direction.T, strict=True)
+    sums = [np.bincount(cell, np.concatenate([own * one[alone], part]) * loud, size) for one, part in columns]
     level, azimuth, elevation = np.full(size, np.nan), np.full(size, np.nan), np.full(size, np.nan)
     audible = total > 0.0
     level[audible] = 10.0 * np.log10(total[audible])

@@ -58,7 +58,7 @@ def link_budget(
 def _cells(arrivals: Arrivals, shape: tuple[int, int, int]) -> Ints:
     """(path,) number of its snap, target (the direct path after them) and family, of a table of that shape."""
     which = np.where(arrivals.direct, shape[1] - 1, arrivals.target)
-    return np.asarray(np.ravel_multi_index((arrivals.snap, which, family(arrivals)), shape))
+    return np.asarray((arrivals.snap * shape[1] + which) * shape[2] + family(arrivals))
 
 
 def _loudest(arrivals: Arrivals, powers: Powers, band: Band, cell: Ints, size: int) -> Ints:

@@ -169,7 +169,9 @@ def meeting_times(tracks: Sequence[Track], snaps: tuple[Emission, ...], travel_t
 
 def positions(tracks: Sequence[Track], times: Floats) -> Floats:
     """Where tracks are (snap, track, xyz) m, world, at times (snap, track) s of the frame; NaN where these are."""
-    places = np.empty((*times.shape, 3))
+    places, unknown = np.empty((*times.shape, 3)), np.isnan(times)
+    known = np.where(unknown, 0.0, times)
     for number, track in enumerate(tracks):
-        places[:, number] = track.positions(np.nan_to_num(times[:, number]))
-    return np.where(np.isnan(times)[..., None], np.nan, places)
+        places[:, number] = track.positions(known[:, number])
+    places[unknown] = np.nan
+    return places
