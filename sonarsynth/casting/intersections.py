@@ -53,10 +53,12 @@ def confirm(
     size: float,
     facet: Ints,
     distance: Floats,
+    any_hit: bool = False,
 ) -> None:
     """The nearest hit in [near, far] among each proposed facet and those that share a corner with it; -1, NaN for none.
 
-    first, around: facets round each vertex, around[first[v] : first[v + 1]].
+    first, around: facets round each vertex, around[first[v] : first[v + 1]]; any_hit: that of the proposed one, where
+    there is one, will do.
     """
     tolerance = EDGE * size * size
     for i in range(len(proposed)):
@@ -64,6 +66,11 @@ def confirm(
         if proposed[i] < 0:
             continue
         best = math.inf
+        if any_hit:
+            t = distance_to_facet(origin[i], direction[i], vertices, faces, proposed[i], tolerance)
+            if near[i] <= t <= far[i]:
+                facet[i], distance[i] = proposed[i], t
+                continue
         for corner in range(3):
             vertex = faces[proposed[i], corner]
             for j in range(first[vertex], first[vertex + 1]):

@@ -120,8 +120,9 @@ class CastingMesh:
         distance[open_rays] = along + entry[open_rays]
         return facet, distance
 
-    def within(self, start: Floats, heading: Floats, limit: Floats) -> tuple[Ints, Floats]:
-        """The same of rays that start at the bounding sphere or within it, and end within `limit`."""
+    def within(self, start: Floats, heading: Floats, limit: Floats, *, any_hit: bool = False) -> tuple[Ints, Floats]:
+        """The same of rays that start at the bounding sphere or within it, and end within `limit`; any_hit: of another
+        hit perhaps than the nearest."""
         from sonarsynth.casting import intersections
 
         facet, distance = np.full(len(start), NO_TARGET), np.full(len(start), np.nan)
@@ -134,7 +135,7 @@ class CastingMesh:
             hit, along = np.empty(len(candidate), np.int64), np.empty(len(candidate))
             near, far = np.zeros(len(candidate)), np.fmin(limit, beyond + SLACK)
             mesh = self.vertices, self.faces, *self.around
-            intersections.confirm(start, heading, near, far, proposed[candidate], *mesh, 1.0, hit, along)
+            intersections.confirm(start, heading, near, far, proposed[candidate], *mesh, 1.0, hit, along, any_hit)
             facet[rays], distance[rays] = hit, along
             again = np.flatnonzero(hit < 0)
             if not len(again):
@@ -285,6 +286,6 @@ def occluded(
         )
         if not count:
             continue
-        facet, _ = ready.within(origin[:count], heading[:count], far[:count])
+        facet, _ = ready.within(origin[:count], heading[:count], far[:count], any_hit=True)
         hidden[segment[:count]] = facet >= 0
     return hidden

@@ -156,12 +156,15 @@ def mean_powers(
     First of what a facet does to the pulse, (f/centre)^2 of a coherent one (its mean left out) or 1 - w exp(-g^2) of a
     rough one (`facet_pulses`); then with echo_delay_std (path,) s, the facet's part of it; then with absorption of
     loss (path,) dB at the centre, relative (bin,) more at the other frequencies; then with the rest of delay_std
-    (path,) s as well. weight (snap, bin) sums to 1.
+    (path,) s as well. weight (snap, bin) sums to 1. What a loss is more or less than their mean is taken by a
+    series where it is `SMALL`.
     """
     out = np.zeros((4, loss.size))
-    omega = 2.0 * math.pi * frequency
+    omega, shared = 2.0 * math.pi * frequency, math.log(10.0) / 10.0 * loss.mean()
+    fade, largest = np.exp(-shared * relative), np.abs(relative).max()
     for e in range(loss.size):
-        decay = math.log(10.0) / 10.0 * loss[e]
+        decay = math.log(10.0) / 10.0 * loss[e] - shared
+        small = abs(decay) * largest < SMALL
         own = echo_delay_std[e] ** 2
         others = max(delay_std[e] ** 2 - own, 0.0)
         for k in range(frequency.size):
@@ -175,7 +178,8 @@ def mean_powers(
             if own > 0.0:
                 power *= math.exp(-(omega[k] ** 2) * own)
             out[1, e] += power
-            power *= math.exp(-decay * relative[k])
+            x = -decay * relative[k]
+            power *= fade[k] * (1.0 + x * (1.0 + 0.5 * x * (1.0 + x / 3.0)) if small else math.exp(x))
             out[2, e] += power
             if others > 0.0:
                 power *= math.exp(-(omega[k] ** 2) * others)

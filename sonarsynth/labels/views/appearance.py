@@ -27,7 +27,7 @@ class Appearance(NamedTuple):
     """A body as the array sees it."""
 
     corners: Floats  # (vertex, xyz) m, sonar frame: where they appear; NaN where no ray arrives (a shadow)
-    boxes: Floats  # (facet, 4) rad: `facet_boxes` of all facets
+    boxes: Floats  # (facet, 4) rad: `facet_boxes`
     full_box: Floats  # (4,) rad: of all of them; NaN where none is ahead
     visible: Ints  # facets that the array sees, in the view of the beams or not
     fraction: float  # their share of the area that faces the array
@@ -39,7 +39,10 @@ def appearance(
 ) -> Appearance:
     """A body among all bodies; connect: None where rays are straight."""
     corners = _apparent(body, sonar_pose, connect)
-    boxes, visible = facet_boxes(corners, body.mesh.faces), _visible(body, corners, bodies, sonar_pose)
+    boxes, visible = (
+        facet_boxes(corners, body.mesh.faces, body.mesh.closed),
+        _visible(body, corners, bodies, sonar_pose),
+    )
     return Appearance(corners, boxes, whole_box(boxes), *visible, bent=connect is not None)
 
 

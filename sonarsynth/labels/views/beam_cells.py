@@ -17,6 +17,7 @@ import numpy.typing as npt
 from sonarsynth.casting.intersections import EDGE, distance_to_facet
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, direction
+from sonarsynth.labels.views.view_kernels import shows_outer_side
 from sonarsynth.receiver import BeamGrid
 
 DIRECTIONS, STEP = 610, 377
@@ -80,25 +81,17 @@ def cells_of(beams: BeamGrid) -> Cells:
 
 
 @compiled
-def _planes(corners: Floats, a: int, b: int, c: int, outside: bool, planes: Floats) -> bool:
-    """Write inward normals (3, xyz) of the planes through the origin and each side of a triangle; returns whether it is
-    to be looked at: `outside`, where its outer side, from which its corners are counter-clockwise, is seen."""
-    ax, ay, az = corners[a, 0], corners[a, 1], corners[a, 2]
+def _planes(corners: Floats, a: int, b: int, c: int, planes: Floats) -> None:
+    """Write inward normals (3, xyz) of the planes through the origin and each side of a triangle of points (vertex,
+    xyz)."""
+    sign = -1.0 if shows_outer_side(corners, a, b, c) else 1.0
+    ax, ay, az = sign * corners[a, 0], sign * corners[a, 1], sign * corners[a, 2]
     bx, by, bz = corners[b, 0], corners[b, 1], corners[b, 2]
-    cx, cy, cz = corners[c, 0], corners[c, 1], corners[c, 2]
-    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    outer = cx * x + cy * y + cz * z < 0.0
-    if outside and not outer:
-        return False
-    sign = -1.0 if outer else 1.0
-    planes[0, 0], planes[0, 1], planes[0, 2] = sign * x, sign * y, sign * z
-    planes[1, 0], planes[1, 1], planes[1, 2] = (
-        sign * (by * cz - bz * cy), sign * (bz * cx - bx * cz), sign * (bx * cy - by * cx)
-    )  # fmt: skip
-    planes[2, 0], planes[2, 1], planes[2, 2] = (
-        sign * (cy * az - cz * ay), sign * (cz * ax - cx * az), sign * (cx * ay - cy * ax)
-    )  # fmt: skip
-    return True
+    cx, cy, cz = sign * corners[c, 0], sign * corners[c, 1], sign * corners[c, 2]
+    planes[0, 0], planes[0, 1], planes[0, 2] = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    planes[1, 0], planes[1, 1], planes[1, 2] = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    ax, ay, az = sign * ax, sign * ay, sign * az
+    planes[2, 0], planes[2, 1], planes[2, 2] = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
 
 
 @compiled
@@ -129,16 +122,16 @@ def _mark(
 
 @compiled
 def _look(
-    corners: Floats, faces: Int32s, boxes: Floats, cells: Cells, outside: bool, tolerance: float, body: int,
+    corners: Floats, faces: Int32s, boxes: Floats, cells: Cells, tolerance: float, body: int,
     covered: Words, count: npt.NDArray[np.int16], target: npt.NDArray[np.int16], facet: Int32s, nearest: Floats,
 ) -> None:  # fmt: skip
     """Mark the directions that meet triangles (facet, 3) of points (vertex, xyz) with boxes (facet, 4) rad in bits
     (row, column, word), and count them (row, column); and write body, facet and distance (row, column) where beams meet
-    them before anything else. `outside` a closed surface those that show their outer side are met."""
+    them before anything else."""
     rows, columns, directions = len(cells.sine), len(cells.azimuth), cells.sine.shape[1]
     planes, centre, azimuth, elevation = np.empty((3, 3)), np.zeros(3), cells.beam[0], cells.beam[1]
     for f in range(len(faces)):
-        if not boxes[f, 0] <= boxes[f, 1]:  # NaN: behind, or in a shadow
+        if not boxes[f, 0] <= boxes[f, 1]:  # NaN: nothing of it is seen
             continue
         west, east, low, high = boxes[f, 0], boxes[f, 1], boxes[f, 2], boxes[f, 3]
         left = max(math.floor((west - cells.first[0]) / cells.step[0]), 0)
@@ -147,8 +140,7 @@ def _look(
         top = min(math.floor((high - cells.first[1]) / cells.step[1]), rows - 1)
         if left > right or bottom > top:
             continue
-        if not _planes(corners, faces[f, 0], faces[f, 1], faces[f, 2], outside, planes):
-            continue
+        _planes(corners, faces[f, 0], faces[f, 1], faces[f, 2], planes)
         lowest, highest = math.sin(low), math.sin(high)
         for row in range(bottom, top + 1):
             crossed = low - MARGIN <= elevation[row] <= high + MARGIN
@@ -170,23 +162,17 @@ class BeamViews(NamedTuple):
     coverage: npt.NDArray[np.float32]  # share of the solid angle of the cell: 0.002 rms at one edge
 
 
-def beam_views(bodies: Sequence[tuple[Floats, np.ndarray, Floats, bool]], beams: BeamGrid) -> BeamViews:
+def beam_views(bodies: Sequence[tuple[Floats, np.ndarray, Floats]], beams: BeamGrid) -> BeamViews:
     """What the beams of a grid meet of bodies.
 
-    bodies: corners seen (vertex, xyz), sonar frame, facets (facet, 3) of them, their `facet_boxes`, and whether they
-    are a closed surface.
+    bodies: corners seen (vertex, xyz), sonar frame, facets (facet, 3) of them, and their `facet_boxes`.
     """
     cells, shape = cells_of(beams), (beams.elevations, beams.azimuths)
     covered, count = np.zeros((*shape, (DIRECTIONS + 63) // 64), np.uint64), np.zeros(shape, np.int16)
     target, facet = np.full(shape, NO_TARGET, np.int16), np.full(shape, NO_TARGET, np.int32)
     nearest = np.full(shape, np.inf)
-    for number, (corners, faces, boxes, closed) in enumerate(bodies):
-        columns = corners.T.copy()
-        low, high = columns.min(axis=1, initial=np.inf), columns.max(axis=1, initial=-np.inf)
-        beside = bool(np.isfinite(low + high).all() and (low.max() >= 0.0 or high.min() <= 0.0))
-        tolerance = 3.0 * EDGE * float(np.nanmax(np.abs(columns), initial=0.0)) ** 2
-        _look(
-            corners, faces, boxes, cells, closed and beside, tolerance, number, covered, count, target, facet, nearest
-        )
+    for number, (corners, faces, boxes) in enumerate(bodies):
+        tolerance = 3.0 * EDGE * float(np.nanmax(np.abs(corners), initial=0.0)) ** 2
+        _look(corners, faces, boxes, cells, tolerance, number, covered, count, target, facet, nearest)
     away = np.where(np.isfinite(nearest), nearest, np.nan).astype(np.float32)
     return BeamViews(target, facet, away, (count / DIRECTIONS).astype(np.float32))

@@ -19,11 +19,17 @@ class BoxInView(NamedTuple):
     view: View
 
 
-def facet_boxes(corners: Floats, faces: np.ndarray) -> Floats:
+def facet_boxes(corners: Floats, faces: np.ndarray, closed: bool = False) -> Floats:
     """Bounds (facet, 4) in rad of what of each facet (facet, 3) of corners seen (vertex, xyz), sonar frame, is ahead of
-    the sonar, x > 0: azimuth min, max, elevation min, max; NaN where nothing is, or a corner is NaN."""
-    boxes = np.empty((len(faces), 4))
-    view_kernels.boxes_ahead(np.ascontiguousarray(corners, float), faces, boxes)
+    the sonar, x > 0: azimuth min, max, elevation min, max; NaN where nothing is, or a corner is NaN.
+
+    closed: whether they are a closed surface. Where the sonar is beside it, those whose inner side it would see have
+    NaN too: others are before them.
+    """
+    boxes, columns = np.empty((len(faces), 4)), corners.T.copy()
+    low, high = columns.min(axis=1, initial=np.inf), columns.max(axis=1, initial=-np.inf)
+    outside = closed and bool(np.isfinite(low + high).all() and (low.max() >= 0.0 or high.min() <= 0.0))
+    view_kernels.boxes_ahead(np.ascontiguousarray(corners, float), faces, outside, boxes)
     return boxes
 
 

@@ -123,15 +123,28 @@ def bounds(corners: Floats, faces: Ints, azimuth: float, elevation: float, out: 
 
 
 @compiled
-def boxes_ahead(corners: Floats, faces: Ints, boxes: Floats) -> None:
+def shows_outer_side(corners: Floats, a: int, b: int, c: int) -> bool:
+    """Whether the origin sees the side of a triangle of points (vertex, xyz) on which a, b, c are counter-clockwise."""
+    x = corners[a, 1] * corners[b, 2] - corners[a, 2] * corners[b, 1]
+    y = corners[a, 2] * corners[b, 0] - corners[a, 0] * corners[b, 2]
+    z = corners[a, 0] * corners[b, 1] - corners[a, 1] * corners[b, 0]
+    return bool(corners[c, 0] * x + corners[c, 1] * y + corners[c, 2] * z < 0.0)
+
+
+@compiled
+def boxes_ahead(corners: Floats, faces: Ints, outside: bool, boxes: Floats) -> None:
     """Write bounds (facet, 4) in azimuth and elevation (rad) of the part of each triangle (facet, 3) of points (vertex,
-    xyz) that is ahead, x > 0; NaN where none is, or a corner is NaN."""
-    seen, extreme = np.empty((len(corners), 2)), np.empty(3)
-    for v in range(len(corners)):
-        x, y, z = corners[v, 0], corners[v, 1], corners[v, 2]
-        seen[v, 0], seen[v, 1] = math.atan(y / abs(x)), math.atan(z / math.sqrt(x * x + y * y))
+    xyz) that is ahead, x > 0; NaN where none is, or a corner is NaN, or, `outside`, its outer side is not seen."""
+    seen, extreme = np.full((len(corners), 2), np.nan), np.empty(3)
     for f in range(len(faces)):
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        if outside and not shows_outer_side(corners, i, j, k):
+            boxes[f, 0] = boxes[f, 1] = boxes[f, 2] = boxes[f, 3] = np.nan
+            continue
+        for v in (i, j, k):
+            if math.isnan(seen[v, 0]):
+                x, y, z = corners[v, 0], corners[v, 1], corners[v, 2]
+                seen[v, 0], seen[v, 1] = math.atan(y / abs(x)), math.atan(z / math.sqrt(x * x + y * y))
         if not (corners[i, 0] > 0.0 and corners[j, 0] > 0.0 and corners[k, 0] > 0.0):
             box_of_part_ahead(corners, faces[f], boxes[f])
             continue
