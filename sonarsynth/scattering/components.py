@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -16,26 +16,55 @@ from sonarsynth.scattering.kirchhoff_surface import KirchhoffSurface, reflection
 from sonarsynth.scattering.random_signs import random_polarity
 
 
-class Component(Protocol):
-    """One part of the echo of a facet.
+class Component:
+    """One part of the echo of a facet: `amplitude`, `pulses` and `polarity` are its own, the rest may stay as here.
 
     Directions are unit vectors of propagation (..., xyz) in the frame of the body, in and away.
     """
+
+    needs_corners = True
+    """Whether it needs more of a facet than normal and area."""
+    turns = False
+    """Whether the phase of its reflections differs from direction to direction."""
 
     def amplitude(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
         """Far-field amplitude (...) in m at a wavenumber (...) (rad/m), but for `pulses`; of echoes never negative.
 
         0 where a facet is not lit, or, for an echo, not seen.
         """
-        ...
+        raise NotImplementedError(f"{type(self).__name__} has no amplitude")
 
     def pulses(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> PulseResponse:
-        """What it makes of the pulse, for directions (path, xyz) and sound speeds (path,) in m/s."""
-        ...
+        """What it makes of the pulse, for directions (path, xyz) and sound speeds (path,) in m/s: here nothing."""
+        return PulseResponse.plain(len(incident))
 
     def polarity(self, mesh: Mesh) -> Floats:
-        """Sign (facet,) of the echo of each facet: f is the amplitude times it."""
-        ...
+        """Sign (facet,) of the echo of each facet: f is the amplitude times it. Here the amplitude has it."""
+        return np.ones(len(mesh.faces))
+
+    def past_limb(self) -> Component:
+        """The same, going on where a facet is lit but not seen, for arrays of which some hydrophones see it and are
+        told from those that do not; here there is nothing that ends."""
+        return self
+
+    def amplitudes_in(
+        self, away: Floats, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats
+    ) -> Floats:
+        """Amplitude (path, direction) in directions `away` (path, direction, xyz) other than `scattered` (path, xyz),
+        at a wavenumber (path,)."""
+        return self.amplitude(incident[:, None], away, patch.over(), wavenumber[:, None])
+
+    def tapers(self, patch: FacetGeometry) -> Bools:
+        """Where (facet,) the echo falls to 0 towards the limb of the body, rather than ending there."""
+        return np.zeros(len(patch.area), bool)
+
+    def phase(self, incident: Floats, scattered: Floats) -> Floats:
+        """Phase (...) of the reflection coefficient in rad, which directions change where `turns`."""
+        return np.zeros(np.broadcast_shapes(incident.shape, scattered.shape)[:-1])
+
+    def spot(self, patch: FacetGeometry) -> Floats:
+        """Where on its facet each echo comes from (facet, xyz) m, from the middle: here means over facets."""
+        return np.zeros((len(patch.area), 3))
 
 
 class PulseRepeating(Protocol):
@@ -53,21 +82,21 @@ class PulseRepeating(Protocol):
 
 
 @dataclass(frozen=True)
-class Lobe:
+class Lobe(Component):
     """A law that repeats the pulse."""
 
     law: PulseRepeating
     beyond: bool = False
-    """Whether the amplitude goes on where a facet is lit but not seen: for arrays of which some hydrophones see it, and
-    are told from those that do not."""
+    """Whether the amplitude goes on where a facet is lit but not seen."""
+    needs_corners = False
 
     def amplitude(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
         """As `Component.amplitude`: the same at all wavenumbers."""
         return self.law.amplitude(incident, scattered, patch.normal, patch.area, self.beyond)
 
-    def pulses(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> PulseResponse:
-        """As `Component.pulses`: none."""
-        return PulseResponse.plain(len(incident))
+    def past_limb(self) -> Lobe:
+        """As `Component.past_limb`."""
+        return replace(self, beyond=True)
 
     def polarity(self, mesh: Mesh) -> Floats:
         """As the law says."""
@@ -75,7 +104,7 @@ class Lobe:
 
 
 @dataclass(frozen=True)
-class CoherentKirchhoff:
+class CoherentKirchhoff(Component):
     """The coherent part of a Kirchhoff facet: it mirrors as far as it is large, and the phases of facets add up.
 
     f = V (i k/4 pi) A n.(ks - ki) 2 exp[corners] exp(-g^2/2) (`equations.scattering.kirchhoff_integral`,
@@ -114,26 +143,26 @@ class CoherentKirchhoff:
         return PulseResponse(np.ones(count, bool), corners, zero, zero, zero, phase, delay_std)
 
     def phase(self, incident: Floats, scattered: Floats) -> Floats:
-        """Phase (...) of the reflection coefficient in rad, which directions change where `turns`."""
+        """As `Component.phase`."""
         return np.asarray(np.angle(reflection(self.law, incident, scattered)))
 
     def tapers(self, patch: FacetGeometry) -> Bools:
-        """Where (facet,) the echo falls to 0 towards the limb of the body, rather than ending there (`edges`)."""
+        """As `Component.tapers`: by `edges`."""
         smooth = {"auto": patch.curved, "smooth": np.ones_like(patch.curved), "sharp": np.zeros_like(patch.curved)}
         return smooth[self.law.edges]
 
     @property
-    def turns(self) -> bool:
-        """Whether the phase differs from direction to direction."""
+    def turns(self) -> bool:  # type: ignore[override]
+        """As `Component.turns`."""
         return not isinstance(self.law.surface, str)
 
-    def polarity(self, mesh: Mesh) -> Floats:
-        """All alike: the sign is the reflection coefficient's."""
-        return np.ones(len(mesh.faces))
+    def past_limb(self) -> CoherentKirchhoff:
+        """As `Component.past_limb`."""
+        return replace(self, beyond=True)
 
 
 @dataclass(frozen=True)
-class DiffuseKirchhoff:
+class DiffuseKirchhoff(Component):
     """The incoherent part of a Kirchhoff facet: the lobe of the slopes and Lambert's floor
     (`equations.scattering.roughness`).
 
@@ -157,16 +186,25 @@ class DiffuseKirchhoff:
         lobe, floor = self._powers(incident, scattered, patch)
         return np.sqrt(patch.area * (lobe + floor))
 
-    def gain(
-        self, incident: Floats, scattered: Floats, away: Floats, patch: FacetGeometry, wavenumber: Floats
+    def past_limb(self) -> DiffuseKirchhoff:
+        """As `Component.past_limb`."""
+        return replace(self, beyond=True)
+
+    def spot(self, patch: FacetGeometry) -> Floats:
+        """As `Component.spot`: one point of each facet."""
+        return patch.spot
+
+    def amplitudes_in(
+        self, away: Floats, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats
     ) -> Floats:
-        """Amplitude (path, direction) of what is sent in directions `away` (path, direction, xyz) over that in
-        `scattered` (path, xyz), at a wavenumber (path,) (rad/m): low heights send more where they are seen more
-        squarely, great ones do not."""
+        """As `Component.amplitudes_in`: low heights send more where they are seen more squarely, great ones do not."""
+        if self.law.roughness == 0.0:
+            return super().amplitudes_in(away, incident, scattered, patch, wavenumber)
         sent = self._sent(incident[:, None], away, patch.over(), wavenumber[:, None])
         base = self._sent(incident, scattered, patch, wavenumber)[:, None]
         both = (sent > 0.0) & (base > 0.0)
-        return np.where(both, np.sqrt(np.divide(sent, base, out=np.ones_like(sent), where=both)), sent > 0.0)
+        gain = np.where(both, np.sqrt(np.divide(sent, base, out=np.ones_like(sent), where=both)), sent > 0.0)
+        return np.asarray(self.amplitude(incident, scattered, patch, wavenumber)[:, None] * gain)
 
     def _sent(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
         """Power (...) in m2 that is sent without phase in common."""
@@ -189,7 +227,7 @@ class DiffuseKirchhoff:
 
 
 @dataclass(frozen=True)
-class Shadow:
+class Shadow(Component):
     """The wave that makes the shadow behind lit facets, seen or not: what the textbook's factor holds besides the echo.
 
     f = (i k/4 pi) A n.(ki + ks) 2 exp[corners], whatever the surface is made of and however rough it is: -i k/2 pi
@@ -209,10 +247,6 @@ class Shadow:
         count, zero = len(incident), np.zeros(len(incident))
         corners = dot(patch.corners, (incident - scattered)[:, None, :]) / sound_speed[:, None]
         return PulseResponse(np.ones(count, bool), corners, zero, zero, zero, zero, zero)
-
-    def polarity(self, mesh: Mesh) -> Floats:
-        """All alike: the amplitude has the sign."""
-        return np.ones(len(mesh.faces))
 
 
 def size_at(

@@ -9,7 +9,6 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth, picked, rows_of
 from sonarsynth.scattering import Component, Scatterers
-from sonarsynth.scattering.components import CoherentKirchhoff, DiffuseKirchhoff, Lobe
 from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse
 from sonarsynth.tracing.doppler import MotionTerms
 from sonarsynth.tracing.receive_paths import DOUBTFUL
@@ -44,26 +43,21 @@ class EchoBatch:
     def over(self, departure: Floats) -> Floats:
         """Amplitudes (echo, probe) in directions (echo, probe, xyz) of the world."""
         away = self.surface.pose.turn_to_body(departure)
-        if isinstance(self.part, DiffuseKirchhoff) and self.part.law.roughness > 0.0:
-            gain = self.part.gain(self.incident, self.scattered, away, self.patch, self.wavenumber)
-            return np.asarray(self.amplitude[:, None] * gain)
-        return self.part.amplitude(self.incident[:, None, :], away, self.patch.over(), self.wavenumber[:, None])
+        return self.part.amplitudes_in(away, self.incident, self.scattered, self.patch, self.wavenumber)
 
     @property
     def tapered(self) -> Bools:
         """(echo,) whether it falls to 0 at the limb of the body, rather than ending there."""
-        return (
-            self.part.tapers(self.patch) if isinstance(self.part, CoherentKirchhoff) else np.zeros(len(self.row), bool)
-        )
+        return self.part.tapers(self.patch)
 
     @property
     def turns(self) -> bool:
         """Whether the phase of its reflections differs from direction to direction."""
-        return isinstance(self.part, CoherentKirchhoff) and self.part.turns
+        return self.part.turns
 
     def turned(self, departure: Floats) -> Floats:
         """Phase (echo, probe) in directions (echo, probe, xyz) of the world more than in that of the array centre."""
-        if not (isinstance(self.part, CoherentKirchhoff) and self.part.turns):
+        if not self.part.turns:
             return np.zeros(departure.shape[:2])
         away = self.surface.pose.turn_to_body(departure)
         seen_from_centre = self.part.phase(self.incident, self.scattered)[:, None]
@@ -73,9 +67,7 @@ class EchoBatch:
     @property
     def spot(self) -> Floats:
         """Where on its facet each echo comes from (echo, xyz) m, world, from the middle; 0 of means over facets."""
-        if not isinstance(self.part, DiffuseKirchhoff):
-            return np.zeros((len(self.row), 3))
-        return self.surface.pose.turn_to_world(self.patch.spot)
+        return self.surface.pose.turn_to_world(self.part.spot(self.patch))
 
     def pulses(self, centre: float) -> PulseResponse:
         """What they make of the pulse; centre (Hz)."""
@@ -110,11 +102,8 @@ def echo_batches(
         incident, scattered = surface.pose.turn_to_body(arrival), surface.pose.turn_to_body(departure)
         speed = context.medium.profile.at(depth(array.legs.point[owned_leg]))
         wavenumber = 2.0 * np.pi * receiver.centre / speed
-        for component in (
-            replace(p, beyond=True) if looked_for and isinstance(p, Lobe | CoherentKirchhoff | DiffuseKirchhoff) else p
-            for p in of_law
-        ):
-            patch = surface.geometry(not isinstance(component, Lobe)).select(facet)
+        for component in (part.past_limb() if looked_for else part for part in of_law):
+            patch = surface.geometry(component.needs_corners).select(facet)
             amplitude = component.amplitude(incident, scattered, patch, wavenumber)
             sign = surface.polarity(component)[facet]
             batch = EchoBatch(surface, component, row, patch, incident, scattered, wavenumber, amplitude, sign)
