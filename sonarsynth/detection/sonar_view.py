@@ -13,6 +13,8 @@ from sonarsynth.conventions import Floats
 if TYPE_CHECKING:
     import xarray as xr
 
+    from sonarsynth.store.frame_reading import FrameReader
+
 BLOCK: Final = 64
 """Frames that are read at once."""
 
@@ -47,7 +49,7 @@ class SonarView:
         return max(1, round(min(self.beam_width / self.step, float(max(self.energy.shape)))))
 
 
-def beam_width(tree: xr.DataTree) -> float:
+def beam_width(tree: xr.DataTree | FrameReader) -> float:
     """Half-power beam width (rad) of the array at the centre of its band, from the attributes of the store.
 
     Disc: 1.03 lambda / D (first-order; Van Trees 2002, table 4.1).

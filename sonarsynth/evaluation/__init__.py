@@ -3,8 +3,9 @@ xarray."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from sonarsynth.detection import beam_width
 from sonarsynth.evaluation.brightest_beams import brightest_beam_on_target
@@ -23,6 +24,9 @@ from sonarsynth.evaluation.snr_checks import signal_to_noise
 from sonarsynth.evaluation.source_estimates import snap_located
 from sonarsynth.evaluation.target_checks import labels_of_targets
 from sonarsynth.store.checking.check_rows import Check
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = [
     "EXPANSION_AMPLITUDE",

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from sonarsynth.detection import beam_width
 from sonarsynth.evaluation.checks import SmallVariables, blocks, every, numbered, of_frame, other_sounds
 from sonarsynth.evaluation.level_checks import echoes_heard, snaps_heard
 from sonarsynth.products import View
 from sonarsynth.store.checking.check_rows import Check
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def _grid_step(tree: xr.DataTree) -> float:

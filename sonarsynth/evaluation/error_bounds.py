@@ -5,22 +5,24 @@ What is looked at is small, so that a build can say it at its end.
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
+
 import numpy as np
-import xarray as xr
 
 from sonarsynth.detection import beam_width
-from sonarsynth.evaluation.checks import every, numbered
-from sonarsynth.evaluation.point_checks import has_labels, points, range_errors
+from sonarsynth.evaluation.checks import Stored, every, has, numbered, of_frames
+from sonarsynth.evaluation.point_checks import has_labels, points, range_errors, room_for_points
 from sonarsynth.evaluation.source_estimates import snap_located
 from sonarsynth.store import Folder, Remote, folder_of
 from sonarsynth.store.checking.check_rows import Check
 from sonarsynth.store.files.place import opens
+from sonarsynth.store.frame_reading import FrameReader
 
 FRAMES, FRAMES_REMOTE, ROWS = 200, 24, 20_000_000
 """Frames that are looked at after a build, of a store on this machine and elsewhere, and points of them."""
 
 
-def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
+def useful_ranges(tree: Stored, frames: np.ndarray) -> Check:
     """Whether ranges of direct echoes, by their errors and by predicted ones, tell more than the beam alone does.
 
     They do not where half of them are off by more than the size of the target and the width of a beam there.
@@ -31,7 +33,7 @@ def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
         return Check(name, expected, "no points on a target", None, {})
     frame, target = cloud.frame[cloud.judged], cloud.target[cloud.judged].astype(int)
     distinct, row = np.unique(frame, return_inverse=True)
-    corners = np.asarray(tree["truth/targets/box"].isel(frame=distinct).values)
+    corners = of_frames(tree, "truth/targets/box", distinct)
     apart = np.linalg.norm(corners[:, :, :, None] - corners[:, :, None, :], axis=-1).max(axis=(2, 3))
     size = apart[row, target]
     limit = np.fmax(size, beam_width(tree) * cloud.true_range[cloud.judged])
@@ -48,7 +50,7 @@ def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
     return Check(name, expected, result, None, numbers, numbered(np.unique(frame[over[0] | over[1]])), warning)
 
 
-def signals_whole(tree: xr.DataTree, frames: np.ndarray) -> Check:
+def signals_whole(tree: Stored, frames: np.ndarray) -> Check:
     """Arrivals that fell outside the sample window; samples at full scale, as the recipe has it, are a warning."""
     counts = {name: every(tree, f"signals/{name}")[frames] for name in ("outside", "clipped")}
     outside, clipped = (int(count.sum()) for count in counts.values())
@@ -62,10 +64,10 @@ def signals_whole(tree: xr.DataTree, frames: np.ndarray) -> Check:
     )  # fmt: skip
 
 
-def bounds(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
+def bounds(tree: Stored, frames: np.ndarray) -> list[Check]:
     """What of a store is of use, whatever it claims."""
-    checks = [signals_whole(tree, frames)] if "signals" in tree.children else []
-    if "source_estimates" in tree.children:
+    checks = [signals_whole(tree, frames)] if has(tree, "signals") else []
+    if has(tree, "source_estimates"):
         checks.append(snap_located(tree, frames))
     if has_labels(tree):
         checks.append(useful_ranges(tree, frames))
@@ -79,12 +81,20 @@ def warnings(store: Folder | str) -> list[str]:
     """
     path = folder_of(store)
     try:
-        with xr.open_datatree(opens(path), engine="zarr", chunks=None) as tree:
+        with _opened(path) as tree:
             built = np.flatnonzero(np.isfinite(every(tree, "truth/sonar_position")[:, 0]))
-            room = tree["cloud"].sizes["point"] if "cloud" in tree.children else 1
+            room = room_for_points(tree) if has(tree, "cloud") else 1
             count = min(FRAMES_REMOTE if isinstance(path, Remote) else FRAMES, max(ROWS // max(room, 1), 1), len(built))
             frames = built[np.linspace(0, len(built) - 1, count).round().astype(int)]
             checks = bounds(tree, frames) + (range_errors(tree, frames) if has_labels(tree) else [])
     except (OSError, KeyError, ValueError):
         return []
     return [check.warning for check in checks if check.warning]
+
+
+def _opened(path: Folder) -> AbstractContextManager[Stored]:
+    if isinstance(path, Remote):
+        import xarray as xr  # 0.7 s, for what is read elsewhere
+
+        return xr.open_datatree(opens(path), engine="zarr", chunks=None)
+    return nullcontext(FrameReader(path))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from sonarsynth.evaluation.checks import SmallVariables, every, numbered
 from sonarsynth.products import LINK_BUDGET
 from sonarsynth.store.checking.check_rows import Check
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 LINK_BUDGET_TOLERANCE = 0.1  # dB
 

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 
-from sonarsynth.evaluation.checks import numbered, other_sounds
+from sonarsynth.evaluation.checks import Stored, has, numbered, of_frames, other_sounds
 from sonarsynth.evaluation.source_estimates import STRANGERS
 from sonarsynth.products import FAMILIES, ORIGINS
 from sonarsynth.store.checking.check_rows import Check
+from sonarsynth.store.frame_reading import FrameReader
 
 OUTLIERS = 0.01
 """Share of the points that may be further off than three predicted errors; one may be whatever their number."""
@@ -56,20 +56,26 @@ class Points:
         return np.asarray(self.range - self.true_range)
 
 
-def has_labels(tree: xr.DataTree) -> bool:
+def has_labels(tree: Stored) -> bool:
     """Whether the points of a store have labels."""
-    return "cloud" in tree.children and "lit_by" in tree["cloud"].dataset
+    return has(tree, "cloud/lit_by")
 
 
-def points(tree: xr.DataTree, frames: Sequence[int] | np.ndarray) -> Points:
+def room_for_points(tree: Stored) -> int:
+    """Points of a frame that a store has room for."""
+    values = tree.array("cloud/range") if isinstance(tree, FrameReader) else tree["cloud/range"]
+    return int(values.shape[1])
+
+
+def points(tree: Stored, frames: Sequence[int] | np.ndarray) -> Points:
     """The points of some frames of a store whose points have labels."""
-    cloud, numbers = tree["cloud"].dataset, np.asarray(frames)
+    numbers = np.asarray(frames)
     names = ("range", "range_error", "true_range", "target", "emission", "family", "lit_by", "origin")
-    count = max(MOST_ROWS // max(cloud.sizes["point"], 1), 1)
+    count = max(MOST_ROWS // max(room_for_points(tree), 1), 1)
     chunks: dict[str, list[np.ndarray]] = {name: [] for name in ("frame", "row", *names)}
     for start in range(0, len(numbers), count):
         block = numbers[start : start + count]
-        lists = {name: np.asarray(cloud[name].isel(frame=block).values) for name in names}
+        lists = {name: of_frames(tree, f"cloud/{name}", block) for name in names}
         frame, row = np.nonzero(np.isfinite(lists["range"]))
         chunks["frame"].append(block[frame])
         chunks["row"].append(row)
@@ -79,17 +85,17 @@ def points(tree: xr.DataTree, frames: Sequence[int] | np.ndarray) -> Points:
     return Points(**columns, clock=_clocks(tree, columns["frame"].astype(int)))
 
 
-def _clocks(tree: xr.DataTree, frames: np.ndarray) -> np.ndarray:
+def _clocks(tree: Stored, frames: np.ndarray) -> np.ndarray:
     """The emission (row,) of the first source estimate in frames (row,)."""
-    if "source_estimates" not in tree.children or "emission" not in tree["source_estimates"].dataset or not len(frames):
+    if not (has(tree, "source_estimates/emission") and len(frames)):
         return np.full(len(frames), UNKNOWN)
     distinct, row = np.unique(frames, return_inverse=True)
-    emission = np.asarray(tree["source_estimates"].dataset["emission"].isel(frame=distinct, estimate=0).values)
+    emission = of_frames(tree, "source_estimates/emission", distinct)[:, 0]
     no_emission = STRANGER if STRANGERS & set(other_sounds(tree)) else UNKNOWN
     return np.where(emission < 0, no_emission, emission.astype(int))[row]
 
 
-def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
+def range_errors(tree: Stored, frames: np.ndarray) -> list[Check]:
     """Errors of the ranges of points by their labels, and what the points are that no range can be judged of.
 
     How large they are depends on the scene (beam width, size of the glints); that they are as predicted does not.

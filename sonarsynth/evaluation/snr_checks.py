@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from sonarsynth.conventions import Floats
 from sonarsynth.evaluation.checks import SmallVariables, blocks, numbered, of_frame
 from sonarsynth.store.checking.check_rows import Check
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 PARTS = ("chorus", "reverberation", "noise", "electronics")
 ROUNDING = 0.01

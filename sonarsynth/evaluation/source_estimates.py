@@ -6,12 +6,11 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
-import xarray as xr
 
 from sonarsynth.conventions import azimuth_elevation
 from sonarsynth.conventions import direction as towards
 from sonarsynth.detection import beam_width
-from sonarsynth.evaluation.checks import SmallVariables, blocks, every, numbered, other_sounds
+from sonarsynth.evaluation.checks import SmallVariables, Stored, blocks, every, has, numbered, other_sounds
 from sonarsynth.evaluation.level_checks import snaps_heard
 from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS
@@ -19,6 +18,10 @@ from sonarsynth.receiver.mirror_images import mirror_image, plane_normal
 from sonarsynth.store.checking.check_rows import Check
 
 NAME, EXPECTED = "snap located", "within 3 predicted errors in 95 %"
+COLUMNS = (
+    *("emission", "reason", "time", "time_error", "azimuth", "azimuth_error", "elevation", "elevation_error"),
+    *("position", "position_covariance"),
+)
 NEAR = 14.16
 """Three standard errors in each of three axes: the chi-square of three degrees of freedom that has the probability of
 three sigma (99.73 %)."""
@@ -60,7 +63,7 @@ class _Tally:
             self.frames.add(frame)
 
 
-def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
+def snap_located(tree: Stored, frames: np.ndarray) -> Check:
     """Each estimate is within three predicted errors of the snap that it came from, in 95 %; each quantity by its own.
 
     Positions by their Mahalanobis distance. An estimate that is accepted and comes from no snap counts as a miss, but
@@ -68,7 +71,7 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     snap that reaches the array and is not found, and errors as large as what is sought, are honest but of no use: a
     warning.
     """
-    if "emission" not in tree["source_estimates"].dataset:
+    if not has(tree, "source_estimates/emission"):
         return Check(NAME, EXPECTED, "not in this store", None, {})
     tally, normal = _Tally(), _normal(tree)
     for block in blocks(tree, frames):
@@ -98,9 +101,9 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     return Check(NAME, EXPECTED, result, good, numbers, numbered(sorted(tally.frames)), _warning(tally))
 
 
-def _normal(tree: xr.DataTree) -> np.ndarray:
+def _normal(tree: Stored) -> np.ndarray:
     """Unit normal (xyz) of the plane of the array: its axis, where no sensors are stored; 0 where they are in none."""
-    if "signals" not in tree.children:
+    if not has(tree, "signals"):
         return np.array([1.0, 0.0, 0.0])
     live = every(tree, "signals/position")[every(tree, "signals/gain") > 0.0]
     normal = plane_normal(live, tree.attrs["assumed_sound_speed"] / tree.attrs["band_high"])
@@ -108,9 +111,7 @@ def _normal(tree: xr.DataTree) -> np.ndarray:
 
 
 def _frame(block: SmallVariables, i: int, tally: _Tally, normal: np.ndarray) -> None:
-    rows = block.tree["source_estimates"].dataset.data_vars.items()
-    names = (str(name) for name, variable in rows if "estimate" in variable.dims)
-    column = {name: block.of(f"source_estimates/{name}", i) for name in names}
+    column = {name: block.of(f"source_estimates/{name}", i) for name in COLUMNS}
     estimates = np.flatnonzero(np.isfinite(column["time"]))
     reached = int(snaps_heard(block, i).sum())
     tally.rows += len(estimates)
@@ -163,7 +164,7 @@ def _within(
     return {name: bool(abs(error) <= 3 * estimate[f"{name}_error"]) for name, error in errors.items()}
 
 
-def _useless(tree: xr.DataTree, row: dict[str, np.ndarray]) -> bool:
+def _useless(tree: Stored, row: dict[str, np.ndarray]) -> bool:
     """Whether the predicted errors of an estimate are as large as what it says."""
     bandwidth = float(tree.attrs["band_high"] - tree.attrs["band_low"])
     spread = float(np.sqrt(max(np.trace(row["position_covariance"]), 0.0)))

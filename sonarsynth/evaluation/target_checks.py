@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from sonarsynth.evaluation.checks import blocks, numbered
 from sonarsynth.geometry import Pose
 from sonarsynth.store.checking.check_rows import Check
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 ROUNDING = 1e-9
 """m of corners, degrees of boxes, and pixels."""

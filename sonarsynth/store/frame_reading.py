@@ -204,9 +204,9 @@ class FrameReader:
         self.root = folder
         try:
             document = json.loads(read(folder, "zarr.json"))
-            self.attributes: Mapping[str, Any] = document["attributes"]
+            self.attrs: Mapping[str, Any] = document["attributes"]
             self._members: Mapping[str, Any] = document["consolidated_metadata"]["metadata"]
-            check_format(folder, self.attributes)
+            check_format(folder, self.attrs)
         except (OSError, ValueError, KeyError, TypeError) as error:
             if isinstance(error, Mismatch):
                 raise
