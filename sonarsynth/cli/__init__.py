@@ -31,6 +31,8 @@ from sonarsynth.cli.target_strength_command import target_strength
 if TYPE_CHECKING:
     from xarray import DataTree
 
+    from sonarsynth.evaluation import Check
+
 __all__ = ["app", "main"]
 
 app = typer.Typer(
@@ -183,11 +185,12 @@ def verify(
     as_json: Json = False,
 ) -> None:
     """Check a store: compare all files with their digests, re-read all data, check it against the ground truth."""
-    from sonarsynth import evaluation
     from sonarsynth import store as stores
     from sonarsynth.cli import printing
 
-    def check(tree: DataTree) -> list[evaluation.Check]:
+    def check(tree: DataTree) -> list[Check]:
+        from sonarsynth import evaluation  # half a second, which --quick does not need
+
         reading.close()
         with printing.planning("checking truth against data"):
             return evaluation.check(tree)

@@ -14,19 +14,19 @@ from sonarsynth.store.files.place import Folder, absolute, beside, folder_of, he
 from sonarsynth.store.files.remote import Remote, Unreachable
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.marks import Damage, Mark
-from sonarsynth.store.opening import built_frames, chosen_frames, open_store, splits_of
+from sonarsynth.store.opening import built_frames, chosen_frames, open_store, root_attributes, splits_of
 
 if TYPE_CHECKING:
     from sonarsynth.store.checking.examining import Findings, Problem, examine, must_be_store, ranges
     from sonarsynth.store.checking.verifying import Report, verify
-    from sonarsynth.store.creating import create, identity, root_attributes
+    from sonarsynth.store.creating import create, identity
     from sonarsynth.store.layout import Layout, layout_of
     from sonarsynth.store.writing import frames_there, missing, write_shard
 
 _WRITERS = {
     "checking.examining": "Findings Problem examine must_be_store ranges",
     "checking.verifying": "Report verify",
-    "creating": "create identity root_attributes",
+    "creating": "create identity",
     "layout": "Layout layout_of",
     "writing": "frames_there missing write_shard",
 }

@@ -21,9 +21,7 @@ from sonarsynth.store.array_metadata import documents, fixed_array, framed_array
 from sonarsynth.store.encoding import encoded_whole
 from sonarsynth.store.files.place import (
     Folder,
-    Opened,
     absolute,
-    read_json,
     record_of,
     records,
     upload,
@@ -34,7 +32,7 @@ from sonarsynth.store.files.scratch import clear, hidden, made, sweep
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.layout import Layout, layout_of
 from sonarsynth.store.marks import LAYOUT, MANIFESTS, Damage, Mark, encoded_mark, load_layout, marked, save_mark
-from sonarsynth.store.opening import check_format
+from sonarsynth.store.opening import check_format, root_attributes
 from sonarsynth.store.provenance import begun, made_of, other_versions
 
 if TYPE_CHECKING:
@@ -144,17 +142,6 @@ def identity(plan: Plan) -> dict[str, Any]:
         "code_digest": code_digest(),
         "recipe": dump(plan.recipe),
     }
-
-
-def root_attributes(path: Folder | str) -> dict[str, Any]:
-    """Root attributes of a store, {} where there is none."""
-    return attributes_in(absolute(path))
-
-
-def attributes_in(store: Opened) -> dict[str, Any]:
-    """The same of a store that is open."""
-    attributes = read_json(store, "zarr.json").get("attributes")
-    return attributes if isinstance(attributes, dict) else {}
 
 
 def _version() -> str:

@@ -1,4 +1,4 @@
-"""Opening a store to read it, by xarray; and whether it is of the format that this version reads."""
+"""Opening a store to read it, by xarray; what its root says, and whether that is of the format of this version."""
 
 from __future__ import annotations
 
@@ -11,11 +11,22 @@ from sonarsynth.conventions import FORMAT_VERSION
 from sonarsynth.description import FieldError
 from sonarsynth.products import SPLITS
 from sonarsynth.store.files.decoding import NAMING
-from sonarsynth.store.files.place import Folder, absolute, opens, there
+from sonarsynth.store.files.place import Folder, Opened, absolute, opens, read_json, there
 from sonarsynth.store.files.within import Mismatch
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+def root_attributes(path: Folder | str) -> dict[str, Any]:
+    """Root attributes of a store, {} where there is none."""
+    return attributes_in(absolute(path))
+
+
+def attributes_in(store: Opened) -> dict[str, Any]:
+    """The same of a store that is open."""
+    attributes = read_json(store, "zarr.json").get("attributes")
+    return attributes if isinstance(attributes, dict) else {}
 
 
 def check_format(path: Folder, attributes: Mapping[Any, Any]) -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from sonarsynth.pipeline import Values
-from sonarsynth.store.creating import attributes_in
 from sonarsynth.store.encoding import encoded
 from sonarsynth.store.files import within
 from sonarsynth.store.files.place import Folder, Opened, absolute, folder_of, held, record_of, remove, write_each
@@ -17,6 +16,7 @@ from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import OpenedFolder
 from sonarsynth.store.layout import layout_of
 from sonarsynth.store.marks import ABSENT, ContentDigest, Damage, Mark, drop_mark, load_marks, marked, save_mark
+from sonarsynth.store.opening import attributes_in
 from sonarsynth.store.provenance import other_versions
 
 if TYPE_CHECKING:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-LIBRARIES = {"numba", "llvmlite", "scipy", "xarray", "dask", "distributed", "zarr", "trimesh", "embreex", "matplotlib"}
+READERS = {"xarray", "pandas", "zarr"}
+SCHEDULERS = {"dask", "distributed"}
+LIBRARIES = READERS | SCHEDULERS | {"numpy", "numba", "llvmlite", "scipy", "trimesh", "embreex", "matplotlib"}
 
 
 def loaded_by(*arguments: str) -> set[str]:
@@ -31,4 +34,14 @@ def test_help_needs_no_library_and_no_scene(command: list[str]) -> None:
 def test_a_schema_needs_no_compiler_store_or_scheduler() -> None:
     loaded = loaded_by("schema")
     assert "sonarsynth.recipe.scene" in loaded
-    assert loaded & {"numba", "llvmlite", "xarray", "dask", "distributed", "zarr", "matplotlib", "embreex"} == set()
+    assert loaded & (READERS | SCHEDULERS | {"numba", "llvmlite", "matplotlib", "embreex"}) == set()
+
+
+def test_a_short_build_needs_no_reader_and_no_scheduler_and_comparing_files_no_compiler(tmp_path: Path) -> None:
+    store = str(tmp_path / "s.zarr")
+    loaded = loaded_by("build", "configs/remus.yaml", store, "--frames", "3:4")
+    assert "sonarsynth.store.writing" in loaded
+    assert loaded & (READERS | SCHEDULERS | {"matplotlib", "open3d"}) == set()
+    loaded = loaded_by("verify", "--quick", store)
+    assert "sonarsynth.store.checking.verifying" in loaded
+    assert loaded & (READERS | SCHEDULERS | {"numba", "scipy", "matplotlib", "sonarsynth.recipe"}) == set()

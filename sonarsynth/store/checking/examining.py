@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
-from sonarsynth.store.creating import root_attributes
 from sonarsynth.store.files.place import FileRecord, Folder, entries, is_folder, read_json, records, there
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import Mismatch
@@ -24,7 +23,7 @@ from sonarsynth.store.marks import (
     marked,
     read_mark,
 )
-from sonarsynth.store.opening import check_format, must_be_folder
+from sonarsynth.store.opening import check_format, must_be_folder, root_attributes
 
 Progress = Callable[[int, int, int], None]
 """What is told of frames: how many are done, of how many, and how many failed."""

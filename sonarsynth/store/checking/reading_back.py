@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sonarsynth.store.checking.examining import Problem
-from sonarsynth.store.creating import root_attributes
 from sonarsynth.store.files.place import Folder, opens
 from sonarsynth.store.marks import ContentDigest, Mark
+from sonarsynth.store.opening import root_attributes
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,12 +12,13 @@ import numpy as np
 
 from sonarsynth.pipeline import attributes
 from sonarsynth.store.checking.examining import Findings
-from sonarsynth.store.creating import described, identity, laid_out, layout_mark, root_attributes
+from sonarsynth.store.creating import described, identity, laid_out, layout_mark
 from sonarsynth.store.files.place import Folder, opens, record, there, write_in
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import Mismatch, parts_of, status
 from sonarsynth.store.layout import ArrayLayout, layout_of
 from sonarsynth.store.marks import Mark, save_mark
+from sonarsynth.store.opening import root_attributes
 
 if TYPE_CHECKING:
     import zarr
