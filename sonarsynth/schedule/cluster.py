@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 from queue import Empty, SimpleQueue
 from typing import Any, Final
 
-from distributed import Client, Future, KilledWorker
+from distributed import Client, Future, KilledWorker, Worker, WorkerPlugin
 
+from sonarsynth.planning import Plan
 from sonarsynth.schedule import tasks, worker_status
 from sonarsynth.schedule.tasks import Failure, Job, StageResult, WrittenShard
 
@@ -216,6 +217,19 @@ class _Builder:
         return Failure(frame, stage, "it ends its worker process: out of memory, or a crash", str(error))
 
 
+class GivenPlan(WorkerPlugin):
+    """Gives each worker, those that come later too, what the plan of a job resolved; the last build's, of several."""
+
+    name = "sonarsynth-plan"
+
+    def __init__(self, job: Job, resolved: Mapping[str, Any]) -> None:
+        self.job, self.resolved = job, resolved
+
+    def setup(self, worker: Worker) -> None:
+        """Give it to the process."""
+        tasks.give(self.job, self.resolved)
+
+
 def _probe(job: Job, frame: int) -> None:
     """Render a frame and forget it."""
     tasks.render_frames(job, [frame])
@@ -224,6 +238,7 @@ def _probe(job: Job, frame: int) -> None:
 def run(
     client: Client,
     job: Job,
+    plan: Plan,
     todo: Mapping[int, tuple[int, ...]],
     done: Callable[[WrittenShard], None],
     lost: Callable[[str, str], None] = lambda worker, why: None,
@@ -236,6 +251,7 @@ def run(
     """
     worker_status.open_folder(job.path)
     try:
+        client.register_plugin(GivenPlan(job, tasks.resolved(plan)))
         _Builder(client, job, done, lost, patience).run(todo)
     finally:
         worker_status.close_folder(job.path)

@@ -90,7 +90,7 @@ def make_shards(
     count = min(usable_cores() if workers is None else workers, len(todo))
     with connecting.connected(count, scheduler, memory, dashboard) as client:
         started(len(client.nthreads()), client.dashboard_link or "")
-        cluster.run(client, job, todo, done, lost, math.inf if scheduler else PATIENCE)
+        cluster.run(client, job, plan, todo, done, lost, math.inf if scheduler else PATIENCE)
 
 
 def brief(plan: Plan, frames: Collection[int] | None = None) -> bool:

@@ -10,7 +10,6 @@ import numpy as np
 from sonarsynth.conventions import FORMAT_VERSION
 from sonarsynth.description import FieldError
 from sonarsynth.products import SPLITS
-from sonarsynth.store.files.decoding import NAMING
 from sonarsynth.store.files.place import Folder, Opened, absolute, opens, read_json, there
 from sonarsynth.store.files.within import Mismatch
 
@@ -54,6 +53,8 @@ def open_store(path: Folder | str) -> xr.DataTree:
     """
     import xarray as xr
     import zarr
+
+    from sonarsynth.store.files.decoding import NAMING
 
     folder = absolute(path)
     must_be_folder(folder)

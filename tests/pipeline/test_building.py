@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ import xarray as xr
 import zarr
 from distributed import Client, Future, LocalCluster
 
-from sonarsynth import evaluation, pipeline, store
+from sonarsynth import evaluation, pipeline, planning, store
 from sonarsynth.planning import Plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule import build, cluster, making, tasks
@@ -277,6 +278,28 @@ def test_a_worker_refuses_a_store_of_another_recipe(reference: Path) -> None:
     job = tasks.Job(str(reference), "0" * 64, ("cloud", "image", "signals"))
     with pytest.raises(store.Damage, match="is not the same on this worker"):
         tasks.plan_of(job)
+
+
+def test_a_worker_is_given_what_was_planned_and_looks_at_no_frames(
+    small: Recipe, reference: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = planning.plan(small)
+    job = job_of(reference, plan, "given")
+    tasks.give(job, pickle.loads(pickle.dumps(tasks.resolved(plan))))
+    monkeypatch.setattr("sonarsynth.planning.sample_frames", None)
+    given = tasks.plan_of(job)
+    assert given.digest == plan.digest and given.recipe is not plan.recipe
+    assert repr(given.as_json()) == repr(plan.as_json())
+    np.testing.assert_array_equal(given.windows.start, plan.windows.start)
+    ours = tasks.render_frames(job, [19])[0].value
+    tasks.remember(job, plan)
+    theirs = tasks.render_frames(job, [19])[0].value
+    for name in theirs:
+        np.testing.assert_array_equal(ours[name], theirs[name])
+    other = replace(job, digest="0" * 64)
+    tasks.give(other, tasks.resolved(plan))
+    with pytest.raises(store.Damage, match="is not the same on this worker"):
+        tasks.plan_of(other)
 
 
 class Lost:
