@@ -9,6 +9,7 @@ import xarray as xr
 
 from sonarsynth.loading.stacking import stack
 from sonarsynth.loading.tables import as_table, points_table
+from sonarsynth.pictures.single_frames.frame_pictures import cloud_picture, image_picture
 from sonarsynth.store import built_frames
 
 if TYPE_CHECKING:
@@ -62,14 +63,10 @@ class SonarAccessor:
         """The energy image of a frame with the outlines of targets and the rings of ghosts, in dB re its brightest
         beam. Raises NothingToDraw, a ValueError, where there is none.
         """
-        from sonarsynth.pictures.single_frames.frame_pictures import image_picture
-
         return image_picture(self._tree, frame)
 
     def cloud(self, frame: int) -> Figure:
         """The point cloud of a frame in the true hulls, in 3-D, coloured by range error. Raises NothingToDraw, a
         ValueError, where the frame was not built.
         """
-        from sonarsynth.pictures.single_frames.frame_pictures import cloud_picture
-
         return cloud_picture(self._tree, frame)

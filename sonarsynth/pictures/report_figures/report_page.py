@@ -12,6 +12,7 @@ from sonarsynth.conventions import finite_json
 from sonarsynth.evaluation import warnings as warnings_of
 from sonarsynth.evaluation.detectors.detector_scores import words_of
 from sonarsynth.pictures.figures.style import PAGE_CONFIG
+from sonarsynth.pictures.report_figures import report_plots as plots
 from sonarsynth.pictures.report_figures.report_numbers import numbers_of
 from sonarsynth.pictures.store_reading import NothingToDraw
 from sonarsynth.store import Folder, built_frames, folder_of, named_after, open_store
@@ -58,7 +59,6 @@ def report(
         chosen = Path(out)
         ending = "" if chosen.suffix.lower() in (".html", ".htm") else ".html"
         file = chosen / file.name if chosen.is_dir() else chosen.with_name(chosen.name + ending)
-    from sonarsynth.pictures.report_figures import report_plots as plots
 
     figures = [
         ("Film", plots.film(tree, built_frames(tree))),
