@@ -15,7 +15,13 @@ Elevation = Annotated[Radians, Ge(-0.5 * np.pi), Le(0.5 * np.pi)]
 
 
 class NoiseDirections(Protocol):
-    """Noise that is the same in all azimuths: a sum of plane waves from all directions, independent of each other."""
+    """Noise that is the same in all azimuths, a sum of plane waves from all directions, independent of each other; or
+    one plane wave."""
+
+    @property
+    def toward(self) -> Floats | None:
+        """Unit vector (xyz) to where one plane wave comes from, world; None: waves come from many directions."""
+        ...
 
     @property
     def edges(self) -> tuple[float, ...]:
@@ -34,6 +40,7 @@ class IsotropicDirections:
     """From all directions alike."""
 
     kind: Literal["isotropic"] = "isotropic"
+    toward = None
 
     @property
     def edges(self) -> tuple[float, ...]:
@@ -51,6 +58,7 @@ class SurfaceDirections:
     Sherman (1962), JASA 34, 1732."""
 
     kind: Literal["surface"] = "surface"
+    toward = None
     exponent: Annotated[Number, Ge(0.5), Le(4)] = 1.0
     """m: 1 for dipoles, as wind and rain are; up to 1.5 for heavy rain."""
 
@@ -70,6 +78,7 @@ class BottomDirections:
     surface and bottom: 1/|sin| of the elevation, down to that of the farthest."""
 
     kind: Literal["bottom"] = "bottom"
+    toward = None
     lowest: Annotated[Radians, Gt(0), Lt(0.5 * np.pi)] = np.deg2rad(1.0)
     """Size of the elevation of the farthest sources that are heard."""
     images: bool = True
@@ -94,6 +103,7 @@ class RingDirections:
     """From all azimuths and a range of elevations, such as distant ships over a sloping bottom."""
 
     kind: Literal["ring"] = "ring"
+    toward = None
     low: Elevation = np.deg2rad(-10.0)
     """Lower end of the elevations, up positive."""
     high: Elevation = np.deg2rad(-1.0)
@@ -127,14 +137,20 @@ class OneDirection:
 
     @property
     def toward(self) -> Floats:
-        """Unit vector (xyz) to where it comes from, world."""
+        """As `NoiseDirections.toward`."""
         return direction(0.5 * np.pi - self.bearing, self.elevation)
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """As `NoiseDirections.edges`: none."""
+        return ()
+
+    def intensity(self, sine: Floats) -> Floats:
+        """As `NoiseDirections.intensity`: no solid angle has any."""
+        return np.zeros_like(sine)
 
 
 Directions = Annotated[
     IsotropicDirections | SurfaceDirections | BottomDirections | RingDirections | OneDirection, BY_KIND
 ]
 """Where noise comes from, by `kind`."""
-
-AnyDirections = NoiseDirections | OneDirection
-"""What noise of given directions is drawn from: those that people write, and what planning makes."""

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description.method import FrameSize, Method
-from sonarsynth.environment.noise.directions import AnyDirections
+from sonarsynth.environment.noise.directions import NoiseDirections
 
 Complexes = npt.NDArray[np.complex128]
 
@@ -21,7 +21,7 @@ SECONDS, PRODUCT_SECONDS = 10e-9, 0.1e-9
 class NoiseField(Method):
     """Gaussian noise at the hydrophones, stationary in a frame; as it stands, independent between them."""
 
-    directions: AnyDirections | None = None
+    directions: NoiseDirections | None = None
     """Where it comes from, at point hydrophones of the density; none: it is independent between hydrophones, or says
     its cross spectral density itself."""
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.noise import NoiseField
-from sonarsynth.environment.noise.directions import OneDirection
 from sonarsynth.equations.noise.ambient_noise import quantisation_density
 from sonarsynth.equations.noise.filters import response
 from sonarsynth.equations.noise.plane_wave_spectra import cross_power, heard_share
@@ -116,7 +115,7 @@ class SoundModel:
         directions = noise.directions
         if directions is None:
             return None
-        if isinstance(directions, OneDirection):
+        if directions.toward is not None:
             return self.receiver.pose.turn_to_body(directions.toward[None]), np.ones(1)
         toward, weight = quadrature(directions.intensity, directions.edges, self._degree(frequency, extent))
         return self.receiver.pose.turn_to_body(toward), weight

@@ -40,6 +40,7 @@ class DistantDirections:
 
     edges: tuple[float, ...]  # sines
     powers: tuple[float, ...]  # of each stretch between them, in any unit
+    toward = None
 
     def intensity(self, sine: Floats) -> Floats:
         """As `NoiseDirections.intensity`."""

@@ -16,7 +16,7 @@ from sonarsynth.conventions import Bools, Floats, evenly
 from sonarsynth.environment.profiles import nearest
 from sonarsynth.environment.sea import Profile
 from sonarsynth.planning.measured.ray_bending import difference_of_paths, ways
-from sonarsynth.propagation import Propagation, Straight
+from sonarsynth.propagation import Propagation
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
 
@@ -45,7 +45,7 @@ def thinned(model: Propagation, recipe: Recipe, sequence: int, profile: Profile)
     scene, signal = recipe.scene_of(sequence), 0.0 if recipe.accuracy.exact else recipe.accuracy.signal
     bottom = scene.world.environment.depth
     above = _above(profile, bottom) if scene.world.environment.sound_speed.measured else profile
-    if len(above.depth) <= FEW or signal == 0.0 or isinstance(model, Straight):
+    if len(above.depth) <= FEW or signal == 0.0 or not model.bends:
         return above, 0.0
     frames = tuple(sampled(recipe, sequence))
     low, high = (0.0, bottom) if model.bounces else _passed(frames, bottom)

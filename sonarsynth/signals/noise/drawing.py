@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.noise.directions import AnyDirections, OneDirection
+from sonarsynth.environment.noise.directions import NoiseDirections
 from sonarsynth.geometry import Pose
 from sonarsynth.receiver import BandPass, Elements, Sonar, stop_frequency
 from sonarsynth.signals.noise import lattice_noise, random_waves
@@ -21,10 +21,10 @@ SMALL = 64
 
 
 def field_on_lattice(
-    directions: AnyDirections, elements: Elements, pose: Pose, sonar: Sonar, sound_speed: float
+    directions: NoiseDirections, elements: Elements, pose: Pose, sonar: Sonar, sound_speed: float
 ) -> PeriodicField | None:
     """The periodic field that is drawn, over all that passes the filter of the sonar; None where plane waves are."""
-    if isinstance(directions, OneDirection) or not elements.on_lattice or elements.count < SMALL:
+    if directions.toward is not None or not elements.on_lattice or elements.count < SMALL:
         return None
     high = stop_frequency(sonar.antialias)
     passed = sonar.antialias
@@ -36,7 +36,7 @@ def field_on_lattice(
 
 
 def draw(
-    directions: AnyDirections,
+    directions: NoiseDirections,
     elements: Elements,
     pose: Pose,
     sonar: Sonar,
@@ -53,13 +53,13 @@ def draw(
 
 
 def coherence_error(
-    directions: AnyDirections, elements: Elements, pose: Pose, sonar: Sonar, sound_speed: float
+    directions: NoiseDirections, elements: Elements, pose: Pose, sonar: Sonar, sound_speed: float
 ) -> tuple[float, str]:
     """What the coherence of what is drawn errs by, at most, and how it is drawn in a few words.
 
     Plane waves are right on average: their error is the scatter of one bin.
     """
-    if isinstance(directions, OneDirection):
+    if directions.toward is not None:
         return 0.0, "one plane wave"
     field = field_on_lattice(directions, elements, pose, sonar, sound_speed)
     if field is None:
@@ -68,10 +68,10 @@ def coherence_error(
     return field.error, f"periodic field of {field.powers.shape[1]} x {field.powers.shape[2]} waves"
 
 
-def seconds(directions: AnyDirections, elements: Elements, samples: int) -> float:
+def seconds(directions: NoiseDirections, elements: Elements, samples: int) -> float:
     """Seconds that a frame takes on one core of the machine that costs are measured on."""
     bins = samples // 2
-    if isinstance(directions, OneDirection):
+    if directions.toward is not None:
         return bins * elements.count * random_waves.SECONDS
     if elements.on_lattice and elements.count >= SMALL:
         return bins * 4.0 * elements.columns * elements.rows * TORUS[1] ** 2 * WAVE_SECONDS

@@ -11,7 +11,6 @@ from scipy.fft import irfft, rfft, rfftfreq
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.noise import RecordedNoise
-from sonarsynth.environment.noise.directions import OneDirection
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.noise.filters import Fir, duration, response
 from sonarsynth.equations.noise.wave_directions import drawn
@@ -100,9 +99,8 @@ def _direction(noise: RecordedNoise, pose: Pose, even: Floats) -> Floats:
     """Unit vector (xyz) to where a stretch comes from, sonar frame."""
     directions = noise.directions
     assert directions is not None, "what is played has directions"
-    if isinstance(directions, OneDirection):
-        return pose.turn_to_body(directions.toward)
-    return pose.turn_to_body(drawn(directions.intensity, directions.edges, even))
+    one = directions.toward
+    return pose.turn_to_body(drawn(directions.intensity, directions.edges, even) if one is None else one)
 
 
 def _fade(clock: Floats, number: int) -> Floats:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.noise.directions import AnyDirections, OneDirection
+from sonarsynth.environment.noise.directions import NoiseDirections
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.noise.wave_directions import drawn
 from sonarsynth.geometry import Pose
@@ -26,7 +26,7 @@ def waves(sensors: int) -> int:
 
 
 def draw(
-    directions: AnyDirections,
+    directions: NoiseDirections,
     elements: Elements,
     pose: Pose,
     behind: float,
@@ -41,7 +41,7 @@ def draw(
     cross spectral density is exact, and each point hydrophone's spectrum is Gaussian.
     """
     wave_number = 2.0 * np.pi * frequency / sound_speed
-    if isinstance(directions, OneDirection):
+    if directions.toward is not None:
         toward = pose.turn_to_body(directions.toward)
         sent = random.standard_normal((2, frequency.size))
         face = element_directivity(frequency, toward, elements.face, sound_speed) * (behind if toward[0] < 0.0 else 1.0)
