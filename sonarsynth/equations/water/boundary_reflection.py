@@ -76,6 +76,17 @@ def rayleigh(
     return np.asarray(np.where(nothing, (m - 1.0) / (m + 1.0), top / np.where(nothing, 1.0, bottom)))
 
 
+def plane_wave_error(distance: npt.ArrayLike, wavenumber: npt.ArrayLike) -> Floats:
+    """How much (...), over the incident wave, the reflection of a spherical wave differs from `rayleigh`, which is that
+    of a plane one, at its worst: within a few degrees of the critical angle of a fast bottom.
+
+    3 (k R)^-0.6, of the length R (m) of the path from image to receiver and the wavenumber k (rad/m): that of
+    Sommerfeld's integral is 0.6 to 1.4 times as much over sand and rock, k R from 200 to 5000. Beyond ten degrees it is
+    a tenth of that or less, and falls as 1/(k R) (Brekhovskikh and Lysanov 2003, section 4.2). Arguments broadcast.
+    """
+    return np.asarray(np.minimum(3.0 * (np.asarray(wavenumber, float) * np.asarray(distance, float)) ** -0.6, 1.0))
+
+
 def pressure_release(grazing: npt.ArrayLike) -> Complexes:
     """Reflection coefficient of the flat sea surface: -1 at every angle."""
     return np.full(np.shape(grazing), -1.0 + 0j)

@@ -5,11 +5,17 @@ Frames use the same formulas without a word.
 
 from __future__ import annotations
 
+import numpy as np
+
 from sonarsynth.description import FieldError
 from sonarsynth.environment.absorption import absorption_notes
+from sonarsynth.environment.boundaries import FluidHalfSpace, Sediment
 from sonarsynth.environment.boundary_numbers import boundary_notes
 from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.water.boundary_reflection import SEDIMENTS, plane_wave_error
 from sonarsynth.planning.notes.noise_checks import noise_notes
+from sonarsynth.planning.plan_tables import Omission
+from sonarsynth.planning.plans import Plan
 from sonarsynth.recipe.scene import Scene
 
 
@@ -40,3 +46,22 @@ def _believed(scene: Scene) -> tuple[str, ...]:
         return scene.processing.placing.notes()
     except (ValueError, OSError, ImportError) as error:
         raise FieldError(BELIEVED, str(error)) from None
+
+
+def curved_waves(plan: Plan) -> list[Omission]:
+    """What is left out by reflecting waves at a fast bottom as if they were plane, in the first frame."""
+    frame = plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1]
+    reflection, depth = plan.scene.world.environment.bottom.reflection, plan.medium.depth
+    if isinstance(reflection, Sediment):
+        ratio = SEDIMENTS[reflection.name][1]
+    else:
+        ratio = reflection.speed_ratio if isinstance(reflection, FluidHalfSpace) else 1.0
+    if not plan.propagation.bounces or ratio <= 1.0 or not frame.moment.snaps:
+        return []
+    array = frame.sonar_pose.position
+    images = [snap.position * [1.0, 1.0, -1.0] - [0.0, 0.0, 2.0 * depth] for snap in frame.moment.snaps]
+    shortest = min(float(np.linalg.norm(image - array)) for image in images)
+    wavenumber = 2.0 * np.pi * plan.scene.sonar.band.low / float(plan.profile.at(depth))
+    error, critical = float(plane_wave_error(shortest, wavenumber)), np.rad2deg(np.arccos(1.0 / ratio))
+    bound = f"up to {error:.1g} of a wave that meets it within a few degrees of its critical angle, {critical:.0f} deg"
+    return [Omission("curvature of waves at the bottom", "they are reflected as plane waves", bound)]

@@ -10,6 +10,7 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.planning.choices import ALL_PRODUCTS
 from sonarsynth.planning.measured.ray_bending import bending_error
 from sonarsynth.planning.measured.sampled_arrivals import one_facet_in
+from sonarsynth.planning.notes.formula_validity import curved_waves
 from sonarsynth.planning.plan_tables import Omission
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.reverberation_rows import reverberation_left_out
@@ -42,6 +43,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
         "the direct family" if not bounces else f"paths by at most {bounces} reflections at surface and bottom in all"
     )
     rows.append(Omission("more reflections", f"requested: {families}", reflected_bound(plan)))
+    rows += curved_waves(plan)
     rough = [b for b in (environment.surface, environment.bottom) if rms_height(b) > 0.0]
     if bounces and rough and scene.world.reverberation is None:
         rows.append(
