@@ -55,6 +55,8 @@ def target_strength(
     from sonarsynth.conventions import FASTEST, SLOWEST
     from sonarsynth.pictures.strength_pictures import strength_table, write_strength
     from sonarsynth.scattering import Scattering
+    from sonarsynth.targets.meshes import mesh_of
+    from sonarsynth.targets.shapes import MeshFile
 
     law = described(scattering, "--scattering", Scattering)
     shape = _shape(body, unit)
@@ -72,7 +74,8 @@ def target_strength(
         except ValueError as error:
             raise BadOption(str(error)) from None
     files = write_strength(table, f"{body}, {scattering}", out)
-    for text in dict.fromkeys(str(note.message) for note in notes):
+    repaired = mesh_of(shape).notes if isinstance(shape, MeshFile) else ()
+    for text in dict.fromkeys((*repaired, *(str(note.message) for note in notes))):
         typer.echo(f"note: {text}", err=True)
     if as_json:
         typer.echo(json.dumps(table.as_json()))

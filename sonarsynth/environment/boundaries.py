@@ -151,7 +151,7 @@ class SeaSurface:
     """
 
     reflection: Reflection = PressureRelease()
-    """Of a plane wave, where the surface is smooth."""
+    """Reflection of a plane wave, where the surface is smooth."""
     rms_height: RmsHeight = 0.0
     """Root-mean-square height of the waves; or give wind_speed."""
     wind_speed: Annotated[MetresPerSecond, Ge(0), Le(60)] | None = None
@@ -180,6 +180,6 @@ class SeaBottom:
     """The bottom: medium sand and smooth unless said otherwise."""
 
     reflection: Reflection = Sediment(name="medium sand")
-    """Of a plane wave, where the bottom is smooth."""
+    """Reflection of a plane wave, where the bottom is smooth."""
     rms_height: RmsHeight = 0.0
     """Root-mean-square height of the roughness."""

@@ -53,9 +53,9 @@ class Absorption:
     formula: Literal["francois_garrison", "ainslie_mccolm", "none"] = "francois_garrison"
     """`ainslie_mccolm` is simpler, within 10 % of the other; `none`: no absorption."""
     temperature: WaterTemperature = 27.0
-    """Of the water, alike at all depths."""
+    """Temperature of the water, alike at all depths."""
     salinity: WaterSalinity = 35.0
-    """Of the water, alike at all depths."""
+    """Salinity of the water, alike at all depths."""
     ph: Annotated[Number, Ge(0), Le(14)] = 8.1
     """pH of the water; it matters under some 10 kHz, where boric acid absorbs."""
 

@@ -47,7 +47,7 @@ class Isovelocity(SpeedModel):
 
     kind: Literal["isovelocity"] = "isovelocity"
     speed: WaterSoundSpeed
-    """At all depths."""
+    """Sound speed at all depths."""
 
 
 @description
@@ -84,9 +84,9 @@ class TemperatureSalinity(SpeedModel):
     formula: SpeedFormula = "mackenzie"
     """How sound speed follows from them."""
     latitude: Latitude | None = None
-    """Of the place ("1.3 deg"), for the pressure at a depth; left out: 45 degrees."""
+    """Latitude of the place ("1.3 deg"), for the pressure at a depth; left out: 45 degrees."""
     longitude: Longitude | None = None
-    """Of the place, for what the salt there consists of (teos10); left out: standard sea water."""
+    """Longitude of the place, for what the salt there consists of (teos10); left out: standard sea water."""
 
     _depth = field_validator("depth")(_ascending)
     _values = field_validator("temperature", "salinity")(_as_long_as_depth)
@@ -109,11 +109,11 @@ class Cast(SpeedModel):
     formula: SpeedFormula = "mackenzie"
     """How sound speed follows from temperature and salinity."""
     latitude: Latitude | None = None
-    """Of the place ("1.3 deg"), for depth and pressure; left out: what the file says, else 45 degrees."""
+    """Latitude of the place ("1.3 deg"), for depth and pressure; left out: what the file says, else 45 degrees."""
     longitude: Longitude | None = None
-    """Of the place, for what the salt there consists of (teos10); left out: what the file says, else standard."""
+    """Longitude of the place, for what its salt consists of (teos10); left out: what the file says, else standard."""
     salinity: WaterSalinity | None = None
-    """Of the whole depth, where the file has none (an expendable thermograph); left out: such a file is refused."""
+    """Salinity at all depths, where the file has none (an expendable thermograph); left out: such a file is refused."""
     profile: Annotated[int, Ge(0)] | None = None
     """Which of several profiles in the file, from 0; left out: the first, with a note."""
     smoothing: PositiveMetres | None = None
@@ -128,7 +128,7 @@ class Linear(SpeedModel):
 
     kind: Literal["linear"] = "linear"
     surface_speed: WaterSoundSpeed
-    """At the surface."""
+    """Sound speed at the surface."""
     gradient: Number
     """Rise of the sound speed with depth (m/s per m); 0.0163 is that of pressure alone."""
 
@@ -150,7 +150,7 @@ class Thermocline(SpeedModel):
 
     kind: Literal["thermocline"] = "thermocline"
     surface_speed: WaterSoundSpeed = 1541.0
-    """In the mixed layer."""
+    """Sound speed in the mixed layer."""
     mixed_depth: NonNegativeMetres = 5.0
     """Depth of the top of the thermocline."""
     thickness: NonNegativeMetres = 1.5
@@ -234,7 +234,7 @@ class Catenary(SpeedModel):
     scale: PositiveMetres
     """Depth g over which the sound speed rises by half."""
     axis_speed: WaterSoundSpeed = 1500.0
-    """On the axis, the least."""
+    """Sound speed on the axis, the least."""
     tolerance: RayTimeError = 1e-6
     """Largest error of the travel time that layers may make where a ray turns."""
 

@@ -21,25 +21,25 @@ class Hover:
 
     kind: Literal["hover"] = "hover"
     position: Position
-    """The place that it swings about."""
+    """Position (x, y, z) that it swings about: east, north and up, 0 at the surface."""
     heading: Radians = 0.0
-    """That it swings about."""
+    """Heading that it swings about, clockwise from north."""
     pitch: Radians = 0.0
-    """Nose up. About this it swings."""
+    """Pitch: the nose up is positive."""
     roll: Radians = 0.0
-    """Starboard down."""
+    """Roll: the starboard side down is positive."""
     surge: NonNegativeMetres = 0.0
-    """Amplitude forward."""
+    """Amplitude of the swing forward and back."""
     sway: NonNegativeMetres = 0.0
-    """Amplitude to port."""
+    """Amplitude of the swing to port and starboard."""
     heave: NonNegativeMetres = 0.0
-    """Amplitude up and down."""
+    """Amplitude of the swing up and down."""
     yaw: Annotated[Radians, Ge(0), Le(np.pi)] = 0.0
-    """Amplitude of the heading."""
+    """Amplitude of the swing of the heading."""
     period: PositiveSeconds = 10.0
-    """Of the swing, the same for all of its parts."""
+    """Period of all four swings."""
     phase: Radians = 0.0
-    """Of the heave at time 0; surge, sway and yaw are a quarter, a half and three quarters of a period later."""
+    """Phase of the heave at time 0; surge, sway and yaw are a quarter, a half and three quarters of a period later."""
 
 
 _LATER = 0.5 * np.pi * np.array([1.0, 2.0, 0.0, 3.0])  # surge, sway, heave, yaw

@@ -23,13 +23,13 @@ class Still:
 
     kind: Literal["still"] = "still"
     position: Position
-    """(x, y, z)."""
+    """Position (x, y, z): east, north and up, 0 at the surface."""
     heading: Radians = 0.0
-    """Clockwise from north; left out, it looks north (a sonar too: its beams are about its heading)."""
+    """Heading, clockwise from north; left out, it looks north (a sonar too: its beams are about its heading)."""
     pitch: Radians = 0.0
-    """Nose up."""
+    """Pitch: the nose up is positive."""
     roll: Radians = 0.0
-    """Starboard down."""
+    """Roll: the starboard side down is positive."""
 
 
 @description
@@ -44,11 +44,11 @@ class Line:
     duration: PositiveSeconds
     """Time from start to stop."""
     heading: Radians | None = None
-    """Left out: along the track."""
+    """Heading, clockwise from north; left out: along the track."""
     pitch: Radians = 0.0
-    """Nose up."""
+    """Pitch: the nose up is positive."""
     roll: Radians = 0.0
-    """Starboard down."""
+    """Roll: the starboard side down is positive."""
 
 
 @description
@@ -56,11 +56,11 @@ class Waypoint:
     """A place to be at a time, with a heading."""
 
     time: Seconds
-    """Since the start of the motions."""
+    """Time since the start of the motions."""
     position: Position
-    """(x, y, z)."""
+    """Position (x, y, z): east, north and up, 0 at the surface."""
     heading: Radians | None = None
-    """Left out: towards the next waypoint (the last: as before)."""
+    """Heading there, clockwise from north; left out: towards the next waypoint (the last: as before)."""
 
 
 @description
@@ -71,9 +71,9 @@ class Waypoints:
     points: Annotated[tuple[Waypoint, ...], MinLen(2)]
     """Waypoints in the order of their times."""
     pitch: Radians = 0.0
-    """Nose up."""
+    """Pitch: the nose up is positive."""
     roll: Radians = 0.0
-    """Starboard down."""
+    """Roll: the starboard side down is positive."""
 
     @field_validator("points")
     @classmethod
@@ -92,15 +92,15 @@ class Circle:
     centre: Position
     """Centre of the circle, at the depth of the body."""
     radius: PositiveMetres
-    """Of the track."""
+    """Radius of the circle."""
     speed: MetresPerSecond
-    """Positive is counter-clockwise seen from above."""
+    """Speed along the circle; positive is counter-clockwise seen from above."""
     bearing: Radians = 0.0
     """Compass bearing from the centre to the body at time 0."""
     pitch: Radians = 0.0
-    """Nose up."""
+    """Pitch: the nose up is positive."""
     roll: Radians = 0.0
-    """Starboard down."""
+    """Roll: the starboard side down is positive."""
 
 
 @description
@@ -113,13 +113,13 @@ class ConstantVelocity:
     heading: Radians = 0.0
     """Compass heading of the body and of its way; left out: north (a sonar looks there too)."""
     speed: MetresPerSecond = 0.0
-    """Negative is astern."""
+    """Speed ahead; negative is astern."""
     climb: MetresPerSecond = 0.0
-    """How fast it rises; it stays level."""
+    """Speed upwards; the body stays level."""
     pitch: Radians = 0.0
-    """Nose up."""
+    """Pitch: the nose up is positive."""
     roll: Radians = 0.0
-    """Starboard down."""
+    """Roll: the starboard side down is positive."""
 
 
 Motion = Annotated[Still | Line | Waypoints | Circle | ConstantVelocity | Hover | RecordedTrack, BY_KIND]

@@ -64,7 +64,7 @@ class RecordedTrack:
 
     kind: Literal["track"] = "track"
     path: str
-    """Relative to the recipe."""
+    """Path of the file, relative to the recipe."""
     start: Literal["first"] | Seconds = "first"
     """Time of the file that is time 0 of the motions; `first`: that of its first point. Dates are s since 1970."""
     origin: tuple[Latitude, Longitude] | None = None
@@ -72,13 +72,13 @@ class RecordedTrack:
     offset: Position = (0.0, 0.0, 0.0)
     """Added to every place: where in the world the file's own origin is."""
     depth: NonNegativeMetres | None = None
-    """Of the whole track, in place of what the file says; a file without depths needs it."""
+    """Depth of the whole track, in place of what the file says; a file without depths needs it."""
     heading: Radians | None = None
-    """Of the whole track, in place of what the file says."""
+    """Heading of the whole track, in place of what the file says."""
     pitch: Radians = 0.0
-    """Where the file has none."""
+    """Constant angle where the file has none."""
     roll: Radians = 0.0
-    """Where the file has none."""
+    """Constant angle where the file has none."""
 
 
 @dataclass(frozen=True, eq=False)

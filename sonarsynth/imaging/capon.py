@@ -43,7 +43,7 @@ class Capon(Steering):
     bins: Annotated[int, Ge(2)] = 8
     """Neighbouring frequencies that one covariance is the mean of, where there are no blocks."""
     loading: Annotated[Number, Gt(0)] = 1e-3
-    """Of the mean power of a sensor (the trace over the number of sensors), added to the diagonal of the covariance."""
+    """Share of the mean power of a sensor (trace over their number) that is added to the diagonal of the covariance."""
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`: products with the inverse of a covariance, and its forms in every beam, at each frequency.

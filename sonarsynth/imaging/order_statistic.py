@@ -22,7 +22,7 @@ class OrderStatistic(TimeStatistic):
 
     kind: Literal["order_statistic"] = "order_statistic"
     quantile: Annotated[Number, Gt(0), Lt(1)] = 0.5
-    """Which: 0.5 is the median."""
+    """Quantile of the sensors' magnitudes: 0.5 is the median."""
 
     def row(self) -> str:
         """Its kind, and the quantile."""

@@ -33,15 +33,15 @@ class RayRequest:
     eigenrays: EigenrayRequest | None = None
     """The eigenrays to draw; none if left out."""
     directions: Annotated[tuple[tuple[Radians, Radians], ...], MinLen(1)] | None = None
-    """(azimuth, elevation) of each ray in the sonar frame; left out: the grid."""
+    """Direction (azimuth, elevation) of each ray in the sonar frame; left out: the grid."""
     azimuth_span: Annotated[Radians, Ge(0), Le(2 * np.pi)] = np.deg2rad(50.0)
-    """Of the grid, about the axis of the sonar."""
+    """Azimuths that the grid spans, about the axis of the sonar."""
     azimuths: Annotated[int, Ge(1), Le(100)] = 11
     """Rays in a row of the grid."""
     elevation_span: Annotated[Radians, Ge(0), Le(np.pi)] = np.deg2rad(50.0)
-    """Of the grid, about the axis of the sonar."""
+    """Elevations that the grid spans, about the axis of the sonar."""
     elevations: Annotated[int, Ge(1), Le(100)] = 11
-    """Rows of the grid."""
+    """Rows of rays in the grid."""
     duration: PositiveSeconds = 0.05
     """How long a ray is followed."""
     bounces: Annotated[int, Ge(0), Le(100_000)] = 20

@@ -81,7 +81,7 @@ class LowPass:
     transition: Transition = 10e3
     """From where it passes everything to where it stops everything."""
     attenuation: Annotated[Decibels, Ge(21), Le(160)] = 80.0
-    """Of what is stopped, at least."""
+    """Attenuation of what is stopped, at least."""
 
 
 @description
@@ -96,7 +96,7 @@ class BandPass:
     transition: Transition = 5e3
     """From where it passes everything to where it stops everything."""
     attenuation: Annotated[Decibels, Ge(21), Le(160)] = 80.0
-    """Of what is stopped, at least."""
+    """Attenuation of what is stopped, at least."""
 
     @field_validator("high")
     @classmethod
@@ -167,11 +167,11 @@ class Sonar:
     array: Array = Romanis()
     """Where the hydrophones are."""
     band: Band = Band(low=25e3, high=85e3)
-    """What it works in."""
+    """Band that it works in."""
     filter: Filter | None = None
     """Anti-alias filter before sampling; left out: a `BandPass` of the band."""
     sampling_frequency: Annotated[PositiveHertz, Le(100e6)] = 196e3
-    """Of every channel."""
+    """Sampling frequency of every channel."""
     electronics: Electronics | None = None
     """Noise of the preamplifiers; left out: none."""
     sensor_errors: SensorErrors | None = None
@@ -179,7 +179,7 @@ class Sonar:
     baffle: Annotated[Decibels, Ge(0), Le(200)] = 0.0
     """How much weaker hydrophones hear what comes from behind the array."""
     converter: Converter | None = None
-    """Left out: pressure is stored as float32."""
+    """Converter to whole counts; left out: pressure is stored as float32."""
     beams: BeamGrid = BeamGrid()
     """Directions of the images."""
     assumed_sound_speed: WaterSoundSpeed = 1540.0

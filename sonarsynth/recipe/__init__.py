@@ -74,9 +74,9 @@ class Recipe:
     """
 
     title: str = "sonarsynth dataset"
-    """Of the dataset, in a few words."""
+    """Title of the dataset, in a few words."""
     seed: Annotated[int, Ge(0)] = 0
-    """Of everything that is drawn at random."""
+    """Seed of everything that is drawn at random."""
     licence: str = "CC-BY-4.0"
     """Licence of the dataset (not of the software)."""
     dataset: Attribution = Attribution()

@@ -189,7 +189,7 @@ class Scene:
     world: World
     """What there is."""
     sonar: Sonar = Field(default_factory=Sonar)
-    """What listens."""
+    """The sonar that listens."""
     trajectory: Trajectory = Field(default_factory=Trajectory)
     """When frames are taken, and how the sonar moves."""
     physics: Physics = Field(default_factory=Physics)

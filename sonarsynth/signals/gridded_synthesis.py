@@ -87,7 +87,7 @@ class GriddedSynthesis(Method):
     oversampling: Annotated[Number, Ge(1.2), Le(8)] = 1.5
     """Rate of the grid over twice the highest frequency."""
     precision: Literal["float32", "float64"] = "float32"
-    """Of the arrays that pulses are summed in."""
+    """Precision of the arrays that pulses are summed in."""
     tolerance: Annotated[Number, Gt(0), Lt(0.1)] = 1.5e-4
     """Error allowed to each of the other approximations, relative to what a path gives: nodes along each axis of the
     aperture, terms of directivity and of absorption; the quiet ends of the spectrum get 3 % of it each."""

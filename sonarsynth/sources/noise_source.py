@@ -28,7 +28,7 @@ class NoiseRecording:
 
     kind: Literal["noise_recording"] = "noise_recording"
     path: str
-    """Relative to the recipe."""
+    """Path of the file, relative to the recipe."""
     distance: PositiveMetres = 1.0
     """From the source to the hydrophone that recorded it: the pressure is brought to 1 m as 1/r."""
     pascals: Annotated[Number, Gt(0)] = 1.0
@@ -38,7 +38,7 @@ class NoiseRecording:
     dataset: str | None = None
     """Of an HDF5 ("/group/dataset"); left out: the only one that there is."""
     channel: Annotated[int, Ge(0)] = 0
-    """Of the file, from 0."""
+    """Channel of the file, from 0."""
     start: Seconds = 0.0
     """Time of the recording that is played at time 0 of the motions."""
 
@@ -83,7 +83,7 @@ class NoiseSource:
     one wave, curved as it is, bodies shade it, and it is alike in all directions."""
 
     name: Annotated[str, MinLen(1)]
-    """For people."""
+    """Name, for people."""
     motion: Motion
     """Where it is: at one place in each frame. Recordings are played faster as it approaches (Doppler)."""
     sound: Annotated[Noise | NoiseRecording, BY_KIND]

@@ -48,7 +48,7 @@ class RecordedSnap(PulseModel):
 
     kind: Literal["recorded_snap"] = "recorded_snap"
     path: str
-    """Relative to the recipe."""
+    """Path of the file, relative to the recipe."""
     distance: PositiveMetres = 1.0
     """From the snap to the hydrophone that recorded it: the pressure is brought to 1 m as 1/r."""
     pascals: Annotated[Number, Gt(0)] = 1.0
@@ -58,7 +58,7 @@ class RecordedSnap(PulseModel):
     dataset: str | None = None
     """Of an HDF5 ("/group/dataset"); left out: the only one that there is."""
     channel: Annotated[int, Ge(0)] = 0
-    """Of a WAV or an HDF5, or the column of pressure after the time, from 0."""
+    """Channel of a WAV or an HDF5, or the column of pressure after the time, from 0."""
     time: Seconds | None = None
     """Time of the collapse, on the file's own clock (of WAV and HDF5 from 0); left out: of the largest pressure."""
     fade: Annotated[Number, Ge(0), Le(0.5)] = 0.0

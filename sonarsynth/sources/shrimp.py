@@ -72,9 +72,9 @@ class SnappingShrimp(SoundSource):
 
     kind: Literal["snapping_shrimp"] = "snapping_shrimp"
     name: str = "shrimp"
-    """For people; nothing depends on it."""
+    """Name, for people; nothing depends on it."""
     position: tuple[Metres, Metres] | Position
-    """(x, y) on the bottom, or (x, y, z)."""
+    """Position (x, y) on the bottom, or (x, y, z): east, north and up, 0 at the surface."""
     height: NonNegativeMetres = 0.0
     """Height above the bottom, where z is left out."""
     snap: SnapModel = LogarithmicBubble()

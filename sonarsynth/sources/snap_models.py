@@ -44,15 +44,15 @@ class KellerMiksis(PulseModel):
     depth: NonNegativeMetres | None = None
     """Depth whose pressure drives the collapse; left out: that of the shrimp."""
     surface_pressure: Annotated[Pascals, Ge(0)] = 101325.0
-    """Of the air."""
+    """Pressure of the air above the sea."""
     vapour_pressure: Annotated[Pascals, Ge(0)] = 2339.0
-    """Within the bubble, constant."""
+    """Pressure of the vapour within the bubble, constant."""
     surface_tension: Annotated[Number, Ge(0)] = 0.0725
-    """In N/m."""
+    """Surface tension in N/m."""
     viscosity: Annotated[Number, Ge(0)] = 1e-3
-    """In Pa s."""
+    """Viscosity of the water in Pa s."""
     density: Annotated[KilogramsPerCubicMetre, Gt(0)] = 998.0
-    """Of the water."""
+    """Density of the water."""
     sound_speed: WaterSoundSpeed = 1482.0
     """In the water about the bubble: sets what it radiates, not how that travels."""
     exponent: Annotated[Number, Ge(1), Le(3)] = 1.4
@@ -140,9 +140,9 @@ class Gabor(PulseModel):
 
     kind: Literal["gabor"] = "gabor"
     frequency: PositiveHertz
-    """Of the tone."""
+    """Frequency of the tone."""
     cycles: Annotated[Number, Gt(0), Le(1000)] = 5.0
-    """Of the tone in the Gaussian's width at half its height."""
+    """Cycles of the tone in the Gaussian's width at half its height."""
     peak: Annotated[Pascals, Gt(0)] = 1.0
     """Pressure at 1 m at t = 0."""
 

@@ -43,7 +43,7 @@ class SoundSource(Method):
     otherwise."""
 
     name: str
-    """For people; nothing depends on it."""
+    """Name, for people; nothing depends on it."""
 
     times_field: ClassVar[str] = "times"
     """The field that gives the times, to be named where they are wrong."""

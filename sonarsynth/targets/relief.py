@@ -35,7 +35,7 @@ class Relief:
     least: NonNegativeMetres = 0.1
     """What rises less is taken as the mean plane."""
     scattering: Scattering | None = None
-    """As of a target."""
+    """How it scatters, as of a target."""
 
     def target(self, depth: float) -> Target | None:
         """The body, over a mean bottom at this depth (m); None where nothing rises. Raises MeshError."""

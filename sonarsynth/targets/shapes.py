@@ -38,7 +38,7 @@ class MeshFile(BodyShape):
 
     kind: Literal["mesh_file"] = "mesh_file"
     path: str
-    """Relative to the recipe."""
+    """Path of the file, relative to the recipe."""
     unit: Literal["auto", "m", "cm", "mm", "in", "ft"] = "auto"
     """Unit of the numbers in the file. `auto`: what the file says (COLLADA, glTF, 3MF); else metres, or millimetres
     where it would be larger than 300 m, which a note says. Of a file that says it: of what it calls a metre."""
@@ -94,9 +94,9 @@ class Cylinder(BodyShape):
 
     kind: Literal["cylinder"] = "cylinder"
     radius: Size
-    """Of the circle."""
+    """Radius of the circle."""
     length: Size
-    """Along x."""
+    """Length along x."""
     edge: Size | None = None
     """Longest edge of a facet; left out: an eighth of the radius, at most 10 cm where each echoes from its middle."""
 
@@ -121,13 +121,13 @@ class LShape(BodyShape):
 
     kind: Literal["l_shape"] = "l_shape"
     height: Size
-    """Of the inner face of the upright plate (x = 0, facing forward)."""
+    """Height of the inner face of the upright plate (x = 0, facing forward)."""
     length: Size
-    """Of the inner face of the lying plate (z = 0, facing up)."""
+    """Length of the inner face of the lying plate (z = 0, facing up)."""
     width: Size
-    """Of both plates, along y."""
+    """Width of both plates, along y."""
     thickness: Size
-    """Of both plates, behind and below the inner faces."""
+    """Thickness of both plates, behind and below the inner faces."""
     edge: Size | None = None
     """Longest edge of a facet; left out: the fewest facets, cut to 10 cm where each echoes from its middle."""
 
@@ -166,9 +166,9 @@ class Myring(BodyShape):
     tail: Size
     """Length of the tail."""
     diameter: Size
-    """Of the straight part."""
+    """Diameter of the straight part."""
     exponent: Annotated[Number, Ge(0.5), Le(10)] = 2.0
-    """Of the nose: 2 is an ellipse, more is blunter."""
+    """Exponent of the nose: 2 is an ellipse, more is blunter."""
     tail_angle: Annotated[Radians, Ge(0), Le(1.5)] = np.float64(0.436)
     """Half the angle included at the tip of the tail."""
     nose_offset: NonNegativeMetres = 0.0
@@ -203,11 +203,11 @@ class Knots(BodyShape):
 
     kind: Literal["knots"] = "knots"
     columns: Annotated[int, Ge(1), Le(1000)] = 1
-    """Knots of a row, along y."""
+    """Knots in a row, along y."""
     rows: Annotated[int, Ge(1), Le(1000)] = 20
-    """Rows, along z."""
+    """Rows of knots, along z."""
     spacing: Size = 0.1
-    """From one to the next."""
+    """Distance from one knot to the next."""
     radius: Size = 0.02
     """From the middle of a knot to its corners."""
     edge: ClassVar[None] = None

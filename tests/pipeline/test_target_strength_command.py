@@ -31,12 +31,14 @@ def test_the_table_holds_what_the_call_returns(tmp_path: Path, capsys: pytest.Ca
     assert (tmp_path / "out" / "target_strength.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_mesh_file_in_its_unit_and_silence_as_null(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_open_mesh_file_in_its_unit_and_silence_as_null(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "plate.off"
     file.write_text("OFF\n4 2 0\n0 -100 -100\n0 100 -100\n0 100 100\n0 -100 100\n3 0 1 2\n3 0 2 3\n")
     options = ["--frequency", "50e3", "--aspect", "0:180:180", "--unit", "cm", "--json", "--out", str(tmp_path)]
     assert run(app, ["target-strength", str(file), *options]) == 0
-    answer = json.loads(capsys.readouterr().out)
+    said = capsys.readouterr()
+    assert said.err.startswith("note: not closed: 1 of 1 parts open, 4 edges with one facet only")
+    answer = json.loads(said.out)
     assert answer["aspect_deg"] == [0.0, 180.0]
     levels = [row[0] for row in answer["target_strength_db"]]
     seen = [level for level in levels if level is not None]

@@ -131,9 +131,9 @@ class OneDirection:
 
     kind: Literal["direction"] = "direction"
     bearing: Radians
-    """Where it comes from, clockwise from north."""
+    """Bearing that it comes from, clockwise from north."""
     elevation: Elevation = 0.0
-    """Up positive."""
+    """Elevation that it comes from; up is positive."""
 
     @property
     def toward(self) -> Floats:

@@ -21,9 +21,9 @@ class KnudsenNoise(NoiseField):
 
     kind: Literal["knudsen"] = "knudsen"
     sea_state: Annotated[Number, Ge(0.5), Le(9)] = 2.0
-    """SS in the formula."""
+    """Sea state, SS in the formula."""
     directions: Directions | None = None
-    """As of `flat`; those of the surface fit it."""
+    """Directions that it comes from, as of `flat`; those of the surface fit it."""
 
     def density(self, frequency: Floats) -> Floats:
         """As `NoiseField.density`."""

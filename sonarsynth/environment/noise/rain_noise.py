@@ -21,9 +21,9 @@ class RainNoise(NoiseField):
 
     kind: Literal["rain"] = "rain"
     rate: Annotated[Number, Gt(0), Le(500)] = 10.0
-    """R: of rain, in mm/h."""
+    """Rate of rain, R in the formula, in mm/h."""
     directions: Directions | None = None
-    """As of `flat`; rain's are those of the surface."""
+    """Directions that it comes from, as of `flat`; rain's are those of the surface."""
 
     def density(self, frequency: Floats) -> Floats:
         """As `NoiseField.density`."""

@@ -33,7 +33,7 @@ class RecordedNoise(NoiseField):
 
     kind: Literal["recording"] = "recording"
     path: str
-    """Relative to the recipe."""
+    """Path of the file, relative to the recipe."""
     pascals: Annotated[Number, Gt(0)] = 1.0
     """Pressure (Pa) of the number 1 in the file; the full scale of a WAV of whole numbers is 1."""
     sampling_frequency: PositiveHertz | None = None
@@ -41,9 +41,9 @@ class RecordedNoise(NoiseField):
     dataset: str | None = None
     """Of an HDF5 ("/group/dataset"); left out: the only one that there is."""
     channel: Annotated[int, Ge(0)] = 0
-    """Of the file, from 0."""
+    """Channel of the file, from 0."""
     directions: Directions | None = None
-    """As of `flat`: one hydrophone does not tell where its sound came from."""
+    """Directions that it comes from, as of `flat`: one hydrophone does not tell where its sound came from."""
     play: Literal["spectrum", "samples"] = "spectrum"
     """What is kept of it; samples need `directions`."""
     start: Seconds = 0.0

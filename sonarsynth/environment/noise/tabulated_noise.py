@@ -24,11 +24,11 @@ class TabulatedNoise(NoiseField):
 
     kind: Literal["table"] = "table"
     frequencies: Annotated[tuple[PositiveHertz, ...], MinLen(1)]
-    """Rising."""
+    """Frequencies of the levels, rising."""
     levels: tuple[SpectralLevel, ...]
     """Spectral levels there, in dB re 1 uPa2/Hz."""
     directions: Directions | None = None
-    """As of `flat`."""
+    """Directions that it comes from, as of `flat`."""
 
     @model_validator(mode="after")
     def _check(self) -> TabulatedNoise:

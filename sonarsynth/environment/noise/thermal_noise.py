@@ -17,7 +17,7 @@ class ThermalNoise(NoiseField):
 
     kind: Literal["thermal"] = "thermal"
     directions: Directions | None = None
-    """As of `flat`."""
+    """Directions that it comes from, as of `flat`."""
 
     def density(self, frequency: Floats) -> Floats:
         """As `NoiseField.density`."""

@@ -22,7 +22,7 @@ class WenzNoise(NoiseField):
     shipping: Annotated[Number, Ge(0), Le(1)] = 0.5
     """How busy the sea is, from 0 to 1."""
     wind_speed: Annotated[PositiveSpeed, Le(60)] = 5.0
-    """Of the wind over the sea."""
+    """Wind speed over the sea."""
 
     directions: Directions | None = None
     """Where it comes from: hydrophones then hear it through their faces, and together; left out, the level is that at

@@ -21,9 +21,9 @@ class WindNoise(NoiseField):
 
     kind: Literal["wind"] = "wind"
     wind_speed: Annotated[PositiveSpeed, Le(60)] = 5.0
-    """Of the wind over the sea."""
+    """Wind speed over the sea."""
     directions: Directions | None = None
-    """As of `flat`; wind's are those of the surface."""
+    """Directions that it comes from, as of `flat`; wind's are those of the surface."""
 
     def density(self, frequency: Floats) -> Floats:
         """As `NoiseField.density`."""

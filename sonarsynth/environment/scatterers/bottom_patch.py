@@ -24,9 +24,9 @@ class BottomPatch(ScatteringField):
 
     kind: Literal["bottom_patch"] = "bottom_patch"
     centre: tuple[Metres, Metres]
-    """Of the disc: east and north."""
+    """Centre of the disc: east and north."""
     radius: PositiveMetres
-    """Of the disc."""
+    """Radius of the disc."""
     pieces: Annotated[int, Ge(1), Le(100_000)] = 1000
     """How many pieces the disc is cut into."""
     strength: Annotated[Decibels, Ge(-100), Le(-5)] = -27.0

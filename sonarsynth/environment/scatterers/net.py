@@ -27,7 +27,7 @@ class Net(ScatteringField):
     down: tuple[Metres, Metres, Metres] = (0.0, 0.0, -1.0)
     """From there to the first knot of the last row."""
     columns: Annotated[int, Ge(1), Le(1000)] = 1
-    """Knots of a row."""
+    """Knots in a row."""
     rows: Annotated[int, Ge(1), Le(1000)] = 20
     """Rows of knots."""
     strength: Annotated[Decibels, Ge(-120), Le(0)] = -50.0

@@ -25,7 +25,7 @@ class Stones(ScatteringField):
     positions: Annotated[tuple[tuple[Metres, Metres], ...], MinLen(1), MaxLen(100_000)]
     """East and north of each."""
     radius: PositiveMetres = 0.1
-    """Of each."""
+    """Radius of each stone."""
 
     @property
     def count(self) -> int:

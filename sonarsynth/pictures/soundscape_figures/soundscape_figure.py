@@ -163,9 +163,11 @@ def _amplitudes(axes: Axes, both: list[_Curve]) -> None:
         for data in (curve.figures for curve in both)
     )
     axes.set_ylim(0.5 * least, 1.5)
-    short = "/".join(name.split()[0] for name in ESTIMATORS)
     label(
-        axes, f"magnitude ({both[0].figures.sound.unit})", "share above", f"amplitudes ({short})\n" + "\n".join(titles)
+        axes,
+        f"magnitude ({both[0].figures.sound.unit})",
+        "share above",
+        f"amplitudes; alpha of a stable law by\n{', '.join(ESTIMATORS)}\n" + "\n".join(titles),
     )
 
 

@@ -29,7 +29,7 @@ class FirstEcho(Method):
     locality: Annotated[Decibels, Ge(0)] = 3.0
     """A beam gives no point where one within a beam width holds this much more at the same delay: the echo is its."""
     share: Annotated[Number, Gt(0), Lt(1)] = 0.5
-    """Of the power of the loudest echo in a beam, that is an echo too."""
+    """Share of the power of the loudest echo in a beam from which on a peak is an echo too."""
 
     def picks(self, window: ReceivedWindow) -> PickedEchoes:
         """See `PickingMethod`."""

@@ -66,11 +66,11 @@ class Upright(_Ranges):
 
     kind: Literal["upright"] = "upright"
     heading: tuple[Radians, Radians] = (0.0, 2 * np.pi)
-    """Clockwise from north."""
+    """Bounds of the heading, clockwise from north."""
     pitch: tuple[Radians, Radians] = (0.0, 0.0)
-    """Nose up."""
+    """Bounds of the pitch; the nose up is positive."""
     roll: tuple[Radians, Radians] = (0.0, 0.0)
-    """Starboard down."""
+    """Bounds of the roll; the starboard side down is positive."""
 
     def attitude(self, draws: Floats) -> Attitude:
         """By three draws (0 to 1)."""
@@ -110,9 +110,9 @@ class StraightAhead(_Ranges):
 
     kind: Literal["straight"] = "straight"
     speed: tuple[MetresPerSecond, MetresPerSecond]
-    """Along the heading."""
+    """Bounds of the speed along the heading."""
     climb: tuple[MetresPerSecond, MetresPerSecond] = (0.0, 0.0)
-    """How fast they rise; they stay level."""
+    """Bounds of the speed upwards; the bodies stay level."""
 
     def motion(self, point: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
         """As `AtRest.motion`."""
@@ -127,15 +127,15 @@ class Hovering(_Ranges):
 
     kind: Literal["hovering"] = "hovering"
     surge: tuple[NonNegativeMetres, NonNegativeMetres] = (0.0, 0.0)
-    """Amplitude forward."""
+    """Bounds of the amplitude forward and back."""
     sway: tuple[NonNegativeMetres, NonNegativeMetres] = (0.0, 0.0)
-    """Amplitude to port."""
+    """Bounds of the amplitude to port and starboard."""
     heave: tuple[NonNegativeMetres, NonNegativeMetres] = (0.0, 0.0)
-    """Amplitude up and down."""
+    """Bounds of the amplitude up and down."""
     yaw: tuple[Radians, Radians] = (0.0, 0.0)
-    """Amplitude of the heading."""
+    """Bounds of the amplitude of the heading."""
     period: tuple[PositiveSeconds, PositiveSeconds] = (5.0, 10.0)
-    """Of the swing, the same for all of a body's."""
+    """Bounds of the period, which is the same for all swings of a body."""
 
     def motion(self, point: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
         """As `AtRest.motion`, about the point."""
@@ -159,7 +159,7 @@ class Wandering(_Ranges):
 
     kind: Literal["wandering"] = "wandering"
     speed: tuple[MetresPerSecond, MetresPerSecond]
-    """Along each leg."""
+    """Bounds of the speed along a leg."""
     leg: PositiveSeconds
     """How long a leg takes."""
     turn: Annotated[Radians, Ge(0), Le(np.pi)]

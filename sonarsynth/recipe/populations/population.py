@@ -29,9 +29,9 @@ class BodyModel:
     scale: tuple[Scale, Scale] = (1.0, 1.0)
     """Least and largest size over that of the shape, drawn evenly in the logarithm."""
     scattering: Scattering | None = None
-    """As of a target."""
+    """How its bodies scatter, as of a target."""
     licence: str = ""
-    """Of the mesh, where it is somebody's."""
+    """Licence of the mesh, where it is somebody's."""
 
     @model_validator(mode="after")
     def _check(self) -> BodyModel:

@@ -37,7 +37,7 @@ class FieldOfView:
     far: PositiveMetres
     """Longest range."""
     share: Annotated[Number, Gt(0), Le(2)] = 1.0
-    """Of the spans of the beams: over 1, some bodies are out of view."""
+    """Share of the spans of the beams in which bodies are: over 1, some bodies are out of view."""
 
     @model_validator(mode="after")
     def _check(self) -> FieldOfView:
@@ -83,7 +83,7 @@ class Annulus:
 
     kind: Literal["annulus"] = "annulus"
     centre: tuple[Metres, Metres]
-    """x and y."""
+    """Centre of both circles: x (east) and y (north)."""
     inner: NonNegativeMetres = 0.0
     """Radius of the inner circle."""
     outer: PositiveMetres

@@ -18,7 +18,7 @@ class RoughSediment(BoundaryLaw):
 
     kind: Literal["sediment"] = "sediment"
     name: str | None = None
-    """Of the sediment; left out, that of the environment's bottom."""
+    """Name of the sediment; left out, that of the environment's bottom."""
 
     @field_validator("name")
     @classmethod

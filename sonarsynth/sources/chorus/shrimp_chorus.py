@@ -31,11 +31,11 @@ class Clusters:
     """Snaps that come together: a Neyman-Scott process. Source: Neyman and Scott (1958), J. R. Stat. Soc. B 20, 1."""
 
     snaps: Annotated[Number, Ge(0.1), Le(100)] = 3.0
-    """Of a cluster: the mean of a Poisson law, so that counts over long times have a Fano factor of 1 + snaps."""
+    """Snaps of a cluster: the mean of a Poisson law, so that counts over long times have a Fano factor of 1 + snaps."""
     radius: Annotated[PositiveMetres, Le(20)] = 2.0
-    """Of a cluster on the bottom, evenly filled."""
+    """Radius of a cluster on the bottom, evenly filled."""
     duration: Annotated[PositiveSeconds, Le(1)] = 0.1
-    """Of a cluster, evenly filled."""
+    """Duration of a cluster, evenly filled."""
 
 
 @description
