@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -119,7 +120,9 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
     full = _straight_covariance(wave, timing, by_angle / from_depth, knowledge)
     tilt = by_angle * (KINKED * knowledge.kink * elements.aperture / sonar.assumed_sound_speed)
     straight, spread = full, full[:2, :2] + np.outer(tilt, tilt)
-    around = spread[0, 0] / max(1 - bent.direction[2] ** 2, 1e-300)
+    from_pole = float(np.hypot(*bent.direction[:2]))  # its azimuth is anybody's guess where it may be beyond
+    beyond = 0.5 * math.erfc(from_pole / max(np.sqrt(2.0 * spread[1, 1]), 1e-300))
+    around = min(spread[0, 0] / max(from_pole**2, 1e-300) + np.pi**2 * beyond, np.pi**2)
     fix = _fuse(wave, straight, fall, knowledge)
     for _ in range(2 * (knowledge.gradient > 0)):  # bending depends on the distance, and that a little on bending
         likely = [1 / fix.curvature if fix.curvature > 0 else np.nan, from_depth, elements.aperture]
