@@ -41,7 +41,7 @@ def test_a_short_build_needs_no_reader_and_no_scheduler_and_comparing_files_no_c
     store = str(tmp_path / "s.zarr")
     loaded = loaded_by("build", "configs/remus.yaml", store, "--frames", "3:4")
     assert "sonarsynth.store.writing" in loaded
-    assert loaded & (READERS | SCHEDULERS | {"matplotlib", "open3d"}) == set()
+    assert loaded & (READERS | SCHEDULERS | {"matplotlib", "open3d", "scipy.optimize"}) == set()
     loaded = loaded_by("verify", "--quick", store)
     assert "sonarsynth.store.checking.verifying" in loaded
     assert loaded & (READERS | SCHEDULERS | {"numba", "scipy", "matplotlib", "sonarsynth.recipe"}) == set()

@@ -9,6 +9,8 @@ from sonarsynth.conventions import Floats
 LOWEST = 3.0
 """Of the mean power: peaks under this are not told from each other, so that no threshold is lower."""
 HIGHEST = 1e3
+PRECISION = 1e-13
+"""Of a level."""
 
 
 def expected_peaks(level: float, size: Floats) -> float:
@@ -43,11 +45,10 @@ def _expected(level: float, volumes: tuple[float, float, float, float]) -> float
 
 def peak_level(false_alarms: float, size: Floats) -> float:
     """Level, over the mean power of noise, that so many peaks exceed on average (`expected_peaks`)."""
-    from scipy.optimize import brentq
-
-    volumes = _volumes(size)
-
-    def excess(level: float) -> float:
-        return _expected(level, volumes) - false_alarms
-
-    return LOWEST if excess(LOWEST) <= 0.0 else float(brentq(excess, LOWEST, HIGHEST))
+    volumes, low, high = _volumes(size), LOWEST, HIGHEST
+    if _expected(low, volumes) <= false_alarms:
+        return low
+    while high - low > PRECISION * high:  # fewer peaks exceed a higher level
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _expected(middle, volumes) > false_alarms else (low, middle)
+    return high

@@ -81,14 +81,12 @@ def onset(bubble: Bubble) -> float:
 @lru_cache(maxsize=64)
 def peak(bubble: Bubble) -> tuple[float, float]:
     """Time (s) and size (Pa) of the largest pressure at 1 m."""
-    from scipy.optimize import minimize_scalar
-
     x = np.geomspace(1e-4 / abs(bubble.q), -onset(bubble), 4096)
-    i = int(np.clip(np.argmax(pressure(-x, bubble)), 1, x.size - 2))
-    minimum = minimize_scalar(
-        lambda y: -float(pressure(-y, bubble)), bounds=(x[i - 1], x[i + 1]), method="bounded", options={"xatol": 1e-13}
-    )
-    return -float(minimum.x), -float(minimum.fun)
+    for _ in range(7):  # each look is at 1/32 of the one before
+        i = int(np.clip(np.argmax(pressure(-x, bubble)), 1, x.size - 2))
+        x = np.linspace(x[i - 1], x[i + 1], 65)
+    at = np.argmax(pressure(-x, bubble))
+    return -float(x[at]), float(pressure(-x[at], bubble))
 
 
 @lru_cache(maxsize=64)
