@@ -83,6 +83,11 @@ class LowPass:
     attenuation: Annotated[Decibels, Ge(21), Le(160)] = 80.0
     """Attenuation of what is stopped, at least."""
 
+    @property
+    def edges(self) -> tuple[float, float]:
+        """Hz: lower and upper edge of what passes."""
+        return 0.0, self.cutoff
+
 
 @description
 class BandPass:
@@ -102,6 +107,11 @@ class BandPass:
     @classmethod
     def _check_high(cls, value: float, info: ValidationInfo) -> float:
         return _above_low(value, info)
+
+    @property
+    def edges(self) -> tuple[float, float]:
+        """As `LowPass.edges`."""
+        return self.low, self.high
 
 
 Filter = Annotated[LowPass | BandPass, BY_KIND]
@@ -202,7 +212,7 @@ class Sonar:
             raise ValueError(f"{value:g} Hz is under twice the band ({band.high:g} Hz)")
         chosen = chosen or BandPass(low=band.low, high=band.high)
         edge = stop_frequency(chosen)
-        if edge <= band.low or (isinstance(chosen, BandPass) and chosen.low - 0.5 * chosen.transition >= band.high):
+        if edge <= band.low or chosen.edges[0] - 0.5 * chosen.transition >= band.high:
             raise ValueError(f"nothing to sample: the filter stops the whole band ({band.low:g} to {band.high:g} Hz)")
         if value < 2 * edge:
             raise ValueError(f"{value:g} Hz is under twice the filter's stop edge ({edge:g} Hz)")
@@ -244,5 +254,4 @@ def _pass_band(band: Band) -> BandPass:
 
 def stop_frequency(filter: Filter) -> float:
     """Where the stop band begins (Hz)."""
-    edge = filter.cutoff if isinstance(filter, LowPass) else filter.high
-    return edge + 0.5 * filter.transition
+    return filter.edges[1] + 0.5 * filter.transition

@@ -18,7 +18,7 @@ from sonarsynth.equations.bubble.snap_pressure import Bubble, ComplexArray
 from sonarsynth.equations.noise import filters
 from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
-from sonarsynth.receiver import Filter, LowPass, Sonar, stop_frequency
+from sonarsynth.receiver import Filter, Sonar, stop_frequency
 from sonarsynth.signals.gridded.nodes import analysis, chebyshev, rounded_up
 from sonarsynth.sources.pulse_model import PulseModel, Stamp
 from sonarsynth.sources.snap_pulses import Waveform
@@ -39,9 +39,7 @@ PULSE_FEET = float(np.sqrt(-2.0 * np.log(filters.SUPPORT_TOLERANCE)))
 
 def fir(chosen: Filter) -> Fir:
     """The numbers of a described filter, as the equations take them."""
-    low = 0.0 if isinstance(chosen, LowPass) else chosen.low
-    high = chosen.cutoff if isinstance(chosen, LowPass) else chosen.high
-    return Fir(low, high, chosen.transition, chosen.attenuation)
+    return Fir(*chosen.edges, chosen.transition, chosen.attenuation)
 
 
 class PulseChanges(NamedTuple):

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.noise.directions import NoiseDirections
 from sonarsynth.geometry import Pose
-from sonarsynth.receiver import BandPass, Elements, Sonar, stop_frequency
+from sonarsynth.receiver import Elements, Sonar, stop_frequency
 from sonarsynth.signals.noise import lattice_noise, random_waves
 from sonarsynth.signals.noise.lattice_noise import TORUS, PeriodicField, lattice_of, periodic_field
 
@@ -26,13 +26,11 @@ def field_on_lattice(
     """The periodic field that is drawn, over all that passes the filter of the sonar; None where plane waves are."""
     if directions.toward is not None or not elements.on_lattice or elements.count < SMALL:
         return None
-    high = stop_frequency(sonar.antialias)
     passed = sonar.antialias
-    low = passed.low - 0.5 * passed.transition if isinstance(passed, BandPass) else 0.0
+    low, high = passed.edges[0] - 0.5 * passed.transition, stop_frequency(passed)
     up = pose.turn_to_body([0.0, 0.0, 1.0])
-    return periodic_field(
-        directions, lattice_of(elements, up, sound_speed, sonar.behind), max(low, LOWEST * high), high
-    )
+    lattice = lattice_of(elements, up, sound_speed, sonar.behind)
+    return periodic_field(directions, lattice, max(low, LOWEST * high), high)
 
 
 def draw(
