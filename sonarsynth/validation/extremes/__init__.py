@@ -15,7 +15,7 @@ from sonarsynth.validation.extremes import (
     extreme_sources,
     extreme_targets,
 )
-from sonarsynth.validation.extremes.outcomes import Case, Extreme, outcome, outcomes
+from sonarsynth.validation.extremes.outcomes import Case, Extreme, outcome
 
 __all__ = ["Case", "Extreme", "extremes", "groups", "outcome"]
 
@@ -35,6 +35,6 @@ def groups() -> dict[str, tuple[Case, ...]]:
     }
 
 
-def extremes(*, quick: bool = False) -> Iterator[Extreme]:
-    """The rows of the table, as they are done; quick: without what takes minutes or gigabytes."""
-    return outcomes(groups(), quick=quick)
+def extremes() -> Iterator[Extreme]:
+    """The rows of the table, as they are done."""
+    return (outcome(group, case) for group, cases in groups().items() for case in cases)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
@@ -101,11 +101,3 @@ def outcome(group: str, case: Case) -> Extreme:
     except Exception as error:
         result = CaseResult(f"{type(error).__name__}: {' '.join(str(error).split())}", False)
     return Extreme(group, case.name, case.expected, result.text, result.ok, time.process_time() - began)
-
-
-def outcomes(groups: dict[str, tuple[Case, ...]], *, quick: bool) -> Iterator[Extreme]:
-    """The rows of groups of cases, one by one; quick: without the slow ones."""
-    for group, cases in groups.items():
-        for case in cases:
-            if not (quick and case.slow):
-                yield outcome(group, case)
