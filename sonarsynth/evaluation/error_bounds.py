@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
 
+from sonarsynth.conventions import evenly
 from sonarsynth.detection import beam_width
 from sonarsynth.evaluation.checks import Stored, every, has, numbered, of_frames
 from sonarsynth.evaluation.point_checks import has_labels, points, range_errors, room_for_points
@@ -85,7 +86,7 @@ def warnings(store: Folder | str) -> list[str]:
             built = np.flatnonzero(np.isfinite(every(tree, "truth/sonar_position")[:, 0]))
             room = room_for_points(tree) if has(tree, "cloud") else 1
             count = min(FRAMES_REMOTE if isinstance(path, Remote) else FRAMES, max(ROWS // max(room, 1), 1), len(built))
-            frames = built[np.linspace(0, len(built) - 1, count).round().astype(int)]
+            frames = built[evenly(len(built), count)]
             checks = bounds(tree, frames) + (range_errors(tree, frames) if has_labels(tree) else [])
     except (OSError, KeyError, ValueError):
         return []

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Floats, Ints, evenly
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
 from sonarsynth.planning.choosing import pressures
@@ -191,7 +191,7 @@ def synthesis_check(exact: ExactFrame) -> Point:
     few = subarray(plan.elements, sensor)
     arrivals = arrivals_of(exact_plan(plan), frame, few)
     echoes = np.flatnonzero(~arrivals.direct)
-    sampled = echoes[np.linspace(0, len(echoes) - 1, min(CHECKED_PATHS, len(echoes))).astype(int)]
+    sampled = echoes[evenly(len(echoes), CHECKED_PATHS)]
     arrivals = arrivals.select(np.concatenate([np.flatnonzero(arrivals.direct), sampled]))
     both = [pressures(plan, frame, arrivals, few.elements, method) for method in (golden(plan), DirectSum())]
     error, largest = differences(*both)

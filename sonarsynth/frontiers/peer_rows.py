@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from sonarsynth.conventions import evenly
 from sonarsynth.frontiers.exact_frame import golden
 from sonarsynth.frontiers.image_knobs import image_of, imaged
 from sonarsynth.frontiers.peers import (
@@ -81,7 +82,7 @@ def image_peers(plan: Plan, frame: Frame, arrivals: Arrivals, beamformed: Beamfo
     slow = DenseDelayAndSum(focus=focus, shading="uniform")
     exact = np.asarray(image_of(plan, beamformed, slow).energy, float)
     bright = np.flatnonzero(exact.ravel() >= 0.01 * exact.max())
-    beams = bright[np.linspace(0, len(bright) - 1, min(THESIS_BEAMS, len(bright))).astype(int)]
+    beams = bright[evenly(len(bright), THESIS_BEAMS)]
     if len(beams) > 1 and (~arrivals.direct).any():
         pulse = thesis_pulse(frame.moment.snaps[0], plan)
         energy, seconds = thesis_image(plan, arrivals, pulse, sonar.sampling_frequency, beams, sonar.band.centre)

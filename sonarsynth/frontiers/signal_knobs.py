@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonarsynth.conventions import evenly
 from sonarsynth.frontiers.exact_frame import Pressures, differences, golden
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
@@ -119,7 +120,7 @@ def direct_sum_point(traced: TracedBySensor) -> Point:
     """The direct sum: no error; its cost from a few hydrophones and paths."""
     plan, (piece, arrivals) = traced.plan, traced.few[0]
     arrivals = arrivals.seen_from_centre  # they have as many terms at hydrophones that miss some
-    paths = np.linspace(0, len(arrivals.delay) - 1, min(SUMMED_PATHS, len(arrivals.delay))).astype(int)
+    paths = np.array(evenly(len(arrivals.delay), SUMMED_PATHS))
     start, samples = frame_start(plan, traced.frame), plan.windows.samples
     seconds = []
     for count in SUMMED_HYDROPHONES:

@@ -15,7 +15,7 @@ from itertools import takewhile
 
 import numpy as np
 
-from sonarsynth.conventions import Ints
+from sonarsynth.conventions import Ints, evenly
 from sonarsynth.frontiers.exact_frame import (
     ExactFrame,
     Pressures,
@@ -85,8 +85,7 @@ class TracedBySensor:
     @property
     def few(self) -> list[tuple[Subarray, Arrivals]]:
         """Some of the parts, spread."""
-        count = len(self.pieces)
-        return [self.pieces[n] for n in np.unique(np.linspace(0, count - 1, min(TIMED, count)).astype(int))]
+        return [self.pieces[n] for n in evenly(len(self.pieces), TIMED)]
 
     def synthesis_seconds(self) -> float:
         """CPU seconds of the plan's synthesis at all parts."""

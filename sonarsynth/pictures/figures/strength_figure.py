@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, evenly
 from sonarsynth.pictures.figures.style import DYNAMIC_RANGE, ENERGY_MAP, INK, RAYS, figure, label
 
 if TYPE_CHECKING:
@@ -39,9 +39,8 @@ def strength_figure(title: str, aspect: Floats, frequency: Floats, strength: Flo
 def _rose(axes: PolarAxes, aspect: Floats, frequency: Floats, strength: Floats, top: float) -> None:
     low = top - DYNAMIC_RANGE
     axes.set_theta_zero_location("N")
-    drawn = sorted({int(i) for i in np.linspace(0, len(frequency) - 1, CURVES).round()})
     line = "-" if len(aspect) > 1 else "o"
-    for n, i in enumerate(drawn):
+    for n, i in enumerate(evenly(len(frequency), CURVES)):
         level = np.maximum(strength[:, i], low)
         axes.plot(aspect, level, line, color=RAYS[n], linewidth=0.8, markersize=4, label=f"{frequency[i] / 1e3:g} kHz")
     if len(frequency) > 1:

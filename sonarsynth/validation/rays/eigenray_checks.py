@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonarsynth.conventions import evenly
 from sonarsynth.equations.rays import ray_solutions
 from sonarsynth.equations.rays.ray_solutions import CAUSTIC
 from sonarsynth.validation.rays import ray_cases
 from sonarsynth.validation.rays.ray_cases import Case
-from sonarsynth.validation.rays.ray_matching import Rays, errors, miscounted, nearest, rays_of, worst
+from sonarsynth.validation.rays.ray_matching import errors, miscounted, nearest, rays_of, worst
 from sonarsynth.validation.references.rays.followed_rays import count_rays
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
 from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
@@ -64,11 +65,6 @@ def _counts(case: Case, rays: int) -> dict[str, int]:
     return {"pairs": len(case.start), "rays": rays}
 
 
-def _thinned(case: Case, rays: Rays) -> np.ndarray:
-    count = len(rays.pair)
-    return np.unique(np.linspace(0, count - 1, min(count, case.check)).astype(int))
-
-
 def _layered(quick: bool) -> Iterator[Row]:
     """Rows of the rays found, made exact, and of the fan that counts them."""
     for case in ray_cases.layered(quick):
@@ -78,7 +74,7 @@ def _layered(quick: bool) -> Iterator[Row]:
         water = ray_solutions.water(case.depth, case.speed, case.bottom)
         wrong = miscounted(rays, count_rays(water, *ends, case.vertices, case.reflections))
         yield Row(case.name, FAN, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(rays.pair)))
-        keep = _thinned(case, rays)
+        keep = np.array(evenly(len(rays.pair), case.check))
         selected, trusted = rays.select(keep), np.asarray(eigenrays.flag[keep] != CAUSTIC)
         exact = exact_rays(Layers(case.depth, case.speed), selected, eigenrays.slowness[keep], *ends)
         differing = float(sum(a != b for a, b in zip(selected.families, exact.families, strict=True)))
