@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sonarsynth.frontiers.exact_frame import ExactFrame, differences, exact_plan
-from sonarsynth.frontiers.image_knobs import apart, imaged, off_by
+from sonarsynth.frontiers.image_knobs import apart, image_point, imaged
 from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.pipeline import BeamformedFrame, cloud_of, digitise, locate_and_image
@@ -33,12 +33,8 @@ class FullFrame:
         plan, frame = exact.plan, exact.frame
         recorded = digitise(plan, frame, signals)
         beamformed = locate_and_image(plan, frame, recorded)
-        locating, receiver_and_survey, snaps = (
-            locator(plan.scene),
-            (receiver_of(plan, frame), survey_of(plan, frame)),
-            plan.sizes["emission"],
-        )
-        _, seconds = timed(lambda: locating.locate(recorded, *receiver_and_survey, snaps))
+        locating, receiver, survey = locator(plan.scene), receiver_of(plan, frame), survey_of(plan, frame)
+        _, seconds = timed(lambda: locating.locate(recorded, receiver, survey, plan.sizes["emission"]))
         return FullFrame(exact, beamformed, seconds)
 
 
@@ -76,18 +72,8 @@ def whole_points(full: FullFrame, traced: TracedBySensor, seconds: float) -> Ite
     slowest = time.process_time() - began + sum(exact.single.seconds)
     yield Point("frame", "exact", "everything exact", 0.0, "relative", accuracy.signal, slowest)
     assert full.beamformed.image is not None and best.image is not None
-    off = off_by(full.beamformed.image.energy, best.image.energy)
-    yield Point(
-        stage="frame",
-        knob="image",
-        setting="the plan",
-        error=float(np.sqrt(np.mean(off**2))),
-        unit="dB",
-        allowed=accuracy.image_db,
-        seconds=seconds,
-        chosen=True,
-        also={"largest_db": float(np.abs(off).max(initial=0.0)), "beams": len(off)},
-    )
+    energies = full.beamformed.image.energy, best.image.energy
+    yield replace(image_point(plan, *energies, "image", "the plan", seconds, chosen=True), stage="frame")
     metres, angle, alone = apart(cloud_of(plan, frame, full.beamformed), cloud)
     yield Point(
         stage="frame",
