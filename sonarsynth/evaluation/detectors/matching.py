@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Floats, Ints, direction
 from sonarsynth.detection import Detections
 from sonarsynth.evaluation.detectors.true_objects import TrueObjects
 
@@ -31,15 +31,12 @@ def nearness(detections: Detections, objects: TrueObjects, rows: Ints, others: I
     the object."""
     far = objects.range[others][None]
     away = np.where(np.isfinite(detections.range[rows])[:, None], detections.range[rows][:, None], far)
-    ours = away[..., None] * _directions(detections.azimuth[rows], detections.elevation[rows])[:, None]
-    true = far[..., None] * _directions(objects.azimuth[others], objects.elevation[others])[None]
-    return np.asarray(np.nan_to_num(-np.linalg.norm(ours - true, axis=-1), nan=-np.inf))
-
-
-def _directions(azimuth: Floats, elevation: Floats) -> Floats:
-    """Unit vectors (row, xyz) of angles in degrees."""
-    a, e = np.deg2rad(azimuth), np.deg2rad(elevation)
-    return np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], axis=-1)
+    ours, true = (
+        direction(np.deg2rad(of.azimuth[those]), np.deg2rad(of.elevation[those]))
+        for of, those in ((detections, rows), (objects, others))
+    )
+    apart = away[..., None] * ours[:, None] - far[..., None] * true[None]
+    return np.asarray(np.nan_to_num(-np.linalg.norm(apart, axis=-1), nan=-np.inf))
 
 
 def match(detections: Detections, objects: TrueObjects, closeness: Closeness, least: Sequence[float]) -> Ints:

@@ -80,7 +80,8 @@ class BesidePicture:
         across, up = (np.ptp(edges(angle)) for angle in (azimuth, elevation))
         self._width = WIDTHS[len(columns)] * (SMALLER if rows > 1 else 1.0)
         self._height = float(np.clip(self._width * up / across, 0.25 * self._width, 1.6 * self._width))
-        titles = [_two_lines(column.name, int(LETTERS * self._width)) for column in columns]
+        letters = int(LETTERS * self._width)
+        titles = ["\n".join(wrap(column.name, letters, max_lines=2, placeholder=" ...")) for column in columns]
         table = LINE * (len(columns[0].numbers) + 1.3 * bool(note)) + BOTTOM
         below = table + AXIS
         top = below + rows * (self._height + GAP) - GAP
@@ -175,10 +176,6 @@ def _outline(artists: Sequence[PolyCollection], hulls: Sequence[tuple[Hull, ...]
             artist.set_verts(lines[like])
             artist.set_edgecolor(artists[like].get_edgecolor())
     return lines
-
-
-def _two_lines(text: str, letters: int) -> str:
-    return "\n".join(wrap(text, letters, max_lines=2, placeholder=" ..."))
 
 
 def _drawn(level: Floats | None) -> np.ma.MaskedArray:

@@ -83,16 +83,6 @@ DUCT = np.array([0.0, 40.0, 60.0, 100.0]), np.array([1520.0, 1500.0, 1502.0, 153
 JUMP = np.array([0.0, 30.0, 30.0, 70.0, 70.0, 100.0]), np.array([1510.0, 1505.0, 1515.0, 1490.0, 1486.0, 1495.0])
 
 
-def thermocline() -> tuple[Floats, Floats]:
-    """The sharp thermocline of a shallow tropical site over a bottom at 20 m."""
-    return cut(Thermocline().nodes, 20.0)
-
-
-def munk_layers(tolerance: float, bottom: float = 5000.0) -> tuple[Floats, Floats]:
-    """The layers that stand for the canonical profile to a tolerance (s) at each turning point."""
-    return cut(Munk(tolerance=tolerance).nodes, bottom)
-
-
 def layered(quick: bool) -> Iterator[Case]:
     """Layers: one of one speed, one of one gradient (that of pressure and its opposite, that of a sharp thermocline,
     and hardly any), few, many, a thermocline, a duct, jumps, a noisy cast."""
@@ -108,7 +98,7 @@ def layered(quick: bool) -> Iterator[Case]:
     yield drawn(
         "50 layers", random_layers(50, 200.0, 5.0), 10.0, 3e3, many, 3, reflections=3, bounds=LOOSE, check=few // 2
     )
-    yield drawn("thermocline", thermocline(), 1.0, 500.0, many, 4, reflections=4, check=few)
+    yield drawn("thermocline", cut(Thermocline().nodes, 20.0), 1.0, 500.0, many, 4, reflections=4, check=few)
     yield drawn("duct", DUCT, 50.0, 5e3, many, 8, reflections=1, check=few)
     yield drawn("jumps", JUMP, 10.0, 5e3, many, 4, reflections=4, check=few)
     cast = noisy_cast(100.0, 2.0 if quick else 0.5)
@@ -122,4 +112,5 @@ MUNK_START, MUNK_ENDS, MUNK_VERTICES = 1000.0, np.array([310.0, 800.0, 1310.0, 2
 def munk_case(tolerance: float, distance: float) -> Case:
     """The canonical profile in layers to a tolerance (s) at each turning point, joined over a distance (m)."""
     same = np.full(len(MUNK_ENDS), MUNK_START), MUNK_ENDS, np.full(len(MUNK_ENDS), distance)
-    return Case(f"Munk, layers to {tolerance:g} s", *munk_layers(tolerance), *same, MUNK_VERTICES, 0)
+    layers = cut(Munk(tolerance=tolerance).nodes, 5000.0)
+    return Case(f"Munk, layers to {tolerance:g} s", *layers, *same, MUNK_VERTICES, 0)
