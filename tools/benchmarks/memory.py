@@ -74,10 +74,10 @@ def sphere_recipe(facets: int, *changes: tuple[str, Any]) -> Any:
     return reading.load(RECIPE, tuple(f"{path}={json.dumps(value)}" for path, value in sets.items()))
 
 
-def of_mesh(facets: int, refracted: bool = False, choosing: bool = True) -> dict[str, Any]:
+def of_mesh(facets: int, refracted: bool = False) -> dict[str, Any]:
     """Peaks of a plan and a frame of a sphere of so many facets, by stage.
 
-    The frame is made by the choices of a sphere of few facets; choosing: those of this one are made too, last.
+    The frame is made by the choices of a sphere of few facets; those of this one are made last.
     """
     from sonarsynth import planning
 
@@ -92,8 +92,7 @@ def of_mesh(facets: int, refracted: bool = False, choosing: bool = True) -> dict
     mesh = stages.run("mesh", lambda: recipe.scene_of(0).meshes[0])
     plan = stages.run("plan, choices given", lambda: planning.plan(recipe, choices=few))
     paths = _frame(stages, plan)
-    if choosing:
-        stages.run("plan, choosing", lambda: planning.plan(recipe))
+    stages.run("plan, choosing", lambda: planning.plan(recipe))
     worst = max(row["peak_mb"] for row in stages.rows.values())
     return {
         "facets": len(mesh.faces), "paths": paths, "import_mb": round(start), "peak_mb": worst,

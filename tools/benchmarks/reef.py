@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.build import one
 from benchmarks.timing import CONFIGS, gemm, markdown, once
-from sonarsynth.pipeline import beamform_frame, range_frame, stage_timer, trace_frame
 from sonarsynth.planning import Plan, plan
 from sonarsynth.recipe import reading
 
@@ -33,12 +33,12 @@ def bench() -> dict[str, Any]:
     plans = {name: _planned("reef.yaml", *settings) for name, settings in SEAS.items()}
     plans["remus.yaml"] = _planned("remus.yaml")
     for made in plans.values():
-        _stages(made, FRAMES[0])  # compiles, and fills tables
+        one(made, FRAMES[0])  # compiles, and fills tables
     spent = {name: list[dict[str, float]]() for name in plans}
     total = {name: list[float]() for name in plans}
     for frame in FRAMES:
         for name, made in plans.items():
-            stages, seconds = once(partial(_stages, made, frame))
+            (_, stages), seconds = once(partial(one, made, frame))
             spent[name].append(stages)
             total[name].append(seconds)
     living = np.array(total["reef.yaml"])
@@ -67,11 +67,3 @@ def table(found: dict[str, Any]) -> str:
 
 def _planned(name: str, *settings: str) -> Plan:
     return plan(reading.load(CONFIGS / name, list(settings)))
-
-
-def _stages(made: Plan, index: int) -> dict[str, float]:
-    """CPU seconds of each stage of a frame."""
-    with stage_timer() as cpu:
-        traced = trace_frame(made, index)
-        range_frame(made, index, traced, beamform_frame(made, index, traced))
-    return dict(cpu)

@@ -24,6 +24,7 @@ from fault_injection.cluster import Cluster
 from fault_injection.kills import RECIPE
 from fault_injection.processes import workers_of
 
+from benchmarks.timing import markdown
 from sonarsynth import planning, schedule
 from sonarsynth.planning import SHARD_FRAMES, Plan
 from sonarsynth.recipe import reading
@@ -141,23 +142,14 @@ def bench() -> dict[str, Any]:
 def table(result: dict[str, Any]) -> str:
     """The result in Markdown."""
     runs = {name: run for name, run in result.items() if isinstance(run, dict)}
-    lines = [
-        f"| {result['frames']} frames | overhead | writing | ms of processor a frame | load |",
-        "| --- | --- | --- | --- | --- |",
-    ]
+    rows = [[f"{result['frames']} frames", "overhead", "writing", "ms of processor a frame", "load"]]
     for name, run in runs.items():
+        overhead, writing = f"{100 * run['overhead']:.1f} %", f"{run['writing_ms_a_frame']:.2f} ms a frame"
         cpu = ", ".join(f"{who} {ms:.2f}" for who, ms in run["cpu_ms_a_frame"].items())
-        lines.append(
-            f"| {name} | {100 * run['overhead']:.1f} % | {run['writing_ms_a_frame']:.2f} ms a frame "
-            f"| {cpu} (frame itself {run['frames_cpu_ms']:.2f}) | {run['load']:.1f} |"
-        )
+        rows.append([name, overhead, writing, f"{cpu} (frame itself {run['frames_cpu_ms']:.2f})", f"{run['load']:.1f}"])
     marks = sorted({at for run in runs.values() for found in run["megabytes_at"].values() for at in found})
-    lines += [
-        "",
-        "| MB resident after | " + " | ".join(f"{at} frames" for at in marks) + " |",
-        "| --- |" + " --- |" * len(marks),
-    ]
+    memory = [["MB resident after", *(f"{at} frames" for at in marks)]]
     for name, run in runs.items():
         for who, found in run["megabytes_at"].items():
-            lines.append(f"| {name}: {who} | " + " | ".join(f"{found[at]:.1f}" for at in marks if at in found) + " |")
-    return "\n".join(lines)
+            memory.append([f"{name}: {who}", *(f"{found[at]:.1f}" for at in marks if at in found)])
+    return "\n".join([*markdown(rows), "", *markdown(memory)])

@@ -126,10 +126,9 @@ def _noise(made: Plan, times: int = 1) -> dict[str, float]:
     pose, silence = made.recipe.frame(0)[1].sonar_pose, _silence(made, times)
     random = np.random.default_rng(1)
     ms = _timed(range(FRAMES + 1), lambda _: add_noise(silence, noise, sonar, made.elements, random, pose, 1540.0))
-    wrong = (
-        0.0 if noise.directions is None else coherence_error(noise.directions, made.elements, pose, sonar, 1540.0)[0]
-    )
-    return {"ms": ms, "error": wrong}
+    if noise.directions is None:
+        return {"ms": ms, "error": 0.0}
+    return {"ms": ms, "error": coherence_error(noise.directions, made.elements, pose, sonar, 1540.0)[0]}
 
 
 def _distant(made: Plan) -> dict[str, float]:
@@ -142,8 +141,8 @@ def _distant(made: Plan) -> dict[str, float]:
 
 def _chorus(made: Plan, times: int = 1) -> dict[str, float]:
     """Drawing, arrivals and pressure, without what is beyond the reach."""
-    longer = made if times == 1 else _longer(made, times)
-    silence, paths, error = _silence(longer), [], []
+    longer = replace(made, windows=replace(made.windows, samples=times * made.windows.samples))
+    silence, paths = _silence(longer), []
     distant = made.distant_chorus is not None
 
     def one(index: int) -> None:
@@ -154,13 +153,7 @@ def _chorus(made: Plan, times: int = 1) -> dict[str, float]:
         with_chorus(longer, frame, silence, arrivals)
 
     ms = _timed(range(FRAMES + 1), one) - (_distant(longer)["ms"] if distant else 0.0)
-    if times == 1:
-        error.append(_error(made))
-    return {"ms": ms, "paths": float(np.median(paths)), "error": error[0] if error else float("nan")}
-
-
-def _longer(made: Plan, times: int) -> Plan:
-    return replace(made, windows=replace(made.windows, samples=times * made.windows.samples))
+    return {"ms": ms, "paths": float(np.median(paths)), "error": _error(made) if times == 1 else float("nan")}
 
 
 def _error(made: Plan, most: int = 60) -> float:
