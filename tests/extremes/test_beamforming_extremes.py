@@ -1,4 +1,4 @@
-"""Beamforming where it is hardest: far and near foci, faint and loud signals, whole turns between neighbours."""
+"""Beamforming where it is hardest: far and near foci, whole turns between neighbours."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ ARRAY = PlanarLattice(columns=5, rows=4, pitch=0.02)
 SONAR = Sonar(array=ARRAY, beams=BeamGrid(azimuths=7, elevations=6))
 
 
-def noise(sensors=20, samples=700, amplitude=1.0):
-    pressure = amplitude * np.random.default_rng(2).normal(size=(sensors, samples))
+def noise():
+    pressure = np.random.default_rng(2).normal(size=(20, 700))
     return Signals(pressure.astype(np.float32), 0.0, RATE, 0.0, 0, 0)
 
 
@@ -39,15 +39,6 @@ def test_a_focus_within_the_array_gives_numbers(method):
 def test_a_focus_on_an_element_gives_its_delay():
     q = np.array([0.0, 0.3, 0.4])
     assert focus_delay(q[None], q / 0.5, 0.5, SPEED)[0] == pytest.approx(-0.5 / SPEED)
-
-
-@pytest.mark.parametrize("amplitude", [1e-9, 1e9])
-@pytest.mark.parametrize("method", [FocusedDelayAndSum(), DenseDelayAndSum()])
-def test_faint_and_loud_signals(method, amplitude):
-    """From a thousandth of a uPa to 300 dB: no underflow, no overflow."""
-    one = method.image(noise(), elements(ARRAY), SONAR, 0.001, 0.003).energy
-    image = method.image(noise(amplitude=amplitude), elements(ARRAY), SONAR, 0.001, 0.003).energy
-    np.testing.assert_allclose(image.astype(float) / amplitude**2, one, rtol=1e-5)
 
 
 def test_whole_turns_between_neighbours():

@@ -109,15 +109,6 @@ def test_a_broken_file_is_refused_in_one_line(tmp_path, name):
     assert str(refused.value).startswith(str(path))
 
 
-def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(MeshError, match=r"none\.stl: no such file or directory$"):
-        mesh_of(MeshFile(path=str(tmp_path / "none.stl")))
-    folder = tmp_path / "folder.stl"
-    folder.mkdir()
-    with pytest.raises(MeshError, match=r"folder\.stl: is a directory$"):
-        mesh_of(MeshFile(path=str(folder)))
-
-
 def test_a_unit_brings_an_absurd_size_back(tmp_path):
     path = tmp_path / "mm.stl"
     path.write_bytes(one((0, 0, 0), (2e4, 0, 0), (0, 1, 0)))

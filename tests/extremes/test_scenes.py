@@ -229,14 +229,8 @@ def test_odd_stores_are_whole(which: str, tmp_path: Path) -> None:
 
 
 REFUSED = [
-    (scene((ball((10.0, 0.0, -0.4)),)), "scene.world.targets.0.motion: target 'ball' is 0.1 m above the surface"),
     (scene((ball((1e200, 0.0, -5.0)),)), "scene.world.targets.0.motion: target 'ball' is more than 1e+06 m from"),
     (scene((ball((1e5, 0.0, -5.0)),)), "scene.processing.echo_window: a frame would take 8"),
-    (scene(snaps=(shrimp(1e200, 0.0),)), "scene.world.sources.0.position: is more than 1e+06 m from the origin"),
-    (
-        scene(snaps=(shrimp(14.0, -4.0, snap_times=(0.0, 1000.0)),)),
-        "scene.processing.echo_window: a frame would take 6",
-    ),
     (
         scene(snaps=(shrimp(14.0, -4.0, snap=LogarithmicBubble(a=1e9)),)),
         "scene.world.sources.0.snap: makes a source level",
@@ -261,19 +255,10 @@ REFUSED = [
         ),
         "scene.processing.beamforming.kind: 'focused' needs an array on a lattice",
     ),
-    (
-        scene(sonar={"array": PlanarLattice(columns=2, rows=2, pitch=0.1, dead=(4,))}),
-        "scene.sonar.array: dead names an element outside 0..3",
-    ),
     (scene(snaps=(shrimp(10.0, 1.0, -5.0),)), "scene.world.sources.0.position: is inside target 'ball' at frame 0"),
-    (scene(snaps=(shrimp(0.0, 0.0, -5.0),)), "scene.world.sources.0.position: is at the centre of the array"),
     (
         scene((Target(name="dome", shape=Sphere(radius=1.0), motion=Still(position=(0.5, 0, -5))),)),
         "scene.world.targets.0.motion: target 'dome' contains the sonar at frame 0",
-    ),
-    (
-        scene((Target(name="wall", shape=Box(size=(2, 1000, 2), edge=0.01), motion=Still(position=(10, 0, -5))),)),
-        "scene.world.targets.0.shape: edges of 0.01 m would take more than",
     ),
 ]
 

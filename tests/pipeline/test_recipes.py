@@ -71,16 +71,6 @@ WRONG = [
         "{kind: tabulated, depth: [5, 0], speed: [1500, 1500]}",
         "depth: must not decrease",
     ),
-    (
-        "{kind: box, size: [1, 1, 1], edge: 0.25}",
-        "{kind: mesh_file, path: a.stl}",
-        "8: scene.world.targets.0.shape.path: no such",
-    ),
-    (
-        "{kind: box, size: [1, 1, 1], edge: 0.25}",
-        "{kind: mesh_file, path: .}",
-        "8: scene.world.targets.0.shape.path: is not a",
-    ),
 ]
 
 

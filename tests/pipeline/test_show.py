@@ -15,7 +15,7 @@ from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.pictures import show
 from sonarsynth.pictures.compare import moment
 from sonarsynth.pictures.steered_beams import beams, choose
-from sonarsynth.pictures.store_reading import built, opened, stored
+from sonarsynth.pictures.store_reading import opened, stored
 
 SPEED = 1540.0
 RATE = 196e3
@@ -281,12 +281,6 @@ def test_hit_far_hit_and_miss_are_what_they_are_called(store: Path) -> None:
     assert away.min() >= 1.5 * 1.5
 
 
-def test_frames_that_were_not_built_are_not_shown(store: Path, tmp_path: Path) -> None:
-    assert built(opened(store)).tolist() == [0, 1]
-    with pytest.raises(ValueError, match="frame 2 has not been built; there are 2, 0 to 1"):
-        show(store, tmp_path, frame=2, say=lambda _: None)
-
-
 def test_nothing_built_is_said_in_one_line(tmp_path: Path) -> None:
     empty = make_store(tmp_path / "empty.zarr", Size(frames=1, side=2, beams=7, rings=6), unbuilt=1)
     with pytest.raises(ValueError, match=r"empty\.zarr: no frame has been built yet$"):
@@ -302,16 +296,6 @@ def test_what_a_store_lacks_is_left_out_and_said(tmp_path: Path, groups: str) ->
     assert set(note.split(": without ")[1].split(", which")[0].split(", ")) == {"signals", "image", "cloud"} - set(
         groups.split()
     )
-
-
-@pytest.mark.parametrize(
-    "make", [lambda path: None, lambda path: path.mkdir(), lambda path: path.write_text("no store")]
-)
-def test_what_is_no_store_is_refused_in_one_line(tmp_path: Path, make) -> None:
-    make(tmp_path / "none.zarr")
-    with pytest.raises(ValueError, match=r"none\.zarr(: | is not a store: )") as refused:
-        show(tmp_path / "none.zarr", say=lambda _: None)
-    assert "\n" not in str(refused.value)
 
 
 def test_ffmpeg_gets_every_frame_whole(store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -46,24 +46,6 @@ def test_every_format_gives_the_same_body(tmp_path, ending):
     assert mesh_of(MeshFile(path=str(path))) is mesh
 
 
-@pytest.mark.parametrize("how", [{"file_type": "stl_ascii"}, {"file_type": "ply", "encoding": "ascii"}])
-def test_text_formats(tmp_path, how):
-    body = mesh_of(BODY)
-    path = tmp_path / f"body.{how['file_type'][:3]}"
-    mesh = mesh_of(MeshFile(path=written(path, body.vertices, body.faces, **how)))
-    assert (len(mesh.vertices), len(mesh.faces), mesh.notes) == (12, 20, ())
-
-
-def test_polygons_are_cut_in_triangles(tmp_path):
-    path = tmp_path / "box.obj"
-    corners = [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1)]
-    quads = ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f -7 -3 -1 -5"]
-    path.write_text("\n".join(["# a box", *corners, *quads, ""]))
-    mesh = mesh_of(MeshFile(path=str(path)))
-    assert (len(mesh.faces), mesh.notes) == (12, ())
-    assert solid(mesh) == pytest.approx(1.0)
-
-
 def test_unit_turn_and_offset(tmp_path):
     """Roll about x first, then pitch about y, then heading about z, counter-clockwise; then the offset, in metres."""
     path = off(
