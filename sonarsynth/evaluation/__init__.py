@@ -23,6 +23,7 @@ from sonarsynth.evaluation.point_checks import kinds, points, range_errors
 from sonarsynth.evaluation.snr_checks import signal_to_noise
 from sonarsynth.evaluation.source_estimates import snap_located
 from sonarsynth.evaluation.target_checks import labels_of_targets
+from sonarsynth.store import built_frames
 from sonarsynth.store.checking.check_rows import Check
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ EXPANSION_AMPLITUDE = 0.02  # of the strongest echo
 
 def check(tree: xr.DataTree) -> list[Check]:
     """All checks of truth against data, over the frames that were built."""
-    built = np.flatnonzero(np.isfinite(every(tree, "truth/sonar_position")[:, 0]))
+    built = built_frames(tree)
     if not len(built):
         return [Check("frames", "at least one frame built", "none", False, {"frames": 0})]
     checks = [Check("frames", "at least one frame built", f"{len(built)}", True, {"frames": len(built)})]
