@@ -35,7 +35,7 @@ scene:
     noise_sources: {ships}
     targets:
       - name: body
-        shape: {{kind: sphere, radius: 0.3 m}}
+        shape: {shape}
         motion: {motion}
     sources:
       - position: [12, 8]
@@ -48,6 +48,7 @@ scene:
   processing: {{beamforming: {{kind: focused, focus: 10 m}}}}
 """
 USUAL = {
+    "shape": "{kind: sphere, radius: 0.3 m}",
     "speed": "{kind: isovelocity, speed: 1540}",
     "motion": "{kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}",
     "snap": "source_level: 190 dB",

@@ -15,28 +15,10 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from fault_injection.casts import RECIPE, USUAL
 from fault_injection.fuzz import judged
 from fault_injection.recipes import Case, by_file, by_structure, damaged, lines_changed, numbers, pick, places
 
-RECIPE = """\
-title: a mesh
-seed: 3
-scene:
-  world:
-    environment: {{depth: 12 m, sound_speed: {{kind: isovelocity, speed: 1540}}, noise: {{kind: flat, level: 40 dB}}}}
-    targets:
-      - name: body
-        shape: {{kind: mesh_file, path: {name}, smooth: {smooth}}}
-        motion: {{kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}}
-    sources:
-      - position: [12, 8]
-        kind: snapping_shrimp
-  sonar:
-    array: {{kind: planar_lattice, columns: 5, rows: 4, pitch: 5 cm}}
-    beams: {{azimuths: 11, elevations: 9, azimuth_span: 30 deg, elevation_span: 30 deg}}
-  trajectory: {{frames: 2, interval: 0.5}}
-  processing: {{beamforming: {{kind: focused, focus: 10 m}}}}
-"""
 ODD_WORDS = (
     b"\x00\x00\xc0\x7f", b"\x00\x00\x80\x7f", b"\xff\xff\x7f\x7f", b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f",
     b"\x00\x00\x00\x80", b"\x01\x00\x00\x00", b"\x00\x00\x00\x00", b"\x00\x00\x80\x3f", b"\x80\x96\x98\x00",
@@ -86,13 +68,14 @@ def bases() -> list[Case]:
         data = mesh.export(file_type=kind, **options)
         data = _gltf(data) if name.endswith("gltf") else _packed(_model(mesh)) if name.endswith("3mf") else data
         data = data.encode() if isinstance(data, str) else bytes(data)
-        smooth = str(name.startswith("ball")).lower()
-        found.append(Case(name, RECIPE.format(name=name, smooth=smooth).encode(), {name: data}))
+        found.append(_case(name, data, smooth=name.startswith("ball")))
     corners = "".join("{:g} {:g} {:g}\n".format(*corner) for corner in parts.triangles.reshape(-1, 3))
-    return [
-        *found,
-        Case("parts.txt", RECIPE.format(name="parts.txt", smooth="false").encode(), {"parts.txt": corners.encode()}),
-    ]
+    return [*found, _case("parts.txt", corners.encode(), smooth=False)]
+
+
+def _case(name: str, data: bytes, *, smooth: bool) -> Case:
+    shape = f"{{kind: mesh_file, path: {name}, smooth: {str(smooth).lower()}}}"
+    return Case(name, RECIPE.format(**USUAL | {"shape": shape}).encode(), {name: data})
 
 
 def _gltf(data: bytes) -> bytes:
