@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Bytes, Floats, Ints
+from sonarsynth.conventions import Bools, Bytes, Floats, Ints, rows_of
 from sonarsynth.products import ArrayExpansion, Arrivals
 from sonarsynth.products.array_expansion import QUANTITIES
 from sonarsynth.receiver import Elements
@@ -67,10 +67,9 @@ class Wavefronts:
         if len(keep) == self.count and (keep == np.arange(self.count)).all():
             return self
         rows: dict[str, Any] = {
-            name: value[keep] if isinstance(value, np.ndarray | ArrayExpansion) else value
-            for name, value in vars(self).items()
+            name: rows_of(value, keep) if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
         }
-        return type(self)(**rows)
+        return type(self)(**rows | {"expansion": self.expansion[keep]})
 
     def without_faint_shadows(self, tolerance: float, sensors: int) -> Self:
         """The paths with some of those that miss a part of so many hydrophones reaching all or none, as is nearer.

@@ -17,6 +17,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.bubble.snap_pressure import ComplexArray
+from sonarsynth.products.array_expansion import QUANTITIES
 from sonarsynth.signals.array_paths import ArrayPaths, Wavefronts
 
 MOST_POWERS = 8
@@ -69,7 +70,7 @@ def slopes(front: Wavefronts, gradient: Floats, lowest: float, highest: float) -
         (front.expansion.delay_variance, 0.5 * (2.0 * np.pi * highest) ** 2),
     ):
         if terms.shape[1]:
-            total += scale * np.abs(np.einsum("et,ipt->ipe", terms, gradient[:, :, : terms.shape[1]])).max(axis=1)
+            total += scale * np.abs(gradient[:, :, : terms.shape[1]] @ terms.T).max(axis=1)
     return total
 
 
@@ -82,16 +83,14 @@ def with_changes(front: ArrayPaths) -> ArrayPaths:
     loud = np.abs(front.amplitude)
     copies = [np.arange(front.count)]
     copies += [_loudest(loud * (spread > 0.0))] * 2 + [_loudest(loud * turn)]
-    count = [rows.size for rows in copies]
-    shapes = front.expansion.without("delay", "amplitude")
-    every = replace(front, occluded=front.occluded[:, :0], expansion=shapes).select(np.concatenate(copies))
+    rows, count = np.concatenate(copies), [some.size for some in copies]
     blur = np.repeat([0.0, 1.0, -1.0, 0.0], count)
     ahead = np.repeat([0.0, 0.0, 0.0, 1.0], count)
-    size = np.where(ahead > 0.0, np.minimum(every.expansion.largest("phase"), 1.0), 1.0)
+    every = replace(front, occluded=front.occluded[:, :0], expansion=front.expansion.without(*QUANTITIES)).select(rows)
     return replace(
         every,
-        amplitude=every.amplitude * size,
-        variance=every.variance + blur * every.expansion.largest("delay_variance"),
+        amplitude=every.amplitude * np.where(ahead > 0.0, np.minimum(turn[rows], 1.0), 1.0),
+        variance=every.variance + blur * spread[rows],
         phase=every.phase + 0.5 * np.pi * ahead,
     )
 

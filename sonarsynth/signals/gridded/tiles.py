@@ -162,7 +162,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     _, dy, dz = slope.tolist()
     wave = aim.highest / reference.sound_speed  # 1/m
     turn, loss = (aim.elements.face * wave * dy, aim.elements.face * wave * dz), float(far[4])
-    bend = views.bend[:, paths].max(axis=1)
+    bend = np.take(views.bend, paths, axis=1).max(axis=1)
     phase = np.full(3, np.inf) if views.own else (2.0 * np.pi * wave * slope + bend) * probes.size
     modes, sizes = np.zeros((0, 0)), PLAIN
     if views.front.modes.shape[1]:
