@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import sonarsynth as ss
 from sonarsynth.cli import app
-from sonarsynth.cli.authoring import shipped_recipes
+from sonarsynth.cli.authoring import init_command, shipped_recipes
 from sonarsynth.cli.authoring.init_command import ask
 from sonarsynth.cli.authoring.recipe_text import SHAPES, Answers, recipe_text
 from sonarsynth.cli.running import run
@@ -29,6 +29,7 @@ def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_every_shipped_recipe_is_found() -> None:
     assert {"remus", "grid", "harbour"} <= set(NAMES)
+    assert sorted(init_command.NAMES.rstrip(".").split(", ")) == NAMES  # as the help of `--from` has them
 
 
 @pytest.mark.parametrize("name", NAMES)
