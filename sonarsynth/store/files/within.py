@@ -6,23 +6,22 @@ on the way to a file is opened by itself, from the one before it, and a link in 
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import os
 import stat
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import BufferedReader
-from itertools import repeat
 from pathlib import Path
 from typing import Final
 
 IS_LINK: Final = "is a link, which is not followed"
 
-AT_ONCE: Final = 8
-"""Files that are written at once."""
+_syncfs: Final = getattr(ctypes.CDLL(None, use_errno=True), "syncfs", None)
+"""Linux has it: a whole file system is on the disk when it returns 0."""
 
 _FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 _NEW: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -87,13 +86,19 @@ def opened(root: Root, name: str) -> Iterator[BufferedReader]:
 
 def write_each(root: Root, contents: Mapping[str, bytes]) -> None:
     """Write files anew, with their folders: all on the disk when this returns. What had their names is another file's
-    now. Several are on their way at once: each waits for the disk, which takes several in the time of one.
+    now. The folder `root` itself is never made.
 
-    The folder `root` itself is never made.
+    The file system is synchronised once, with all its files: for each of a hundred by itself the processor works forty
+    times as long. What other programs have just written to the same file system is waited for too.
     """
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        for _ in pool.map(_write_new, repeat(root), contents, contents.values()):
-            pass
+    with _walked(root, []) as handle:  # from before anything is written: what fails from then on is told
+        for name, content in contents.items():
+            _write_new(root, name, content)
+        if _syncfs is None:
+            os.sync()
+        elif _syncfs(handle) != 0:
+            code = ctypes.get_errno()
+            raise OSError(code, os.strerror(code), str(root))
 
 
 def _write_new(root: Root, name: str, content: bytes) -> None:
@@ -105,8 +110,6 @@ def _write_new(root: Root, name: str, content: bytes) -> None:
             handle = os.open(last, _NEW, 0o666, dir_fd=folder)
         with open(handle, "wb") as out:
             out.write(content)
-            out.flush()
-            os.fsync(handle)
 
 
 def write_atomically(root: Root, name: str, content: bytes) -> None:
