@@ -14,11 +14,13 @@ import difflib
 from itertools import pairwise
 from typing import Annotated, Any, Literal, get_args
 
+import numpy as np
 from annotated_types import Ge, Le, MinLen
 from pydantic import ValidationInfo, field_validator
 
-from sonarsynth.conventions import Decibels, MetresPerSecond, NonNegativeMetres, Number, Radians
+from sonarsynth.conventions import Decibels, Floats, MetresPerSecond, NonNegativeMetres, Number, Radians
 from sonarsynth.description import BY_KIND, description
+from sonarsynth.equations.water.boundary_reflection import SEDIMENTS, Complexes, pressure_release, rayleigh
 
 SedimentName = Literal[
     "rock",
@@ -52,22 +54,52 @@ Ratio = Annotated[Number, Ge(1e-9), Le(1e9)]
 RmsHeight = Annotated[NonNegativeMetres, Le(100)]
 
 
+Fluid = tuple[float, float, float]
+"""Density and sound speed over those of the water, and loss tangent."""
+
+
+class ReflectionModel:
+    """What reflects plane waves at a smooth boundary: its `coefficient`; the rest may stay as here."""
+
+    def coefficient(self, grazing: Floats) -> Complexes:
+        """Reflection coefficient (path,) at grazing angles (path,) in rad, as of `boundary_numbers`."""
+        raise NotImplementedError(f"{type(self).__name__} has no coefficient")
+
+    @property
+    def fluid(self) -> Fluid | None:
+        """The fluid without end that it is; none: it is something else."""
+        return None
+
+    @property
+    def sediment(self) -> str | None:
+        """Name of the sediment that it is, of those in the table of APL-UW TR 9407."""
+        return None
+
+
 @description
-class PressureRelease:
+class PressureRelease(ReflectionModel):
     """Reflects everything with a change of sign: -1 at every angle, as air does to sound in water."""
 
     kind: Literal["pressure_release"] = "pressure_release"
 
+    def coefficient(self, grazing: Floats) -> Complexes:
+        """As `ReflectionModel.coefficient`."""
+        return pressure_release(grazing)
+
 
 @description
-class Rigid:
+class Rigid(ReflectionModel):
     """Reflects everything without a change of sign: +1 at every angle."""
 
     kind: Literal["rigid"] = "rigid"
 
+    def coefficient(self, grazing: Floats) -> Complexes:
+        """As `ReflectionModel.coefficient`."""
+        return np.ones(grazing.shape, complex)
+
 
 @description
-class FluidHalfSpace:
+class FluidHalfSpace(ReflectionModel):
     """A fluid without end behind the boundary (Rayleigh's coefficient). Absorbs in proportion to frequency."""
 
     kind: Literal["fluid"] = "fluid"
@@ -78,9 +110,18 @@ class FluidHalfSpace:
     loss_tangent: Annotated[Number, Ge(0), Le(1)] = 0.0
     """Imaginary over real part of the wavenumber; a loss in dB per wavelength is 54.58 times as much."""
 
+    @property
+    def fluid(self) -> Fluid:
+        """As `ReflectionModel.fluid`."""
+        return self.density_ratio, self.speed_ratio, self.loss_tangent
+
+    def coefficient(self, grazing: Floats) -> Complexes:
+        """As `ReflectionModel.coefficient`."""
+        return rayleigh(grazing, *self.fluid)
+
 
 @description
-class Sediment:
+class Sediment(ReflectionModel):
     """A fluid half-space with the numbers of a named sediment (APL-UW TR 9407, 1994, section IV, table 2)."""
 
     kind: Literal["sediment"] = "sediment"
@@ -97,9 +138,23 @@ class Sediment:
             raise ValueError(f"'{name}' is not a sediment here; {hint}")
         return name
 
+    @property
+    def sediment(self) -> str:
+        """As `ReflectionModel.sediment`."""
+        return self.name
+
+    @property
+    def fluid(self) -> Fluid:
+        """As `ReflectionModel.fluid`."""
+        return SEDIMENTS[self.name]
+
+    def coefficient(self, grazing: Floats) -> Complexes:
+        """As `ReflectionModel.coefficient`."""
+        return rayleigh(grazing, *self.fluid)
+
 
 @description
-class ReflectionTable:
+class ReflectionTable(ReflectionModel):
     """Reflection coefficient at grazing angles from 0 to 90 degrees: modulus, or loss in dB, and phase.
 
     Each is interpolated linearly in the angle, as it is written. Phases are those of exp(+i 2 pi f t), as in Bellhop's
@@ -137,6 +192,15 @@ class ReflectionTable:
         if info.field_name == "loss" and "modulus" in info.data and (values is None) == (info.data["modulus"] is None):
             raise ValueError("give either modulus or loss")
         return values
+
+    def coefficient(self, grazing: Floats) -> Complexes:
+        """As `ReflectionModel.coefficient`."""
+        phase = np.interp(grazing, self.grazing, self.phase)
+        if self.modulus is not None:
+            modulus = np.interp(grazing, self.grazing, self.modulus)
+        else:
+            modulus = 10.0 ** (-np.interp(grazing, self.grazing, self.loss or ()) / 20.0)
+        return np.asarray(modulus * np.exp(1j * phase))
 
 
 Reflection = Annotated[PressureRelease | Rigid | FluidHalfSpace | Sediment | ReflectionTable, BY_KIND]

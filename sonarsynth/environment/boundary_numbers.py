@@ -13,16 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.boundaries import (
-    FluidHalfSpace,
-    PressureRelease,
-    Reflection,
-    ReflectionTable,
-    Rigid,
-    SeaBottom,
-    SeaSurface,
-    Sediment,
-)
+from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
 from sonarsynth.equations.water import boundary_reflection, formula_ranges
 from sonarsynth.equations.water.boundary_reflection import Complexes
 
@@ -71,7 +62,7 @@ def coefficient(boundary: SeaSurface | SeaBottom, grazing: npt.ArrayLike, freque
     angle = np.asarray(grazing, float)
     none = np.isnan(angle)
     q = np.where(none, 0.5 * np.pi, angle)
-    value = _smooth(boundary.reflection, q)
+    value = boundary.reflection.coefficient(q)
     if isinstance(boundary, SeaSurface) and boundary.bubbles and boundary.wind_speed is not None:
         if frequency is None:
             raise ValueError("the loss in bubbles needs a frequency")
@@ -103,11 +94,10 @@ def boundary_notes(boundary: SeaSurface | SeaBottom, low: float, high: float) ->
     notes: list[tuple[str, str]] = []
     reflection = boundary.reflection
     with formula_ranges.noted() as lines:
-        if isinstance(reflection, Sediment):
+        if reflection.sediment is not None:
             formula_ranges.APL_SEDIMENTS.check(frequency=[low, high])
-            formula_ranges.FLUID_BED.check(speed_ratio=boundary_reflection.SEDIMENTS[reflection.name][1])
-        elif isinstance(reflection, FluidHalfSpace):
-            formula_ranges.FLUID_BED.check(speed_ratio=reflection.speed_ratio)
+        if reflection.fluid is not None:
+            formula_ranges.FLUID_BED.check(speed_ratio=reflection.fluid[1])
     notes += [("reflection", line) for line in lines]
     if isinstance(boundary, SeaSurface) and boundary.wind_speed is not None:
         with formula_ranges.noted() as lines:
@@ -118,27 +108,3 @@ def boundary_notes(boundary: SeaSurface | SeaBottom, low: float, high: float) ->
                 boundary_reflection.bubble_loss(boundary.wind_speed, 0.5 * (low + high), 0.5 * np.pi)
             notes += [("bubbles", line) for line in lines]
     return tuple(notes)
-
-
-def _smooth(reflection: Reflection, grazing: Floats) -> Complexes:
-    match reflection:
-        case PressureRelease():
-            return boundary_reflection.pressure_release(grazing)
-        case Rigid():
-            return np.ones(grazing.shape, complex)
-        case FluidHalfSpace():
-            bottom = (reflection.density_ratio, reflection.speed_ratio, reflection.loss_tangent)
-            return boundary_reflection.rayleigh(grazing, *bottom)
-        case Sediment():
-            return boundary_reflection.rayleigh(grazing, *boundary_reflection.SEDIMENTS[reflection.name])
-        case ReflectionTable():
-            return _tabulated(reflection, grazing)
-
-
-def _tabulated(table: ReflectionTable, grazing: Floats) -> Complexes:
-    phase = np.interp(grazing, table.grazing, table.phase)
-    if table.modulus is not None:
-        modulus = np.interp(grazing, table.grazing, table.modulus)
-    else:
-        modulus = 10.0 ** (-np.interp(grazing, table.grazing, table.loss or ()) / 20.0)
-    return np.asarray(modulus * np.exp(1j * phase))

@@ -9,10 +9,9 @@ import numpy as np
 
 from sonarsynth.description import FieldError
 from sonarsynth.environment.absorption import absorption_notes
-from sonarsynth.environment.boundaries import FluidHalfSpace, Sediment
 from sonarsynth.environment.boundary_numbers import boundary_notes
 from sonarsynth.environment.sea import Profile
-from sonarsynth.equations.water.boundary_reflection import SEDIMENTS, plane_wave_error
+from sonarsynth.equations.water.boundary_reflection import plane_wave_error
 from sonarsynth.planning.notes.noise_checks import noise_notes
 from sonarsynth.planning.plan_tables import Omission
 from sonarsynth.planning.plans import Plan
@@ -51,11 +50,8 @@ def _believed(scene: Scene) -> tuple[str, ...]:
 def curved_waves(plan: Plan) -> list[Omission]:
     """What is left out by reflecting waves at a fast bottom as if they were plane, in the first frame."""
     frame = plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1]
-    reflection, depth = plan.scene.world.environment.bottom.reflection, plan.medium.depth
-    if isinstance(reflection, Sediment):
-        ratio = SEDIMENTS[reflection.name][1]
-    else:
-        ratio = reflection.speed_ratio if isinstance(reflection, FluidHalfSpace) else 1.0
+    fluid, depth = plan.scene.world.environment.bottom.reflection.fluid, plan.medium.depth
+    ratio = 1.0 if fluid is None else fluid[1]
     if not plan.propagation.bounces or ratio <= 1.0 or not frame.moment.snaps:
         return []
     array = frame.sonar_pose.position

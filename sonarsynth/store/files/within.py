@@ -88,8 +88,8 @@ def write_each(root: Root, contents: Mapping[str, bytes]) -> None:
     """Write files anew, with their folders: all on the disk when this returns. What had their names is another file's
     now. The folder `root` itself is never made.
 
-    The file system is synchronised once, with all its files: for each of a hundred by itself the processor works forty
-    times as long. What other programs have just written to the same file system is waited for too.
+    The file system is synchronised once, with all its files: the processor works many times as long for each of a
+    hundred by itself. What other programs have just written to the same file system is waited for too.
     """
     with _walked(root, []) as handle:  # from before anything is written: what fails from then on is told
         for name, content in contents.items():

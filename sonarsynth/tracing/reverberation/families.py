@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, depth
-from sonarsynth.environment.boundaries import SeaBottom, SeaSurface, Sediment
+from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
 from sonarsynth.environment.boundary_numbers import coefficient, rms_height
 from sonarsynth.environment.reverberation import Reverberation
 from sonarsynth.equations.reverberation.speckle import scatterers_per_pulse
@@ -136,14 +136,13 @@ def site_of(owner: str, medium: Medium, frequency: float) -> BoundarySite:
     environment = medium.environment
     boundary: SeaSurface | SeaBottom = environment.bottom if owner == "bottom" else environment.surface
     wind = boundary.wind_speed if isinstance(boundary, SeaSurface) else None
-    reflection = boundary.reflection
     return BoundarySite(
         frequency,
         2.0 * np.pi * frequency / float(medium.profile.at(medium.depth if owner == "bottom" else 0.0)),
         lambda grazing: np.abs(coefficient(boundary, grazing, frequency)),
         wind,
         rms_height(boundary),
-        reflection.name if isinstance(reflection, Sediment) else None,
+        boundary.reflection.sediment,
     )
 
 
