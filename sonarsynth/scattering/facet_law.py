@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from sonarsynth.conventions import Floats
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.scattering.components import Component, Lobe
 from sonarsynth.scattering.law_validity import Scatterer
@@ -20,6 +22,24 @@ class FacetLaw:
         """Far-field scattering amplitude (...) in m, for unit vectors of propagation in and away (..., xyz), facets'
         normals (..., xyz) and areas (...) in m2; 0 where a facet is not lit or, unless `beyond`, not seen."""
         raise NotImplementedError(f"{type(self).__name__} has no amplitude")
+
+    def cross_section(
+        self, corners: Floats, normal: Floats, area: Floats, curved: Bools, incident: Floats, scattered: Floats,
+        wavenumber: Floats, shape: Floats | None = None,
+    ) -> Floats:  # fmt: skip
+        """Power |f|^2 (frequency,) in m2 of unhidden facets, for unit vectors (xyz) of propagation, in and away.
+
+        corners (facet, 3, xyz) m, counter-clockwise from outside, with normal (facet, xyz), area (facet,) m2 and
+        whether the surface is curved there (facet,); wavenumber (frequency,) rad/m. shape: as of a law that `creeps`.
+        """
+        amplitude = self.amplitude(incident, scattered, normal, area)
+        return np.full(wavenumber.shape, np.sum(amplitude**2))
+
+    @property
+    def creeps(self) -> bool:
+        """Whether `cross_section` has what creeps round smooth convex bodies: of all of their facets, with `shape`
+        (facet, xyz, xyz), as `convex_bodies.shape_operators`."""
+        return False
 
     @property
     def parts(self) -> tuple[Component, ...]:

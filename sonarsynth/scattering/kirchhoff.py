@@ -128,24 +128,16 @@ class Kirchhoff(FacetLaw):
         taper = shadow_taper(incident, scattered, normal)
         return taper if self.edges == "smooth" else np.where(curved, taper, sharp)
 
-    def cross_section(
-        self,
-        corners: Floats,
-        normal: Floats,
-        area: Floats,
-        curved: Bools,
-        incident: Floats,
-        scattered: Floats,
-        wavenumber: Floats,
-        shape: Floats | None = None,
-    ) -> Floats:
-        """Power |f|^2 (frequency,) in m2 of unhidden facets, for unit vectors (xyz) of propagation, in and away.
+    @property
+    def creeps(self) -> bool:
+        """As `FacetLaw.creeps`: unless `edges` say how bodies end."""
+        return self.edges == "auto"
 
-        corners (facet, 3, xyz) m, counter-clockwise from outside, with normal (facet, xyz), area (facet,) m2 and
-        whether the surface is curved there (facet,); wavenumber (frequency,) rad/m. shape:
-        `convex_bodies.shape_operators` (facet, xyz, xyz) of a smooth convex body, all of whose facets are given: its
-        light, shadow and what creeps.
-        """
+    def cross_section(
+        self, corners: Floats, normal: Floats, area: Floats, curved: Bools, incident: Floats, scattered: Floats,
+        wavenumber: Floats, shape: Floats | None = None,
+    ) -> Floats:  # fmt: skip
+        """As `FacetLaw.cross_section`."""
         from sonarsynth.equations.scattering.convex_kernels import convex_amplitude
         from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 

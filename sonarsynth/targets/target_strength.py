@@ -87,7 +87,7 @@ class _Body:
 
     def __init__(self, target: Mesh | Shape | Target, law: Scattering, wavelength: float, longest: float) -> None:
         shape = target.shape if isinstance(target, Target) else target
-        coherent = isinstance(law, Kirchhoff)
+        coherent = law.coherent
         if isinstance(shape, Mesh):
             self.mesh = checked(shape, wavelength) if coherent else shape
         elif isinstance(shape, SHAPES):
@@ -101,7 +101,7 @@ class _Body:
         self.law = law
         self.convex = convex(None if isinstance(shape, Mesh) else shape, self.mesh)
         self.curved = np.isfinite(curvature_radius(self.mesh)) if coherent else np.zeros(len(self.mesh.faces), bool)
-        self.shape = self._round() if isinstance(law, Kirchhoff) and law.edges == "auto" else None
+        self.shape = self._round() if law.creeps else None
         self.unhidden: dict[bytes, Bools] = {}
 
     def _round(self) -> Floats | None:
@@ -116,15 +116,12 @@ class _Body:
     def cross_section(self, incident: Floats, scattered: Floats, wavenumber: Floats) -> Floats:
         """|f|^2 (frequency,) in m2 for one pair of directions."""
         mesh = self.mesh
-        if isinstance(self.law, Kirchhoff) and self.shape is not None:
+        if self.shape is not None:
             facets = mesh.corners, mesh.normal, mesh.area, self.curved
             return self.law.cross_section(*facets, incident, scattered, wavenumber, self.shape)
         lit = np.flatnonzero(self.seen_from(-incident) & self.seen_from(scattered))
-        if isinstance(self.law, Kirchhoff):
-            facets = (mesh.corners_of(lit), mesh.normal[lit], mesh.area[lit], self.curved[lit])
-            return self.law.cross_section(*facets, incident, scattered, wavenumber)
-        amplitude = self.law.amplitude(incident, scattered, mesh.normal[lit], mesh.area[lit])
-        return np.full(wavenumber.shape, np.sum(amplitude**2))
+        facets = (mesh.corners_of(lit), mesh.normal[lit], mesh.area[lit], self.curved[lit])
+        return self.law.cross_section(*facets, incident, scattered, wavenumber)
 
     def seen_from(self, towards: Floats) -> Bools:
         """Facets (facet,) that face a direction (xyz) with no other facet before their middles; kept for the last."""

@@ -18,7 +18,6 @@ STILL_ASKED = {
     "planning/notes/noise_checks.py": {"NoiseRecording"},
     "planning/notes/track_checks.py": {"RecordedTrack"},
     "signals/noise/point_sources.py": {"NoiseRecording"},
-    "targets/target_strength.py": {"Kirchhoff"},
 }
 """Kinds that other rooms ask for all the same: each could say for itself what it is asked for."""
 
