@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from sonarsynth.store.files.place import FileRecord, Folder, entries, is_folder, read_json, records, there
 from sonarsynth.store.files.remote import Remote
+from sonarsynth.store.files.scratch import PARTIAL
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.marks import (
     ABSENT,
@@ -201,7 +202,9 @@ def _strangers(
         problems.append(Problem(f"shard {shard}", fault, region(shard)))
     ours = {f"{number}.json" for number in marked(path)} | {PurePosixPath(m).name for m in MANIFESTS}
     foreign += sorted(f"{MARKS}/{name}" for name in entries(path, MARKS) if name not in ours)
-    problems.extend(Problem(shown(name), "the file does not belong here") for name in foreign)
+    unfinished, unknown = "a file that was not finished: build again to remove it", "the file does not belong here"
+    for name in foreign:
+        problems.append(Problem(shown(name), unfinished if PARTIAL.fullmatch(PurePosixPath(name).name) else unknown))
     return set(lost), frozenset(foreign)
 
 
