@@ -59,11 +59,14 @@ Fluid = tuple[float, float, float]
 
 
 class ReflectionModel:
-    """What reflects plane waves at a smooth boundary: its `coefficient`; the rest may stay as here."""
+    """What reflects plane waves at a smooth boundary: a `fluid`, or what has a `coefficient` of its own."""
 
     def coefficient(self, grazing: Floats) -> Complexes:
-        """Reflection coefficient (path,) at grazing angles (path,) in rad, as of `boundary_numbers`."""
-        raise NotImplementedError(f"{type(self).__name__} has no coefficient")
+        """Reflection coefficient (path,) at grazing angles (path,) in rad, as of `boundary_numbers`; here that of the
+        fluid, by Rayleigh."""
+        if self.fluid is None:
+            raise NotImplementedError(f"{type(self).__name__} has no coefficient")
+        return rayleigh(grazing, *self.fluid)
 
     @property
     def fluid(self) -> Fluid | None:
@@ -115,10 +118,6 @@ class FluidHalfSpace(ReflectionModel):
         """As `ReflectionModel.fluid`."""
         return self.density_ratio, self.speed_ratio, self.loss_tangent
 
-    def coefficient(self, grazing: Floats) -> Complexes:
-        """As `ReflectionModel.coefficient`."""
-        return rayleigh(grazing, *self.fluid)
-
 
 @description
 class Sediment(ReflectionModel):
@@ -147,10 +146,6 @@ class Sediment(ReflectionModel):
     def fluid(self) -> Fluid:
         """As `ReflectionModel.fluid`."""
         return SEDIMENTS[self.name]
-
-    def coefficient(self, grazing: Floats) -> Complexes:
-        """As `ReflectionModel.coefficient`."""
-        return rayleigh(grazing, *self.fluid)
 
 
 @description

@@ -62,10 +62,8 @@ class Occlusion:
         """
         if self.elements is None or self.elements.count == 1 or not self.bodies:
             end = np.broadcast_to(self.receiver.pose.position, starts.point.shape)
-            own, ray = (
-                starts.clear_of_own(self.bodies, legs.departure),
-                (starts.point, end, legs.departure, legs.length),
-            )
+            own = starts.clear_of_own(self.bodies, legs.departure)
+            ray = starts.point, end, legs.departure, legs.length
             hides = hidden(self.bodies, self.bending, *ray, bounces=legs.bounces, turning=legs.turning, own=own)
             return legs.select(picked(~hides))
         certain = self._certain(legs, starts)
