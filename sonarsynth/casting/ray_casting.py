@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
-from typing import Any, Literal, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +21,6 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 
 Int32s = npt.NDArray[np.int32]
-Backend = Literal["embree", "open3d"]
 OFFSET = 1e-6
 """Of the body's size: how far off a facet, along its normal, a ray starts so as not to meet it."""
 ROUNDS = 8
@@ -33,16 +31,8 @@ SLACK = 1e-3
 """Of the body's size: a hit this much beyond the proposed one is another hit, with others before it perhaps."""
 
 
-class Caster(Protocol):
-    """A float32 ray caster."""
-
-    def nearest(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
-        """Proposed facet (ray,) of the nearest hit within `far`, -1 for none, and its distance."""
-        ...
-
-
 class EmbreeCaster:
-    """Embree by embreex; watertight mode."""
+    """Embree by embreex: a float32 ray caster, in watertight mode."""
 
     def __init__(self, vertices: Floats, faces: np.ndarray) -> None:
         from embreex.mesh_construction import TriangleMesh
@@ -53,31 +43,10 @@ class EmbreeCaster:
         self.nbytes = BYTES * len(faces)
 
     def nearest(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
-        """As `Caster.nearest`."""
+        """Proposed facet (ray,) of the nearest hit within `far`, -1 for none, and its distance."""
         limit = np.minimum(far, 1e30).astype(np.float32)
         out = self._scene.run(origin.astype(np.float32), direction.astype(np.float32), limit, output=1)
         return out["primID"].astype(np.int64), out["tfar"].astype(float)
-
-
-class Open3DCaster:
-    """Open3D's RaycastingScene on one thread, to check the other against. Raises ImportError without Open3D."""
-
-    def __init__(self, vertices: Floats, faces: np.ndarray) -> None:
-        try:
-            o3d: Any = import_module("open3d")
-        except (ImportError, OSError) as error:
-            reason = str(error).splitlines()[0]
-            raise ImportError(f"ray casting by Open3D needs Open3D, which does not load: {reason}") from None
-        self._tensor = o3d.core.Tensor
-        self._scene: Any = o3d.t.geometry.RaycastingScene(nthreads=1)
-        self._scene.add_triangles(self._tensor(vertices.astype(np.float32)), self._tensor(faces.astype(np.uint32)))
-
-    def nearest(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
-        """As `Caster.nearest`."""
-        rays = np.concatenate([origin, direction], axis=1).astype(np.float32)
-        out = self._scene.cast_rays(self._tensor(rays), nthreads=1)
-        facet, distance = out["primitive_ids"].numpy().astype(np.int64), out["t_hit"].numpy().astype(float)
-        return np.where(np.isfinite(distance) & (distance <= far), facet, -1), distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +57,7 @@ class CastingMesh:
     size: float  # m: radius of the bounding sphere about the centre
     vertices: Floats  # (vertex, xyz) centred, in units of size
     faces: Int32s  # (facet, 3)
-    caster: Caster
+    caster: EmbreeCaster
 
     @cached_property
     def around(self) -> tuple[Int32s, Int32s]:
@@ -173,7 +142,7 @@ class _ByContent:
 
 
 @byte_bounded_cache(16)
-def _casting_mesh(key: _ByContent, backend: Backend) -> CastingMesh:
+def _casting_mesh(key: _ByContent) -> CastingMesh:
     mesh = key.mesh
     if not np.isfinite(mesh.vertices).all():
         raise ValueError("a mesh with vertices that are not finite cannot be cast at")
@@ -187,14 +156,13 @@ def _casting_mesh(key: _ByContent, backend: Backend) -> CastingMesh:
     if not size > 0:
         raise ValueError("a mesh without extent cannot be cast at")
     vertices = (mesh.vertices - centre) / size
-    make = EmbreeCaster if backend == "embree" else Open3DCaster
     faces = np.ascontiguousarray(mesh.faces, np.int32)
-    return CastingMesh(centre, size, np.ascontiguousarray(vertices), faces, make(vertices, faces))
+    return CastingMesh(centre, size, np.ascontiguousarray(vertices), faces, EmbreeCaster(vertices, faces))
 
 
-def casting_mesh(mesh: Mesh, backend: Backend = "embree") -> CastingMesh:
+def casting_mesh(mesh: Mesh) -> CastingMesh:
     """The mesh made ready for casting, kept by content for the last 16. Raises ValueError for a corrupt mesh."""
-    return _casting_mesh(_ByContent(mesh.digest, mesh), backend)
+    return _casting_mesh(_ByContent(mesh.digest, mesh))
 
 
 def enclosing(body: PlacedTarget) -> tuple[Floats, float]:
@@ -214,9 +182,7 @@ def inside(body: PlacedTarget, point: Floats) -> bool:
     return bool(facet[0] >= 0 and body.mesh.normal[facet[0]] @ body.pose.turn_to_body(up)[0] > 0.0)
 
 
-def first_hit(
-    mesh: Mesh, origin: Floats, direction: Floats, far: float = np.inf, backend: Backend = "embree"
-) -> tuple[Ints, Floats]:
+def first_hit(mesh: Mesh, origin: Floats, direction: Floats, far: float = np.inf) -> tuple[Ints, Floats]:
     """Facet (ray,) that each ray meets first, and its distance (m); -1 and NaN where it meets none within `far` (m).
 
     origin, direction: (ray, xyz) in the frame of the mesh; directions of any length. The point hit is origin +
@@ -229,7 +195,7 @@ def first_hit(
         raise ValueError("rays need a finite origin and a direction")
     if not len(mesh.faces) or not len(o):
         return np.full(len(o), NO_TARGET), np.full(len(o), np.nan)
-    ready = casting_mesh(mesh, backend)
+    ready = casting_mesh(mesh)
     limit = np.full(len(o), far / ready.size)
     facet, distance = ready.cast((o - ready.centre) / ready.size, d / length[:, None], limit)
     return facet, distance * ready.size
@@ -260,9 +226,7 @@ def clear_of_body(mesh: Mesh, facet: Ints, direction: Floats, slope: Floats) -> 
     return np.asarray(horizons.clear_of_body(facet, direction, slope, *tables))
 
 
-def occluded(
-    bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, own: Ints | None = None, backend: Backend = "embree"
-) -> Bools:
+def occluded(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, own: Ints | None = None) -> Bools:
     """Whether any body stands in each straight segment from start (segment, xyz) to end (segment, xyz) in the world;
     own (segment,): the body that surely does not (`clear_of_own_body`), -1 for none.
 
@@ -279,7 +243,7 @@ def occluded(
     for number, body in enumerate(bodies):
         if not len(body.mesh.faces):
             continue
-        ready, pose = casting_mesh(body.mesh, backend), body.pose
+        ready, pose = casting_mesh(body.mesh), body.pose
         skip = hidden if own is None else hidden | (own == number)
         count = intersections.into_mesh(
             a, b, skip, pose.rotation, pose.position, ready.centre, ready.size, origin, heading, far, segment

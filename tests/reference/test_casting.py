@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from sonarsynth.casting import ray_casting
-from sonarsynth.casting.ray_casting import OFFSET, Backend, clear_of_own_body, first_hit, occluded
+from sonarsynth.casting.ray_casting import OFFSET, clear_of_own_body, first_hit, occluded
 from sonarsynth.casting.shadows import hide
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion, unit
@@ -184,30 +184,9 @@ def test_a_wrong_proposal_is_passed_over() -> None:
                 return np.zeros(len(origin), int), np.full(len(origin), 1e-9)
             return ready.caster.nearest(origin, direction, far)
 
-    lying = ray_casting.CastingMesh(ready.centre, ready.size, ready.vertices, ready.faces, Liar())
+    lying = ray_casting.CastingMesh(ready.centre, ready.size, ready.vertices, ready.faces, Liar())  # type: ignore[arg-type]
     origin, direction = rays_at(1.0, 3.0, 300, 5)
     honest, at = ready.cast(origin, direction, np.full(300, np.inf))
     facet, distance = lying.cast(origin, direction, np.full(300, np.inf))
     np.testing.assert_array_equal(facet, honest)
     np.testing.assert_allclose(distance, at, rtol=1e-12)
-
-
-def open3d_loads() -> bool:
-    try:
-        import open3d  # noqa: F401
-    except (ImportError, OSError):
-        return False
-    return True
-
-
-@pytest.mark.parametrize("backend", ["open3d"])
-def test_both_back_ends_agree_or_the_missing_one_says_so_in_a_line(backend: Backend) -> None:
-    origin, direction = rays_at(1.0, 20.0, 500, 6)
-    expected, at = first_hit(RING, origin, direction)
-    if not open3d_loads():
-        with pytest.raises(ImportError, match=r"^ray casting by Open3D needs Open3D, which does not load: .+$"):
-            first_hit(RING, origin, direction, backend=backend)
-        return
-    facet, distance = first_hit(RING, origin, direction, backend=backend)
-    np.testing.assert_array_equal(facet, expected)
-    np.testing.assert_allclose(distance, at, rtol=1e-14)
