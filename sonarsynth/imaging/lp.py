@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import gamma, pi, sqrt
 from typing import Annotated, Literal
 
 import numpy as np
@@ -27,7 +26,7 @@ class LpMean(TimeStatistic):
         2.0       12.0   11.3   10.0   7.67
 
     (40 000 draws.) p below alpha/2 is wanted: only there |y|^p has a variance, and the index grows as the root of the
-    number of samples (`detection_index`). With p = 2 it is delay and sum, but for the rounding of the window's ends.
+    number of samples. With p = 2 it is delay and sum, but for the rounding of the window's ends.
     """
 
     kind: Literal["lp"] = "lp"
@@ -54,29 +53,3 @@ def power_mean(magnitude: Floats, p: float) -> Floats:
             return np.asarray(np.exp(np.mean(logarithm, axis=-1)))
         # p may be so small that all |y|^p are one but for rounding.
         return np.asarray(np.exp(np.log1p(np.mean(np.expm1(p * logarithm), axis=-1)) / p))
-
-
-def detection_index(ratio: float, alpha: float, samples: int, p: float = 0.0) -> float:
-    """Index by which a beam is told whose level is higher by `ratio` (dB), of independent samples of symmetric
-    alpha-stable noise: standard deviations of the mean of |y|^p, for p = 0 of ln |y|, as many samples make it.
-
-    p ln(10^(ratio/20)) sqrt(n/(E|y|^2p/(E|y|^p)^2 - 1)), and ln(10^(ratio/20))/sqrt(pi^2/6 (1/alpha^2 + 1/2)/n). With p
-    from alpha/2 on |y|^p has no variance, however many samples there are: the index of a mean is then that of its
-    loudest sample.
-    Source: fractional moments and variance of ln |y| from Nikias & Shao (1995), Signal Processing with Alpha-Stable
-    Distributions, ch. 2 and 5. Raises ValueError for p from alpha/2 on, but where alpha is 2.
-    """
-    higher = ratio / 20.0 * np.log(10.0)
-    if p == 0.0:
-        return float(higher * np.sqrt(samples / (np.pi**2 / 6.0 * (1.0 / alpha**2 + 0.5))))
-    if p >= 0.5 * alpha and alpha < 2.0:
-        raise ValueError(
-            f"|y|^{p:g} of alpha-stable noise of alpha {alpha:g} has no variance: p is under {alpha / 2:g}"
-        )
-    return float(p * higher * np.sqrt(samples / (_moment(2.0 * p, alpha) / _moment(p, alpha) ** 2 - 1.0)))
-
-
-def _moment(p: float, alpha: float) -> float:
-    """E|y|^p of symmetric alpha-stable noise of unit scale, 0 < p < alpha; of alpha 2, Gaussian of variance 2, any."""
-    moment = 2.0**p * gamma(0.5 * (1.0 + p)) / sqrt(pi)
-    return float(moment if alpha == 2.0 else moment * gamma(1.0 - p / alpha) / gamma(1.0 - 0.5 * p))

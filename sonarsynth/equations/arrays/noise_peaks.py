@@ -26,29 +26,18 @@ def expected_peaks(level: float, size: Floats) -> float:
     Source: Worsley (1994), Advances in Applied Probability 26, 13, theorem 3.5, for chi-squared fields, two degrees of
     freedom.
     """
-    return _expected(level, _volumes(size))
-
-
-def _volumes(size: Floats) -> tuple[float, float, float, float]:
-    """The intrinsic volumes of a box of up to three axes."""
     x, y, z = [float(length) for length in size] + [0.0] * (3 - len(size))
-    return 1.0, x + y + z, x * y + y * z + z * x, x * y * z
-
-
-def _expected(level: float, volumes: tuple[float, float, float, float]) -> float:
-    """As `expected_peaks`, of a box of these volumes."""
     u = 2.0 * level
-    one, length, area, volume = volumes
-    lines, planes = length * sqrt(u / (2 * pi)), area * (u - 1.0) / (2 * pi)
-    return exp(-level) * (one + lines + planes + volume * (u**2 - 3 * u) / (sqrt(2 * pi) ** 3 * sqrt(u)))
+    lines, planes = (x + y + z) * sqrt(u / (2 * pi)), (x * y + y * z + z * x) * (u - 1.0) / (2 * pi)
+    return exp(-level) * (1.0 + lines + planes + x * y * z * (u**2 - 3 * u) / (sqrt(2 * pi) ** 3 * sqrt(u)))
 
 
 def peak_level(false_alarms: float, size: Floats) -> float:
     """Level, over the mean power of noise, that so many peaks exceed on average (`expected_peaks`)."""
-    volumes, low, high = _volumes(size), LOWEST, HIGHEST
-    if _expected(low, volumes) <= false_alarms:
+    low, high = LOWEST, HIGHEST
+    if expected_peaks(low, size) <= false_alarms:
         return low
     while high - low > PRECISION * high:  # fewer peaks exceed a higher level
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _expected(middle, volumes) > false_alarms else (low, middle)
+        low, high = (middle, high) if expected_peaks(middle, size) > false_alarms else (low, middle)
     return high

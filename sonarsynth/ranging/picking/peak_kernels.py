@@ -78,26 +78,15 @@ def beside(power: Any, index: Any, row: Any, column: Any, b: Any, t: Any) -> Any
 
 @compiled
 def lobe_power(
-    direction: Any, delay: Any, power: Any, position: Any, weight: Any, frequency: Any, taper: Any, near: Any
+    i: int, direction: Any, delay: Any, power: Any, position: Any, weight: Any, frequency: Any, taper: Any, near: Any
 ) -> Any:
-    """Power (peak,) that louder peaks bring to each by the side lobes and grating lobes of the array.
+    """Power that louder peaks bring to peak i by the side lobes and grating lobes of the array.
 
     direction (peak, xyz) over the speed of sound, s/m; delay (peak,) s; power (peak,), descending; position (sensor,
     xyz) m; weight (sensor,) of sum one; frequency (bin,) evenly spaced, taper (bin,) of an echo's amplitude there;
     near: two peaks within that (s/m) of each other are in one beam. A wave from v is heard by a beam to u at the delay
     t as |sum_f T(f) sum_q w_q exp(i 2 pi f (x_q.(u - v) + t))|^2/(sum_f T)^2.
     """
-    brought = np.zeros(len(power))
-    for i in range(len(power)):
-        brought[i] = _brought(i, direction, delay, power, position, weight, frequency, taper, near)
-    return brought
-
-
-@compiled
-def _brought(
-    i: int, direction: Any, delay: Any, power: Any, position: Any, weight: Any, frequency: Any, taper: Any, near: Any
-) -> Any:
-    """What louder peaks bring to peak i: see `lobe_power`."""
     sensors, bins = len(weight), len(frequency)
     reach = farthest(position)
     spacing = frequency[1] - frequency[0]
@@ -178,7 +167,7 @@ def over_lobes(
             if low >= least[i]:
                 break
         if low < least[i]:
-            own[i] = high < least[i] or least[i] > _brought(
+            own[i] = high < least[i] or least[i] > lobe_power(
                 i, direction, delay, power, position, weight, frequency, taper, near
             )
     return own
