@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 
-from sonarsynth.conventions import Floats, Number
+from sonarsynth.conventions import Floats, Ints, Number
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize, Method
 from sonarsynth.products import Arrivals, Signals
@@ -41,6 +41,12 @@ def deposit_error(method: GriddedSynthesis) -> float:
     """Error of echoes relative to their peak, a bound on what was measured (the tables of `GriddedSynthesis`)."""
     kernel = kernel_error(method.width, method.oversampling)
     return kernel + SPENT * method.tolerance + ROUNDING[method.precision]
+
+
+def _apart(paths: Ints) -> Ints:
+    """The paths in an order that puts neighbours, which arrive at nearly one time, apart: a sum that was just written
+    cannot be read at once, and deposits take a third more."""
+    return paths[np.argsort(np.arange(paths.size) % max(-(-paths.size // 8), 1), kind="stable")]
 
 
 @description
@@ -136,7 +142,7 @@ class GriddedSynthesis(Method):
         out = np.zeros((elements.count, samples), self.precision)
         method = (self.width, self.oversampling, self.precision, self.tolerance)
         for span in plan.stretches:
-            paths, bins = bins_of(span, front.select(span.paths), sonar, absorption, self.tolerance)
+            paths, bins = bins_of(span, front.select(_apart(span.paths)), sonar, absorption, self.tolerance)
             origin, highest = start + span.first / fs, stop_frequency(sonar.antialias)
             add_segment(out, span, paths, elements, bins, origin=origin, highest=highest, method=method)
         return out, plan.outside

@@ -185,8 +185,10 @@ def deposit(
             for i in range(size):
                 for lane in range(0, lanes, 8):
                     w: Any = cubics(taps, row[i] * 4 * lanes + lane, lanes, fraction[i])  # type: ignore[call-arg]
-                    for t in range(terms):
-                        add_scaled(grid, (m * terms + t) * stride + begin[i] + lane, value[(4 + t) * BLOCK + i], w)
+                    to, number = m * terms * stride + begin[i] + lane, np.uint64(4 * BLOCK + i)
+                    for _ in range(terms):
+                        add_scaled(grid, to, value[number], w)
+                        to, number = to + stride, number + np.uint64(BLOCK)
     for line in range(nodes.shape[0] * terms):  # close the circle
         for i in range(lanes):
             grid[line * stride + i] += grid[line * stride + length + i]
@@ -215,15 +217,28 @@ def combine(spectra: Any, first: int, factors: Any, pair: Any, power: Any, respo
 
 
 @compiled(fastmath=True, forceinline=True)
-def _add_two(v: float, first: Any, w: float, second: Any, out: Any) -> None:
-    for i in range(first.size):
-        out[i] += v * first[i] + w * second[i]
+def _sum_three(weight: Any, nodes: Any, first: int, parity: int, out: Any) -> None:
+    """Put weight (node,), of zeros beyond the last, times three nodes (node, parity, sample) in out, or add it there
+    from the second three on."""
+    last = nodes.shape[0] - 1
+    one, two, three = nodes[first, parity], nodes[min(first + 1, last), parity], nodes[min(first + 2, last), parity]
+    u, v, w = weight[first], weight[first + 1], weight[first + 2]
+    if first == 0:
+        for i in range(out.size):
+            out[i] = u * one[i] + v * two[i] + w * three[i]
+    else:
+        for i in range(out.size):
+            out[i] += u * one[i] + v * two[i] + w * three[i]
 
 
 @compiled(fastmath=True, forceinline=True)
-def _add_filtered(wave: Any, a: float, b: float, c: float, d: float, out: Any) -> None:
+def _add_filtered(one: Any, two: Any, taps: Any, factor: Any, out: Any) -> None:
+    """Add to out waves that take turns to be its samples, filtered by eight taps."""
+    a, b, c, d = factor * taps[0], factor * taps[2], factor * taps[4], factor * taps[6]
+    e, f, g, h = factor * taps[1], factor * taps[3], factor * taps[5], factor * taps[7]
     for i in range(out.size):
-        out[i] += a * wave[i] + b * wave[i + 1] + c * wave[i + 2] + d * wave[i + 3]
+        earlier = a * one[i] + b * one[i + 1] + c * one[i + 2] + d * one[i + 3]
+        out[i] += earlier + (e * two[i] + f * two[i + 1] + g * two[i + 2] + h * two[i + 3])
 
 
 @compiled(fastmath=True)
@@ -239,17 +254,14 @@ def hear(
     """
     samples, cubes, number = field.shape[3], taps.size // (4 * lanes), taps.dtype.type
     wave = np.zeros((2, samples + 2 * lanes), field.dtype)  # between zeros
+    share = np.zeros(weight.shape[1] + 2, weight.dtype)
     for q in range(out.shape[0]):
         if gain[q] == 0.0:
             continue
-        nodes, last = field[column[q]], weight.shape[1] - 1
-        for p in range(2):
-            summed = wave[p, lanes : lanes + samples]
-            summed[:] = 0.0
-            for n in range(0, last, 2):
-                _add_two(weight[q, n], nodes[n, p], weight[q, n + 1], nodes[n + 1, p], summed)
-            if last % 2 == 0:
-                _add_two(weight[q, last], nodes[last, p], number(0.0), nodes[last, p], summed)
+        share[: weight.shape[1]] = weight[q]
+        for parity in range(2):
+            for n in range(0, weight.shape[1], 3):
+                _sum_three(share, field[column[q]], n, parity, wave[parity, lanes : lanes + samples])
         whole = np.floor(0.5 * late[q])
         low = 2.0 * whole - late[q] - 0.5 * lanes
         first = np.floor(low) + 1.0
@@ -259,7 +271,7 @@ def hear(
         row = out[q, max(start, 0) : max(start + samples, 0)]
         for lane in range(0, lanes, 8):
             t: Any = cubics(taps, int(cube) * 4 * lanes + lane, lanes, number(x))  # type: ignore[call-arg]
-            for p in range(2):
-                sample = int(first) + lane + p
-                a, b, c, d = factor * t[p], factor * t[p + 2], factor * t[p + 4], factor * t[p + 6]
-                _add_filtered(wave[sample & 1, lanes + (sample >> 1) + max(-start, 0) :], a, b, c, d, row)
+            sample, skipped = int(first) + lane, lanes + max(-start, 0)
+            one = wave[sample & 1, skipped + (sample >> 1) :]
+            two = wave[(sample + 1) & 1, skipped + ((sample + 1) >> 1) :]
+            _add_filtered(one, two, t, factor, row)
