@@ -10,13 +10,14 @@ import numpy as np
 
 from sonarsynth.frontiers.exact_frame import ExactFrame, differences, exact_plan
 from sonarsynth.frontiers.image_knobs import apart, image_point, imaged
-from sonarsynth.frontiers.rows import Point, timed
+from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.pipeline import BeamformedFrame, cloud_of, digitise, locate_and_image
 from sonarsynth.planning import frame_start, receiver_of, survey_of
 from sonarsynth.planning.choosing import pressures
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import Signals
+from sonarsynth.validation.run_time import timed
 
 
 @dataclass(frozen=True, eq=False)

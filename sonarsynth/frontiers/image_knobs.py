@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from sonarsynth.conventions import Floats
 from sonarsynth.frontiers.exact_frame import exact_plan
-from sonarsynth.frontiers.rows import Point, timed
+from sonarsynth.frontiers.rows import Point
 from sonarsynth.imaging import Beamformer, DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.imaging.delay_and_sum.zones import cuts
 from sonarsynth.pipeline import BeamformedFrame, cloud_of
@@ -22,6 +22,7 @@ from sonarsynth.products import EnergyImage, PointCloud
 from sonarsynth.ranging import IsovelocityPlacing, Placing
 from sonarsynth.receiver import Elements
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.validation.run_time import timed
 
 BRIGHT = 20.0
 """dB under the brightest beam: beams that count."""

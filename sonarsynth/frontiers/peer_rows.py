@@ -20,7 +20,7 @@ from sonarsynth.frontiers.peers import (
     thesis_image,
     thesis_pulse,
 )
-from sonarsynth.frontiers.rows import Point, timed
+from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.signal_knobs import FINER
 from sonarsynth.imaging import DenseDelayAndSum
 from sonarsynth.pipeline import BeamformedFrame
@@ -28,6 +28,7 @@ from sonarsynth.planning import Plan, frame_start
 from sonarsynth.products import Arrivals
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import GriddedSynthesis
+from sonarsynth.validation.run_time import timed
 
 THESIS_BEAMS = 24
 """Bright beams that the thesis's loop is timed on."""

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.frontiers.image_knobs import imaged
-from sonarsynth.frontiers.rows import Point, timed
+from sonarsynth.frontiers.rows import Point
 from sonarsynth.pipeline import BeamformedFrame, cloud_of
 from sonarsynth.pipeline.labelling import band_of, point_labels
 from sonarsynth.planning import Plan
 from sonarsynth.products import Arrivals
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.validation.run_time import timed
 
 NEAR = 0.05
 """m from the surface: points that lie on it."""

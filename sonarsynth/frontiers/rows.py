@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from math import isfinite, nan
-from typing import Any, Final, Literal, TypeVar
+from typing import Any, Final, Literal
 
 STAGES: Final = ("trace", "synthesis", "image", "range", "picking", "frame")
 """Parts of a frame that are walked, and the whole."""
 Role = Literal["point", "peer", "check"]
-T = TypeVar("T")
-
-REPEATS, ENOUGH, LONG = 3, 1.0, 5.0
-"""Times that something is measured at most; after so many s together it has been measured enough, and what takes this
-long is measured once."""
 
 
 @dataclass(frozen=True)
@@ -75,18 +69,6 @@ class Verdict:
     def as_json(self) -> dict[str, Any]:
         """The row for programs."""
         return {"row": "verdict"} | asdict(self) | {"ratio": self.ratio}
-
-
-def timed(function: Callable[[], T]) -> tuple[T, float]:
-    """What a function gives, and the CPU seconds of its fastest call: compiled, and with its tables made."""
-    best, total, calls = float("inf"), 0.0, 0
-    while True:
-        began = time.process_time()
-        result = function()
-        seconds = time.process_time() - began
-        best, total, calls = min(best, seconds), total + seconds, calls + 1
-        if calls == REPEATS or total > LONG or (calls > 1 and total > ENOUGH):
-            return result, best
 
 
 def merged(points: Iterable[Point]) -> list[Point]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis, Synthesis
 from sonarsynth.signals.auto_synthesis import PRECISIONS, deposit_for
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.gridded_synthesis import kernel_error
+from sonarsynth.validation.run_time import timed
 
 WIDEST = 14
 OVER_KERNEL = (1.0, 10.0, 100.0)
@@ -125,17 +127,8 @@ def direct_sum_point(traced: TracedBySensor) -> Point:
     seconds = []
     for count in SUMMED_HYDROPHONES:
         elements = subarray(piece.elements, np.resize(np.arange(piece.elements.count), count)).elements
-        began = time.process_time()
-        exact_signals(
-            arrivals.select(paths),
-            traced.frame.moment.snaps,
-            elements,
-            plan.scene.sonar,
-            plan.absorption,
-            start,
-            samples,
-        )
-        seconds.append(time.process_time() - began)
+        summed = partial(exact_signals, arrivals.select(paths), traced.frame.moment.snaps, elements)
+        seconds.append(timed(partial(summed, plan.scene.sonar, plan.absorption, start, samples), 1)[1])
     few, more = SUMMED_HYDROPHONES
     per_hydrophone = max(seconds[1] - seconds[0], 0.0) / (more - few)  # of a hydrophone; the pulses' spectra serve all
     live = int(np.count_nonzero(plan.elements.gain))

@@ -7,7 +7,6 @@ measured with the rest as chosen, too.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -25,13 +24,14 @@ from sonarsynth.frontiers.exact_frame import (
     exact_plan,
     golden,
 )
-from sonarsynth.frontiers.rows import Point, timed
+from sonarsynth.frontiers.rows import Point
 from sonarsynth.planning import Plan, arrivals_of, frame_start
 from sonarsynth.planning.choosing import pressures
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Straight
 from sonarsynth.receiver.subarrays import Subarray, subarrays
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.validation.run_time import timed
 
 DYNAMIC_RANGES = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
 """dB: levels under which the faintest echoes of each target are left out."""
@@ -65,10 +65,8 @@ class TracedBySensor:
             return TracedBySensor(plan, frame, ((every, traced),), 1, seconds)
         cut = subarrays(elements, count)
         needed = [piece for piece in cut if np.isin(piece.sensor, sensor).any()]
-        began = time.process_time()
-        pieces = tuple((piece, arrivals_of(plan, frame, piece)) for piece in needed)
-        of_parts = (time.process_time() - began) / len(needed) * len(cut)
-        return TracedBySensor(plan, frame, pieces, len(cut), seconds + of_parts)
+        pieces, spent = timed(lambda: tuple((piece, arrivals_of(plan, frame, piece)) for piece in needed), 1)
+        return TracedBySensor(plan, frame, pieces, len(cut), seconds + spent / len(needed) * len(cut))
 
     def pressures(self, sensor: Ints) -> Pressures:
         """Echoes and direct arrivals at some hydrophones, by the exact way's synthesis."""

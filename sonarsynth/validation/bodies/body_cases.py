@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -15,13 +14,13 @@ from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.randomness import stream
 from sonarsynth.targets.mesh_resolution import expected_error
+from sonarsynth.validation.run_time import timed
 from sonarsynth.validation.validation_rows import Row
 
 if TYPE_CHECKING:
     from sonarsynth.geometry.mesh import Mesh
 
 Complexes = npt.NDArray[np.complex128]
-T = TypeVar("T")
 
 SOUND_SPEED: Final = 1500.0  # m/s
 BAND: Final = np.arange(25e3, 110.1e3, 5e3)  # Hz
@@ -58,21 +57,6 @@ def round_x(degrees: npt.ArrayLike) -> Floats:
     return np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=-1)
 
 
-def timed(run: Callable[[], T], repeats: int = 3) -> tuple[T, float]:
-    """What a run gives, and its CPU time in ms: the median of some after a first one, which compiles.
-
-    No repeats: that of the only run, for what is long and compiled already.
-    """
-    began = time.process_time()
-    result = run()
-    spent = [] if repeats > 0 else [time.process_time() - began]
-    for _ in range(repeats):
-        began = time.process_time()
-        result = run()
-        spent.append(time.process_time() - began)
-    return result, 1e3 * float(np.median(spent))
-
-
 def backscatter(mesh: Mesh, towards: Floats, frequency: Floats) -> Complexes:
     """Far-field amplitude (frequency,) (m) that a convex rigid mesh sends back to a direction (xyz)."""
     lit = lit_and_seen(-towards, towards, mesh.normal)
@@ -97,10 +81,10 @@ class Point:
 
 def measured(mesh: Mesh, towards: Floats, exact: Complexes) -> Point:
     """Backscatter of a rigid convex mesh to directions (way, xyz) against exact amplitudes (frequency,) over `BAND`."""
-    echoes, cost = timed(lambda: np.array([backscatter(mesh, direction, BAND) for direction in towards]), repeats=1)
+    echoes, cost = timed(lambda: np.array([backscatter(mesh, direction, BAND) for direction in towards]), 2)
     predicted = expected_error(mesh, SOUND_SPEED / BAND[-1]) * (BAND / BAND[-1])  # in proportion while it is small
     edge = float(np.linalg.norm(mesh.corners - np.roll(mesh.corners, -1, axis=1), axis=2).mean())
-    return Point(len(mesh.faces), edge, cost / len(towards), np.abs(echoes / exact - 1.0), predicted)
+    return Point(len(mesh.faces), edge, 1e3 * cost / len(towards), np.abs(echoes / exact - 1.0), predicted)
 
 
 def trade_rows(case: str, reference: str, points: Sequence[Point]) -> Iterator[Row]:

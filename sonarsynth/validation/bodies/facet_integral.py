@@ -11,8 +11,9 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.scattering.kirchhoff_integral import triangle_integral
 from sonarsynth.randomness import stream
-from sonarsynth.validation.bodies.body_cases import SEED, timed
+from sonarsynth.validation.bodies.body_cases import SEED
 from sonarsynth.validation.rays.ray_matching import worst
+from sonarsynth.validation.run_time import timed
 from sonarsynth.validation.validation_rows import Row
 
 DIGITS = 50
@@ -75,7 +76,7 @@ def triangle_rows(quick: bool) -> Iterator[Row]:
 
 def _cost(corners: Floats, wave: Floats) -> float:
     """CPU time (us) of one of many triangles (triangle, 3, xyz) with a wave each."""
-    return 1e3 * timed(lambda: triangle_integral(corners, wave))[1] / len(corners)
+    return 1e6 * timed(lambda: triangle_integral(corners, wave))[1] / len(corners)
 
 
 def _error(rng: np.random.Generator, height: float, size: float, direction: str, turned: bool) -> tuple[float, float]:

@@ -34,12 +34,12 @@ from sonarsynth.validation.bodies.body_cases import (
     decibels,
     measured,
     round_x,
-    timed,
     trade_rows,
     wavenumber,
     ways,
 )
 from sonarsynth.validation.bodies.facet_integral import triangle_rows
+from sonarsynth.validation.run_time import timed
 from sonarsynth.validation.validation_rows import Row
 
 Complexes = npt.NDArray[np.complex128]
@@ -128,12 +128,12 @@ def _levels(radius: float, quick: bool) -> Iterator[Row]:
     meshes = _meshes(radius, quick)
     _mesh_level(meshes[0], towards)  # compiles
     for mesh in meshes:
-        levels, cost = timed(lambda: _mesh_level(mesh, towards), repeats=0)  # noqa: B023 -- called here
+        levels, cost = timed(lambda: _mesh_level(mesh, towards), calls=1)  # noqa: B023 -- called here
         expected = expected_error(mesh, SOUND_SPEED / BAND[-1])
         bound = FAIR + 20.0 * float(np.log10(1.0 + 2.0 * expected))
         error = float(np.abs(levels - exact).max())
         counts = {"facets": len(mesh.faces), "values": levels.size}
-        yield Row(case, SERIES, LEVEL, "dB", bound, error, cost / len(towards), PER_ASPECT, counts, case)
+        yield Row(case, SERIES, LEVEL, "dB", bound, error, 1e3 * cost / len(towards), PER_ASPECT, counts, case)
 
 
 def _mesh_level(mesh: Mesh, towards: Floats) -> Floats:
@@ -167,10 +167,10 @@ def _backscatter(radius: float, surface: Surface, quick: bool) -> Iterator[Row]:
     towards = np.concatenate([[[-1.0, 0.0, 0.0]], ways(1 if quick or radius > 0.3 else 3)])
     body, law = Sphere(radius=radius), Kirchhoff(surface=surface)
     levels, cost = timed(
-        lambda: target_strength(body, frequency[:, None], -towards, towards, SOUND_SPEED, law), repeats=0
+        lambda: target_strength(body, frequency[:, None], -towards, towards, SOUND_SPEED, law), calls=1
     )
     error = float(np.abs(levels - sphere_level(frequency, np.zeros(1), radius, surface)).max())
-    columns = cost / len(towards), PER_ASPECT, {"facets": _facets(radius), "values": levels.size}
+    columns = 1e3 * cost / len(towards), PER_ASPECT, {"facets": _facets(radius), "values": levels.size}
     yield Row(f"{surface} sphere, {radius:g} m", SERIES, "backscatter", "dB", FAIR, error, *columns)
 
 
@@ -197,11 +197,15 @@ def _sectors(case: str, radius: float, surface: Surface, law: Kirchhoff, step: f
     """The largest error over each sector, at angles (deg) every `step` and at the ends of sectors."""
     frequency = BAND[::8] if step >= 30.0 else BAND
     off = np.unique([*np.arange(0.0, last, step), *(end for end in SECTORS if end <= last)])
-    levels, cost = timed(lambda: facet_level(frequency, off, radius, law), repeats=0)
+    levels, cost = timed(lambda: facet_level(frequency, off, radius, law), calls=1)
     error = np.abs(levels - sphere_level(frequency, off, radius, surface)).max(axis=0)
     for first, end in pairwise(SECTORS[: SECTORS.index(last) + 1]):
         inside = (off >= first) & (off <= end)
-        columns = cost / len(off), PER_ASPECT, {"facets": _facets(radius), "values": int(inside.sum()) * len(frequency)}
+        columns = (
+            1e3 * cost / len(off),
+            PER_ASPECT,
+            {"facets": _facets(radius), "values": int(inside.sum()) * len(frequency)},
+        )
         worst = float(error[inside].max())
         yield Row(case, SERIES, f"bistatic, {first:g} to {end:g} deg", "dB", AIM, worst, *columns)
 
@@ -211,13 +215,13 @@ def _partly_reflecting(radius: float, quick: bool) -> Iterator[Row]:
     case = f"fluid sphere, {radius:g} m"
     law = Kirchhoff(surface=PartlyReflecting(density_ratio=FILLING.density_ratio, speed_ratio=FILLING.speed_ratio))
     off = np.array([0.0, 60.0] if quick else [0.0, 30.0, 60.0])
-    levels, cost = timed(lambda: facet_level(BAND, off, radius, law), repeats=0)
+    levels, cost = timed(lambda: facet_level(BAND, off, radius, law), calls=1)
     counts = {"facets": _facets(radius), "values": levels.size}
     front = np.array([front_echo(BAND, float(a), radius, FILLING, SOUND_SPEED) for a in np.radians(off)]).T
     error = float(np.abs(levels - decibels(front)).max())
-    yield Row(case, FRONT, "front, 0 to 60 deg", "dB", FAIR, error, cost / len(off), PER_ASPECT, counts)
+    yield Row(case, FRONT, "front, 0 to 60 deg", "dB", FAIR, error, 1e3 * cost / len(off), PER_ASPECT, counts)
     exact = sphere_level(BAND, off, radius, FILLING)
     power = [10.0 * np.log10(np.mean(10.0 ** (level / 10.0), axis=0)) for level in (levels, exact)]
     left_out = float(np.abs(power[0] - power[1]).max())
     note = "echoes from inside, which the law leaves out: it is for bodies that swallow them"
-    yield Row(case, SERIES, "left out", "dB", INSIDE, left_out, cost / len(off), PER_ASPECT, counts, note=note)
+    yield Row(case, SERIES, "left out", "dB", INSIDE, left_out, 1e3 * cost / len(off), PER_ASPECT, counts, note=note)

@@ -7,7 +7,6 @@ Rayleigh's closed form, are in the table of extremes.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from functools import cache
 from typing import Final
@@ -18,6 +17,7 @@ from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
 from sonarsynth.equations.bubble import bubble_collapse, bubble_pulse, pulses
 from sonarsynth.equations.bubble.bubble_collapse import Cavity, Collapse
 from sonarsynth.validation.references.bubble_series import ExactCollapse, exact_bubble
+from sonarsynth.validation.run_time import timed
 from sonarsynth.validation.validation_rows import Row
 
 RADIUS, DEPTH = 3.5e-3, 5.0  # m
@@ -66,14 +66,10 @@ def exact(cavity: Cavity) -> ExactCollapse:
     return exact_bubble(cavity)
 
 
-def timed(cavity: Cavity, tolerance: float = 1e-10) -> tuple[Collapse, float]:
-    """A bubble and its rebound as they are solved, and the CPU time that takes (ms): the median of several runs."""
-    times: list[float] = []
-    while len(times) < 5 and sum(times) < 0.2:
-        began = time.process_time()
-        bubble = bubble_collapse.collapse.__wrapped__(cavity, 0, tolerance)
-        times.append(time.process_time() - began)
-    return bubble, 1e3 * float(np.median(times))
+def solved(cavity: Cavity, tolerance: float = 1e-10) -> tuple[Collapse, float]:
+    """A bubble and its rebound as they are solved, and the CPU time that takes (ms)."""
+    bubble, seconds = timed(lambda: bubble_collapse.collapse.__wrapped__(cavity, 0, tolerance), 5)
+    return bubble, 1e3 * seconds
 
 
 def row(
@@ -99,13 +95,13 @@ def worst(values: tuple[float, ...], expected: tuple[float, ...]) -> float:
 def frozen_rows(quick: bool) -> Iterator[Row]:
     """Collapse and rebound, to all that is known of them."""
     for (equation, gas), expected in NUMBERS.items():
-        bubble, cost = timed(described(gas, compressible=equation == "Keller-Miksis"))
+        bubble, cost = solved(described(gas, compressible=equation == "Keller-Miksis"))
         case = f"{equation}, {gas:g} Pa"
         yield row(case, FROZEN, "collapse, rebound", "1", 1e-7, worst(numbers_of(bubble), expected), cost, bubble)
         if not quick or gas == 1000.0:
             yield from series_rows(case, bubble, cost)
     for gas in (1000.0,) if quick else (100.0, 1000.0):
-        bubble, cost = timed(described(gas, core=True))
+        bubble, cost = solved(described(gas, core=True))
         yield from series_rows(f"Keller-Miksis with a hard core, {gas:g} Pa", bubble, cost)
 
 
@@ -144,7 +140,7 @@ def tolerance_rows(quick: bool) -> Iterator[Row]:
     """Radii and time of a hard collapse (Mach 0.74) over the solver's tolerance, which local errors add up to."""
     best = exact(described(100.0))
     for tolerance in LOOSER[1:2] if quick else LOOSER:
-        bubble, cost = timed(described(100.0), tolerance)
+        bubble, cost = solved(described(100.0), tolerance)
         case, bound = f"Keller-Miksis, 100 Pa, tolerance {tolerance:g}", 30.0 * tolerance
         radii = worst((bubble.minimum_radius, bubble.largest[0].radius), best.radii)
         yield row(case, SERIES, "smallest radius, rebound", "1", bound, radii, cost, bubble)
@@ -154,7 +150,7 @@ def tolerance_rows(quick: bool) -> Iterator[Row]:
 def level_rows(quick: bool) -> Iterator[Row]:
     """Peak source levels, before filters and behind them, as tabled."""
     for gas, (raw, *limited) in LEVELS.items():
-        bubble, cost = timed(described(gas))
+        bubble, cost = solved(described(gas))
         case = f"Keller-Miksis, {gas:g} Pa"
         yield row(case, TABLE, "peak", "dB", PRINTED, bubble_pulse.source_level(bubble) - raw, cost, bubble)
         S = spectrum(bubble)
@@ -162,6 +158,6 @@ def level_rows(quick: bool) -> Iterator[Row]:
             peak_to_peak = 20.0 * np.log10(np.ptp(waveform(S, 1e3 * corner)) / REFERENCE_PRESSURE)
             yield row(case, TABLE, f"p-p below {corner:g} kHz", "dB", PRINTED, peak_to_peak - level, cost, bubble)
     for (depth, gas), level in {} if quick else DEEPER.items():
-        bubble, cost = timed(described(gas, depth))
+        bubble, cost = solved(described(gas, depth))
         case = f"Keller-Miksis, {gas:g} Pa at {depth:g} m"
         yield row(case, TABLE, "peak", "dB", PRINTED, bubble_pulse.source_level(bubble) - level, cost, bubble)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
@@ -12,6 +11,7 @@ from scipy.optimize import minimize_scalar
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
 from sonarsynth.equations.bubble import snap_pressure
 from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.validation.run_time import timed
 from sonarsynth.validation.validation_rows import Row
 
 CASE = "logarithmic bubble"
@@ -34,15 +34,9 @@ def logarithmic_rows(quick: bool) -> list[Row]:
     return [*_wall_rows(quick), *_collapse_rows(), *_spectrum_rows(quick)]
 
 
-def _timed(run: Callable[[], Any], count: int) -> float:
-    """CPU time (us) of one of `count`, the median of several runs."""
-    times = []
-    for _ in range(5):
-        began = time.process_time()
-        for _ in range(20):
-            run()
-        times.append((time.process_time() - began) / 20.0)
-    return 1e6 * float(np.median(times)) / count
+def _cost(run: Callable[[], Any], count: int) -> float:
+    """CPU time (us) of one of `count`."""
+    return 1e6 * timed(lambda: [run() for _ in range(20)], 5)[1] / 20.0 / count
 
 
 def _row(reference: str, quantity: str, unit: str, expected: float, error: Any, cost: float, points: int) -> Row:
@@ -56,7 +50,7 @@ def _computed(t: Floats) -> Floats:
 
 def _wall_rows(quick: bool) -> Iterator[Row]:
     times = -np.geomspace(1e-9, 2e-3, 6 if quick else 40)
-    cost = _timed(lambda: _computed(times), len(times))
+    cost = _cost(lambda: _computed(times), len(times))
     exact = np.array([_many_digits(float(t)) for t in times]).T
     miss = np.abs(_computed(times) - exact) / np.abs(_scale(exact))
     for name, error in zip(("radius", "speed", "acceleration", "pressure"), miss, strict=True):
@@ -93,12 +87,12 @@ def _collapse_rows() -> Iterator[Row]:
         method="bounded",
         options={"xatol": 1e-12},
     )
-    cost = _timed(lambda: snap_pressure.pressure(-TAU, frozen), 1)
+    cost = _cost(lambda: snap_pressure.pressure(-TAU, frozen), 1)
     yield _row(CLOSED, "peak, growth frozen", "1", 1e-9, -minimum.fun / size / factor - 1.0, cost, 1)
     yield _row(CLOSED, "net impulse", "Pa s", 0.0, float(snap_pressure.impulse(0.0, BUBBLE)), cost, 1)
     x, w = snap_pressure.quadrature(BUBBLE, 2e5)
     p = snap_pressure.pressure(-x, BUBBLE)
-    cost = _timed(lambda: snap_pressure.pressure(-x, BUBBLE), x.size)
+    cost = _cost(lambda: snap_pressure.pressure(-x, BUBBLE), x.size)
     yield _row(CLOSED, "net impulse, summed", "1", 1e-13, (w @ p) / (w @ np.abs(p)), cost, x.size)
     yield _row(TABLE, "energy", "1", 1e-4, (w @ p**2) / ENERGY - 1.0, cost, x.size)
     level = 10.0 * np.log10((w @ p**2) / REFERENCE_PRESSURE**2)
@@ -107,7 +101,7 @@ def _collapse_rows() -> Iterator[Row]:
 
 def _spectrum_rows(quick: bool) -> Iterator[Row]:
     f = np.linspace(500.0, 4000.0, 3501)
-    cost = _timed(lambda: snap_pressure.spectrum(f[:500], BUBBLE), 500)
+    cost = _cost(lambda: snap_pressure.spectrum(f[:500], BUBBLE), 500)
     S = np.abs(snap_pressure.spectrum(f, BUBBLE))
     yield _row(TABLE, "spectrum, peak", "1", 1e-4, S.max() / LARGEST - 1.0, cost, f.size)
     yield _row(TABLE, "spectrum, peak at", "Hz", 5.0, f[S.argmax()] - 1311.0, cost, f.size)

@@ -7,7 +7,6 @@ of the smooth profile, integrated.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
@@ -23,6 +22,7 @@ from sonarsynth.validation.rays.ray_matching import errors, miscounted, nearest,
 from sonarsynth.validation.references.rays.followed_rays import count_rays
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
 from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
+from sonarsynth.validation.run_time import timed
 from sonarsynth.validation.validation_rows import Row
 
 if TYPE_CHECKING:
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 MANY_DIGITS, FAN = "50 digits", "a dense fan"
 SMOOTH = "DOP853, smooth profile"
-REPEATS = 5
 BATCH = 2e-3  # s: a search is timed on at least so much
 COST = "us a ray"  # CPU time of one core for one ray, in the complete search of the whole case
 
@@ -44,19 +43,16 @@ def ray_accuracy(quick: bool = False) -> list[Row]:
 
 
 def search(case: Case) -> tuple[Eigenrays, float]:
-    """All eigenrays of a case, and the CPU time of one of them (us): the median of several runs, on a batch."""
+    """All eigenrays of a case, and the CPU time of one of them (us), on a batch."""
     water = ray_solutions.water(case.depth, case.speed, case.bottom)
 
-    def run(copies: int) -> tuple[Eigenrays, float]:
+    def run(copies: int) -> Eigenrays:
         start, end, distance = (np.tile(v, copies) for v in (case.start, case.end, case.distance))
-        began = time.process_time()
-        eigenrays = ray_solutions.eigenrays(water, start, end, distance, case.vertices, case.reflections)
-        return eigenrays, time.process_time() - began
+        return ray_solutions.eigenrays(water, start, end, distance, case.vertices, case.reflections)
 
-    eigenrays, _ = run(1)  # compiles
-    _, once = run(1)
+    eigenrays, once = timed(lambda: run(1), 2)
     copies = max(1, min(10_000, round(BATCH / max(once, 1e-6))))
-    seconds = float(np.median([run(copies)[1] for _ in range(REPEATS)]))
+    _, seconds = timed(lambda: run(copies), 5)
     return eigenrays, 1e6 * seconds / (copies * max(1, len(eigenrays.pair)))
 
 
