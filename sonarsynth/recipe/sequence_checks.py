@@ -83,7 +83,7 @@ def most_emissions(spanned: Sequences) -> int:
     the most of another. Raises FieldError for values that cannot be.
     """
     scene = spanned.described(0)
-    plain, count = plain_scene(scene), 0
+    plain, count = plain_scene(scene) if spanned.entries else {}, 0
     for i, source in enumerate(scene.world.sources):
         times = ("scene", "world", "sources", i, source.times_field)
         setting = [

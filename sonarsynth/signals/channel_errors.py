@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
-from scipy.sparse import csr_array
 
 from sonarsynth.conventions import Bools
 from sonarsynth.equations.noise.filters import kaiser_bessel
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.sensor_errors import DrawnErrors, Overload, SensorErrors, SensorState
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 BLEND = 256
 """Samples over which the end of a window goes over into its start, so that a filter finds no step there."""
@@ -75,6 +78,8 @@ def talk(signals: Signals, elements: Elements, level: float) -> Signals:
 
 def neighbours(elements: Elements, level: float) -> csr_array:
     """K (sensor, sensor): the amplitude at neighbours, else 0."""
+    from scipy.sparse import csr_array  # here and below: few scenes need it, and it is slow to load
+
     count = elements.count
     position = np.stack([elements.column, elements.row], axis=1) if elements.on_lattice else np.arange(count)[:, None]
     number = {tuple(at): n for n, at in enumerate(position.tolist())}
@@ -89,6 +94,8 @@ def neighbours(elements: Elements, level: float) -> csr_array:
 def sampled(signals: Signals, jitter: float, clock_rate: float, random: np.random.Generator) -> Signals:
     """Signals at the times of a real clock: sample n, n/fs after the start, is taken at n/fs (1 + clock_rate) and
     `jitter` (s, standard deviation) off; the same for all channels. Beyond the window is silence."""
+    from scipy.sparse import csr_array
+
     samples, fs = signals.pressure.shape[1], signals.sampling_frequency
     position = np.arange(samples) * (1.0 + clock_rate) + fs * jitter * random.standard_normal(samples)
     tap = np.floor(position).astype(int)[:, None] + np.arange(1 - TAPS // 2, TAPS // 2 + 1)

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import ifft, irfft, next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
-from scipy.spatial import cKDTree
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.arrays.correlated_errors import correlated_error_factor
@@ -267,6 +266,8 @@ def lag_variance(wave: Wavefront, pulse: Pulse, elements: Elements, rounding: fl
 @lru_cache(maxsize=16)
 def neighbours(elements: Elements) -> tuple[Ints, Ints]:
     """Live sensors (live,), and those next to each (live, beside)."""
+    from scipy.spatial import cKDTree  # loading it takes a third as long as planning
+
     live = np.flatnonzero(elements.gain)
     count = min(BESIDE, len(live) - 1)
     _, near = cKDTree(elements.position[live]).query(elements.position[live], range(2, count + 2))
