@@ -280,7 +280,8 @@ class Profile:
 
     def at(self, depth: np.ndarray | float) -> Floats:
         """Sound speed (m/s) at depths (m, positive down)."""
-        return np.asarray(np.interp(depth, self.depth, self.speed))
+        speed = np.full(np.shape(depth), self.speed[0])
+        return speed if self.uniform else np.asarray(np.interp(depth, self.depth, self.speed))
 
 
 def mean_gradient(profile: Profile, depth: float, other_depth: float, least: float) -> float:

@@ -30,6 +30,7 @@ from sonarsynth.equations.kernels import moving_ends
 from sonarsynth.equations.kernels.row_products import row_products
 from sonarsynth.equations.kernels.unit_vectors import moved
 from sonarsynth.equations.scattering.lobes import dot
+from sonarsynth.geometry import Pose, unit
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import ArrayExpansion, Arrivals
 from sonarsynth.receiver import Elements
@@ -69,20 +70,24 @@ class MotionTerms:
         zero, none = np.zeros(count), np.zeros((count, 3))
         return MotionTerms(zero + snap.time, zero, none + snap.velocity, none, none)
 
-    def departure(self, length: Floats, away: Floats) -> Floats:
+    def departure(self, length: Floats, away: Floats, body: Pose | None = None) -> Floats:
         """Directions (path, ..., xyz) to the array or probes of it, of rays of some length (path,) m that left in
-        directions `away`; world."""
-        probes = away if away.ndim == 3 else away[:, None]
-        return np.asarray(moved(length, probes, self.apart).reshape(away.shape))
+        directions `away`, world; with the pose of the body that was traced, as it sees them when it has turned, in
+        its axes."""
+        turn, rotation = (np.zeros_like(self.spin), np.eye(3)) if body is None else (self.turn, body.rotation)
+        places = away if away.ndim == 3 else away[:, None]
+        return np.asarray(moved(length, places, self.apart, turn, rotation).reshape(away.shape))
 
-    def turned_back(self, direction: Floats) -> Floats:
-        """Directions (path, ..., xyz) as the body that has turned sees them, in the axes that it was traced in."""
-        if not self.spin.any():
-            return direction
-        broadcast = (slice(None), *(None for _ in direction.shape[2:]))
-        turn = (self.late[:, None] * self.spin)[broadcast]
-        back = direction - np.cross(turn, direction)
-        return np.asarray(back / np.sqrt(dot(back, back))[..., None])
+    @property
+    def turn(self) -> Floats:
+        """(path, xyz) rad: by how much the body has turned."""
+        return np.asarray(self.late[:, None] * self.spin)
+
+    def arrival(self, direction: Floats, body: Pose) -> Floats:
+        """Directions (path, xyz) of rays, world, as the body that has turned sees them, in its axes."""
+        if self.spin.any():
+            direction = unit(direction - np.cross(self.turn, direction))
+        return body.turn_to_body(direction)
 
 
 def velocities(scattering: tuple[Scatterers, ...], owner: Ints, point: Floats) -> tuple[Floats, Floats]:

@@ -40,9 +40,8 @@ class EchoBatch:
         rows: dict[str, Any] = {k: rows_of(v, keep) for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         return replace(self, patch=self.patch.select(keep), **rows)
 
-    def over(self, departure: Floats) -> Floats:
-        """Amplitudes (echo, probe) in directions (echo, probe, xyz) of the world."""
-        away = self.surface.pose.turn_to_body(departure)
+    def over(self, away: Floats) -> Floats:
+        """Amplitudes (echo, probe) in directions (echo, probe, xyz)."""
         return self.part.amplitudes_in(away, self.incident, self.scattered, self.patch, self.wavenumber)
 
     @property
@@ -55,11 +54,10 @@ class EchoBatch:
         """Whether the phase of its reflections differs from direction to direction."""
         return self.part.turns
 
-    def turned(self, departure: Floats) -> Floats:
-        """Phase (echo, probe) in directions (echo, probe, xyz) of the world more than in that of the array centre."""
+    def turned(self, away: Floats) -> Floats:
+        """Phase (echo, probe) in directions (echo, probe, xyz) more than in that of the array centre."""
         if not self.part.turns:
-            return np.zeros(departure.shape[:2])
-        away = self.surface.pose.turn_to_body(departure)
+            return np.zeros(away.shape[:2])
         seen_from_centre = self.part.phase(self.incident, self.scattered)[:, None]
         more = self.part.phase(self.incident[:, None, :], away) - seen_from_centre
         return np.asarray(more - 2.0 * np.pi * np.rint(more / (2.0 * np.pi)))
@@ -95,11 +93,12 @@ def echo_batches(
         owned = picked(owner == number)
         row, owned_leg, facet = np.arange(len(owner))[owned], leg[owned], facets.facet[out.facet[owned]]
         arrival, departure = rows_of(out.arrival, owned), rows_of(array.legs.departure, owned_leg)
-        if carried is not None:
-            moved = carried.select(owned)
-            arrival = moved.turned_back(arrival)
-            departure = moved.turned_back(moved.departure(array.legs.length[owned_leg], departure))
-        incident, scattered = surface.pose.turn_to_body(arrival), surface.pose.turn_to_body(departure)
+        if carried is None:
+            incident, scattered = surface.pose.turn_to_body(arrival), surface.pose.turn_to_body(departure)
+        else:
+            motion, length = carried.select(owned), array.legs.length[owned_leg]
+            incident = motion.arrival(arrival, surface.pose)
+            scattered = motion.departure(length, departure, surface.pose)
         speed = context.medium.profile.at(depth(array.legs.point[owned_leg]))
         wavenumber = 2.0 * np.pi * receiver.centre / speed
         for component in (part.past_limb() if looked_for else part for part in of_law):

@@ -24,8 +24,8 @@ from sonarsynth.tracing.expansion.scattering_points import delay_to_scattering_p
 from sonarsynth.tracing.occlusion.ray_cones import hidden, overlapping
 from sonarsynth.tracing.path_absorption import path_loss
 from sonarsynth.tracing.pruning import EchoLevels, loud_of_all, loud_ones
-from sonarsynth.tracing.receive_paths import DOUBTFUL, ReceivePaths, may_face_receiver, path_pairs, usable
-from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arrivals, ordered
+from sonarsynth.tracing.receive_paths import DOUBTFUL, ReceivePaths, may_face_receiver, usable
+from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arrivals, ordered, path_pairs
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
@@ -92,12 +92,12 @@ class _EchoBlock:
         if few is not None:
             return self.few, self.gain
         (row,) = _columns(self.groups, "row")
-        more = np.concatenate([g.over(self.departure(g.row, MORE)) for g in self.groups])
+        more = np.concatenate([g.over(self.away(g, MORE)) for g in self.groups])
         return np.concatenate([self.few, more], axis=1), self.array.fronts.gain(self.leg[row])
 
-    def departure(self, rows: Ints, some: slice = slice(None)) -> Floats:
-        """Where some probes are seen from the facets of pairs (row, probe, xyz), as `_departure`."""
-        return _departure(self.array, self.leg[rows], None if self.carried is None else self.carried.select(rows), some)
+    def away(self, group: EchoBatch, some: slice = slice(None)) -> Floats:
+        """Where some probes are seen from the facets of a group (echo, probe, xyz), as `_away`."""
+        return _away(self.array, self.leg, self.carried, group, some)
 
     def seen(self) -> EchoLevels:
         """What decides which of them are kept."""
@@ -182,15 +182,13 @@ def _loudest(array: FacetPaths, snap: Emission, components: tuple[tuple[Componen
 def _found(array: FacetPaths, snap: Emission, components: tuple[tuple[Component, ...], ...]) -> _EchoBlock:
     """All echoes of a snap from the facets of the legs."""
     out, fronts = _ways(array, snap), array.fronts
-    way, leg = path_pairs(out.facet, array.legs.row, len(array.facets.facet))
-    within = picked(out.bounces[way] + array.legs.bounces[leg] <= array.propagation.bounces)
-    out, leg, carried = out.select(way[within]), leg[within], None
+    way, leg = path_pairs(out, array.legs, len(array.facets.facet), array.propagation.bounces)
+    out, carried = out.select(way), None
     if array.meeting is not None:
         out, carried = _carried(array, snap, out, leg)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
     groups = echo_batches(array, out, leg, components, carried, factor)
-    away = [_departure(array, leg[g.row], carried and carried.select(g.row), FEW) for g in groups]
-    few = np.concatenate([g.over(of) for g, of in zip(groups, away, strict=True)])
+    few = np.concatenate([g.over(_away(array, leg, carried, g, FEW)) for g in groups])
     pulses = PulseResponse.join([g.pulses(array.context.receiver.centre) for g in groups])
     rows = leg[_columns(groups, "row")[0]]
     gain, over = fronts.gain(rows, QUADRATIC_PROBES), fronts.expansion[rows]
@@ -208,12 +206,14 @@ def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -
     return met_out, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
 
 
-def _departure(array: FacetPaths, leg: Ints, carried: MotionTerms | None, some: slice) -> Floats:
-    """Where some probes are seen from facets (row, probe, xyz): world, in axes that turn with what turns."""
-    away = array.fronts.departure(leg, some)
+def _away(array: FacetPaths, leg: Ints, carried: MotionTerms | None, group: EchoBatch, some: slice) -> Floats:
+    """Where some probes are seen from the facets of a group (echo, probe, xyz), in the frame of its body; leg, carried:
+    of all pairs (pair,)."""
+    rows = leg[group.row]
+    away, pose = array.fronts.departure(rows, some), group.surface.pose
     if carried is None:
-        return away
-    return carried.turned_back(carried.departure(array.legs.length[leg], away))
+        return pose.turn_to_body(away)
+    return carried.select(group.row).departure(array.legs.length[rows], away, pose)
 
 
 def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:
@@ -264,7 +264,7 @@ def _turned(block: _EchoBlock, strongest: float) -> ArrayExpansion:
     over, array = block.terms, block.array
     if not any(g.turns for g in block.groups):
         return over
-    shift = np.concatenate([g.turned(block.departure(g.row)) for g in block.groups])
+    shift = np.concatenate([g.turned(block.away(g)) for g in block.groups])
     leaps = np.abs(shift).max(axis=1, initial=0.0) > MAX_PHASE_CHANGE
     if not shift.any():
         return over

@@ -137,8 +137,9 @@ def facet_paths(
             every = every.select(picked(facing))
         leaving = receive_paths(every, medium, receiver, propagation, slack)
         leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
-        reached, row = np.unique(leaving.row, return_inverse=True)
-        columns[0].append(leaving.numbered(count + row))
+        first = np.diff(leaving.row, prepend=-1) > 0
+        reached = leaving.row[first]
+        columns[0].append(leaving.numbered(count - 1 + np.cumsum(first)))
         columns[1].append(every.select(reached))
         count += len(reached)
     legs, facets = concatenate(columns[0]), concatenate(columns[1])

@@ -252,12 +252,3 @@ def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Me
     steepest = np.abs(facets.normal[:, 2]) * np.sqrt((1.0 - cosine) * (1.0 + cosine))
     margin = 1e-9 + slack / np.maximum(distance, 1e-300)
     return np.asarray((ahead >= -margin) | (ahead * cosine + steepest > -margin))
-
-
-def path_pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
-    """Every pair of a way out to a facet and a leg from it; legs are sorted by facet, the pairs by leg."""
-    begin = np.searchsorted(row, np.arange(facets + 1))
-    count = np.diff(begin)[facet]
-    way = np.repeat(np.arange(len(facet)), count)
-    within = np.arange(len(way)) - np.repeat(np.cumsum(count) - count, count)
-    return way, begin[facet[way]] + within

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, rows_of
+from sonarsynth.conventions import Bools, Floats, Ints, picked, rows_of
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind, Paths
 from sonarsynth.products.array_expansion import stacked
 from sonarsynth.propagation.reflections import Reflections, as_sign
@@ -86,6 +86,20 @@ def directed(snap: Emission, departure: Floats) -> tuple[Floats | float, Floats 
         return 1.0, 0.0
     factor = snap.directivity(departure)
     return np.abs(factor), np.where(factor < 0.0, np.pi, 0.0)
+
+
+def path_pairs(out: TransmitPaths, legs: ReceivePaths, facets: int, bounces: int) -> tuple[Ints | slice, Ints]:
+    """Every pair of a way out to one of so many facets, each of which has a leg, and a leg from it, with no more than
+    so many bounces: which way, or a slice of all of them, and which leg. Legs are sorted by facet, the pairs by way."""
+    if len(legs.row) == facets:
+        way, leg = picked(out.bounces + legs.bounces[out.facet] <= bounces), out.facet
+        return way, leg[way]
+    begin = np.searchsorted(legs.row, np.arange(facets + 1))
+    count = np.diff(begin)[out.facet]
+    way = np.repeat(np.arange(len(count)), count)
+    leg = begin[out.facet[way]] + np.arange(len(way)) - np.repeat(np.cumsum(count) - count, count)
+    within = out.bounces[way] + legs.bounces[leg] <= bounces
+    return way[within], leg[within]
 
 
 def assemble(

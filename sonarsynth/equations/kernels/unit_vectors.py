@@ -40,14 +40,19 @@ def to_images(length: Floats, departure: Floats, mirrored: Bools, offset: Floats
 
 
 @compiled
-def moved(length: Floats, away: Floats, apart: Floats) -> Floats:
-    """Unit vectors (leg, place, xyz) of length (leg,) times away (leg, place, xyz) plus apart (leg, xyz)."""
+def moved(length: Floats, away: Floats, apart: Floats, turn: Floats, rotation: Floats) -> Floats:
+    """Unit vectors (leg, place, xyz) of length (leg,) times away (leg, place, xyz) plus apart (leg, xyz), turned back
+    by small angles (leg, xyz) rad, in axes with this rotation (xyz, axis)."""
     out = np.empty(away.shape)
     for i in range(away.shape[0]):
+        tx, ty, tz = turn[i, 0], turn[i, 1], turn[i, 2]
         for j in range(away.shape[1]):
             x = length[i] * away[i, j, 0] + apart[i, 0]
             y = length[i] * away[i, j, 1] + apart[i, 1]
             z = length[i] * away[i, j, 2] + apart[i, 2]
+            x, y, z = x - (ty * z - tz * y), y - (tz * x - tx * z), z - (tx * y - ty * x)
             far = math.sqrt(x * x + y * y + z * z)
-            out[i, j, 0], out[i, j, 1], out[i, j, 2] = x / far, y / far, z / far
+            x, y, z = x / far, y / far, z / far
+            for n in range(3):
+                out[i, j, n] = rotation[0, n] * x + rotation[1, n] * y + rotation[2, n] * z
     return out

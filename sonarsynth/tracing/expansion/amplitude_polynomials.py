@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
+from sonarsynth.equations.kernels import probe_fits
 from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
 
 if TYPE_CHECKING:
@@ -58,23 +59,16 @@ def variations(blocks: Sequence[FacetBlock]) -> tuple[list[Floats], float]:
 
 
 def _fitted(blocks: Sequence[FacetBlock], few: int | None) -> tuple[list[Floats], float]:
+    """The same at all probes, or the first few. Echoes that end at the limb of some probe are the same everywhere;
+    those that are tapered to nothing there are followed. All sensors share what the centre sees."""
     terms, worst, loudest = [], 0.0, 0.0
     for block in blocks:
-        law, gain = block.over(few)
-        strength = np.where((law == 0.0).any(axis=1), 0.0, block.strength)  # on the limb of some probe: not counted
-        fitted = _fit(block.array, _gain(law, block.amplitude, block.tapered, gain), strength, few)
-        terms.append(fitted[0])
-        worst, loudest = max(worst, fitted[1]), max(loudest, fitted[2])
+        law, probe_gain = block.over(few)
+        gain, strength, most = probe_fits.gains(law, block.amplitude, probe_gain, block.tapered, block.strength)
+        block_terms, wrong = _terms(block.array, gain, strength)
+        terms.append(block_terms)
+        worst, loudest = max(worst, wrong), max(loudest, most)
     return terms, worst / max(loudest, SILENT)
-
-
-def _gain(over_aperture: Floats, amplitude: Floats, tapered: Bools, probe_gain: Floats) -> Floats:
-    """Amplitude (path, probe) over that of the centre and the sphere; 1 for a facet that ends at the limb of some
-    probe; one that is tapered (path,) to nothing there is followed. All sensors share what the centre sees.
-    """
-    gain = over_aperture / amplitude[:, None] * probe_gain
-    gain[(over_aperture == 0).any(axis=1) & ~tapered] = 1.0
-    return np.asarray(gain)
 
 
 def fitted(array: FacetPaths, gain: Floats, strength: Floats) -> tuple[Floats, float]:
@@ -82,14 +76,14 @@ def fitted(array: FacetPaths, gain: Floats, strength: Floats) -> tuple[Floats, f
 
     And their largest error at the probes, for paths of that strength (path,), relative to the strongest.
     """
-    terms, worst, loudest = _fit(array, gain, strength, None)
+    terms, worst = _terms(array, gain, strength)
+    loudest = float(np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0))
     return terms, worst / max(loudest, SILENT)
 
 
-def _fit(array: FacetPaths, gain: Floats, strength: Floats, few: int | None) -> tuple[Floats, float, float]:
-    """Polynomials, the largest error at the probes, and the largest amplitude there."""
-    loudest = float(np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0))
+def _terms(array: FacetPaths, gain: Floats, strength: Floats) -> tuple[Floats, float]:
+    """Polynomials as above, and the largest error at the probes."""
     if (gain == 1.0).all():
-        return np.empty((len(gain), 0)), 0.0, loudest
-    terms, error = probes(array.context.receiver.elements).expand(gain - 1.0)
-    return terms, float((np.abs(strength) * error).max(initial=0.0)), loudest
+        return np.empty((len(gain), 0)), 0.0
+    terms, missed = probes(array.context.receiver.elements).expand(gain - 1.0)
+    return terms, float((np.abs(strength) * missed).max(initial=0.0))

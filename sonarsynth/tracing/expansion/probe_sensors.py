@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.equations.kernels import probe_fits
 from sonarsynth.equations.kernels.row_products import row_products
 from sonarsynth.products import Paths
 from sonarsynth.products.array_expansion import aperture_terms
@@ -34,38 +35,25 @@ class Probes:
     basis: Floats  # (probe, term)
     aperture: float  # m
     solve_few: Floats  # (term, probe): as solve, from the first of FEW probes to terms up to the second degree
-
-    def fit(self, values: Floats) -> Floats:
-        """Coefficients (path, term) of the least-squares polynomial, 0 at the centre, through values (path, probe).
-
-        Values that are NaN (no ray there) are left out.
-        """
-        fitted = values[:, : self.fitted]
-        terms = row_products(np.nan_to_num(fitted), self.solve.T)
-        for i in np.flatnonzero(np.isnan(fitted).any(axis=1)):
-            finite = np.isfinite(fitted[i])
-            terms[i, 1:] = np.linalg.lstsq(self.basis[: self.fitted][finite, 1:], fitted[i, finite], rcond=1e-10)[0]
-        return terms
+    varying: Ints  # terms that are not the same at all of them
 
     def expand(self, values: Floats) -> tuple[Floats, Floats]:
-        """Terms (path, term) of `ArrayExpansion` from values (path, probe), and how much (path,) they miss these by; of
-        the second degree from values at the first `QUADRATIC_PROBES` alone."""
-        if values.shape[1] == len(self.sensor):
-            terms = self.fit(values)
-        else:
-            few = row_products(values[:, : self.solve_few.shape[1]], self.solve_few.T)
-            terms = np.concatenate([few, np.zeros((len(few), self.basis.shape[1] - few.shape[1]))], axis=1)
-        return terms, self.misfit(values, terms)
+        """Terms (path, term) of `ArrayExpansion`, 0 at the centre, by least squares through values (path, probe), and
+        the largest of what they miss these by (path,); of the second degree from values at the first `QUADRATIC_PROBES`
+        alone.
 
-    def misfit(self, values: Floats, terms: Floats) -> Floats:
-        """Largest |error| (path,) at the probes, those held out as well; inf where a ray is missing.
-
-        A measurement at some places, not a bound: kinks of a profile within the aperture were seen to err twice as much
-        between the probes.
+        Values that are NaN (no ray there) are left out, and inf is missed. A measurement at some places, those held out
+        as well, not a bound: kinks of a profile within the aperture were seen to err twice as much between the probes.
         """
-        basis = self.basis[: values.shape[1], : terms.shape[1]]
-        error = np.abs(values - row_products(terms, basis.T)).max(axis=1, initial=0.0)
-        return np.where(np.isnan(values).any(axis=1), np.inf, error)
+        every = values.shape[1] == len(self.sensor)
+        solve = self.solve if every else self.solve_few
+        some = self.varying[self.varying < len(solve)]
+        tables = np.ascontiguousarray(solve[some].T), np.ascontiguousarray(self.basis[: values.shape[1], some].T)
+        terms, missed = probe_fits.fits(values, *tables, some, self.basis.shape[1])
+        for i in np.flatnonzero(np.isinf(missed)) if every else ():
+            finite = np.flatnonzero(np.isfinite(values[i, : self.fitted]))
+            terms[i, 1:] = np.linalg.lstsq(self.basis[finite, 1:], values[i, finite], rcond=1e-10)[0]
+        return terms, missed
 
 
 @lru_cache(maxsize=1024)
@@ -87,7 +75,8 @@ def probes(elements: Elements) -> Probes:
     solve = np.vstack([np.zeros(fitted), np.linalg.pinv(basis[:fitted, 1:], rcond=1e-10)])
     few = len(sensor) if len(sensor) < QUADRATIC_PROBES else QUADRATIC_PROBES - HELD_OUT  # of a small array, all
     second = np.linalg.pinv(basis[:few, 1:SECOND_DEGREE], rcond=1e-10)
-    return Probes(sensor, position[sensor], fitted, solve, basis, scale, np.vstack([np.zeros(few), second]))
+    few_terms, varying = np.vstack([np.zeros(few), second]), 1 + np.flatnonzero(basis[:, 1:].any(axis=0))
+    return Probes(sensor, position[sensor], fitted, solve, basis, scale, few_terms, varying)
 
 
 def sphere(direction: Floats, radius: Floats, position: Floats) -> Floats:

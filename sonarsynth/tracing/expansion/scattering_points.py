@@ -44,5 +44,5 @@ def delay_to_scattering_points(over: ArrayExpansion, array: FacetPaths, leg: Int
     speed = array.context.medium.profile.at(depth(array.legs.point[leg[rows]]))
     late = -dot(spot[rows, None], away) / speed[:, None]
     delay = over.delay.copy()
-    delay[rows] += probes(array.context.receiver.elements).fit(late)
+    delay[rows] += probes(array.context.receiver.elements).expand(late)[0]
     return replace(over, delay=delay)
