@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Track
@@ -18,6 +19,7 @@ from sonarsynth.scattering import Kirchhoff
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
+from sonarsynth.validation.extremes import plain_scenes
 
 C = 1500.0
 BOTTOM_DEPTH = 30.0
@@ -54,15 +56,9 @@ def heard(
 
 def transfer(found: Arrivals, sensor: Floats | None = None) -> Floats:
     """Pressure (frequency,) at the array centre, or at a sensor (xyz), for a snap of unit spectrum at 1 m."""
-    shape = facet_response(
-        F, found.coherent, found.corner_delays, found.coherent_fraction, found.height_delay_std, found.centre
-    )
-    delay, amplitude = found.delay, found.amplitude
     if sensor is not None:
         away = np.linalg.norm(found.radius[:, None] * found.direction - sensor, axis=1)
         late, louder = (found.expansion.over(name, sensor[None])[:, 0] for name in ("delay", "amplitude"))
-        delay = delay + (away - found.radius) / found.sound_speed + late
-        amplitude = amplitude * found.radius / away * (1.0 + louder)
-    phase = found.phase[:, None] - 2.0 * np.pi * delay[:, None] * F
-    left = np.exp(-0.5 * np.multiply.outer(found.delay_std, 2.0 * np.pi * F) ** 2)
-    return (amplitude[:, None] * shape * left * np.exp(1j * phase)).sum(axis=0)
+        delay = found.delay + (away - found.radius) / found.sound_speed + late
+        found = replace(found, delay=delay, amplitude=found.amplitude * found.radius / away * (1.0 + louder))
+    return plain_scenes.transfer(found, F)

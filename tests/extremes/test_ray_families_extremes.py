@@ -167,23 +167,6 @@ def test_a_hundred_kilometres_in_eleven_kilometres_of_water_and_twelve_vertices(
         assert sorted(family(found, i) for i in range(len(found.pair))) == sorted(row[0] for row in fan)
 
 
-def test_a_cast_of_a_thousand_noisy_nodes() -> None:
-    rng = np.random.default_rng(1)
-    depth = np.linspace(0, 60, 1001)
-    water = ray_solutions.water(depth, 1540 - 0.1 * depth + 0.2 * rng.normal(size=1001), 60.0)
-    start, end, distance = 22.2, 41.7, 150.0
-    found, back = one(water, start, end, distance, 3, 3), one(water, end, start, distance, 3, 3)
-    check(water, found, start, end, distance, 4)
-    np.testing.assert_allclose(found.travel_time, back.travel_time, rtol=1e-13)
-    for surface, bottom in ((0, 0), (1, 0), (0, 1), (1, 2), (2, 1)):  # which no gradient turns back
-        mine = (found.surface == surface) & (found.bottom == bottom)
-        assert mine.sum() >= 1
-    fine = ray_solutions.water(np.linspace(0, 60, 41), water.speed[::25], 60.0)  # few enough for a dense fan
-    few = one(fine, start, end, distance, 3, 3)
-    fan = families(fine, start, end, np.array([distance]), 3, 3)[0]
-    assert sorted(family(few, i) for i in range(len(few.pair))) == sorted(row[0] for row in fan)
-
-
 @pytest.mark.parametrize("name", WATERS)
 @pytest.mark.parametrize(
     ("start", "end"),

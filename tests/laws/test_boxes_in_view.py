@@ -85,12 +85,6 @@ def test_a_sphere_at_any_bearing_has_its_own_box_or_none(bearing: float) -> None
     assert found.image_box[0] == pytest.approx([*sides, -top, top], abs=0.006)
 
 
-def test_a_body_behind_has_no_box_from_minus_180_to_180_degrees() -> None:
-    found = truth((mesh_of(Sphere(radius=0.5, edge=0.1)), np.array([-10.0, 0.0, 0.0])))
-    assert np.isnan(found.image_box[0]).all()
-    assert found.view[0] == View.BEHIND and found.visible_fraction[0] == pytest.approx(1.0)
-
-
 def test_a_wall_round_the_view_fills_it() -> None:
     found = truth((mesh_of(Box(size=(0.1, 80.0, 40.0))), np.array([5.0, 0.0, 0.0])))
     assert found.view[0] == View.PARTLY_IN_VIEW

@@ -35,13 +35,6 @@ def test_the_last_straight_ray_and_the_first_turning_one_meet() -> None:
     np.testing.assert_allclose(found.amplitude[3:6], found.amplitude[4], rtol=1e-5)
 
 
-def test_a_thermocline_bends_with_a_radius_of_350_m() -> None:
-    found = ray_solutions.eigenrays(thermocline(), np.array([5.1]), np.array([6.4]), np.array([20.0]))
-    turn = np.arcsin(found.start_sine[0]) - np.arcsin(found.end_sine[0])
-    radius = found.length[0] / turn
-    assert radius == pytest.approx(1537.0 / 4.3, rel=5e-3)
-
-
 def test_the_bed_ends_the_water_that_a_ray_may_turn_in() -> None:
     profile = np.array([0.0, 100.0]), np.array([1500.0, 1520.0])
     vertex = ray_solutions.eigenrays(
@@ -52,19 +45,6 @@ def test_the_bed_ends_the_water_that_a_ray_may_turn_in() -> None:
             ray_solutions.water(*profile, bottom_depth), np.array([40.0]), np.array([40.0]), np.array([400.0])
         )
         assert len(found.pair) == paths
-
-
-def test_a_jump_is_the_limit_of_a_thin_layer() -> None:
-    jump = ray_solutions.water(np.array([0.0, 10.0, 10.0, 30.0]), np.array([1500.0, 1502.0, 1520.0, 1521.0]), 30.0)
-    rng = np.random.default_rng(6)
-    z1, z2, r = rng.uniform(0, 30, 200), rng.uniform(0, 30, 200), 10 ** rng.uniform(0, 2.3, 200)
-    sharp = ray_solutions.eigenrays(jump, z1, z2, r)
-    thin = ray_solutions.eigenrays(
-        ray_solutions.water(np.array([0.0, 10.0, 10.0 + 1e-10, 30.0]), jump.speed, 30.0), z1, z2, r
-    )
-    assert np.array_equal(sharp.pair, thin.pair)
-    np.testing.assert_allclose(sharp.travel_time, thin.travel_time, rtol=1e-11)
-    assert np.isfinite(np.fmax(sharp.upper, sharp.lower)).sum() > 5
 
 
 def test_a_ray_followed_arc_by_arc_ends_where_the_eigenray_does() -> None:

@@ -228,12 +228,6 @@ def test_a_shard_with_no_good_frame_is_not_marked(
     assert store.frames_there(tmp_path / "s.zarr") == []
 
 
-def test_a_build_is_refused_while_another_runs(tmp_path: Path, small_plan: Plan) -> None:
-    with store.lock(tmp_path / "s.zarr"), pytest.raises(store.StoreLocked):
-        build(small_plan, tmp_path / "s.zarr", workers=0)
-    assert not (tmp_path / "s.zarr").exists()
-
-
 def test_products_decide_what_is_stored(tmp_path: Path, small: Recipe, reference: Path) -> None:
     path = tmp_path / "s.zarr"
     build(small, path, products=["image"], workers=0)

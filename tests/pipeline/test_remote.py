@@ -113,12 +113,14 @@ def test_a_store_that_was_not_laid_out_whole_is_laid_out_anew(small_plan: Plan, 
     assert contents(place) == contents(whole)
 
 
-def test_what_is_not_ours_stays(small_plan: Plan, place: Remote) -> None:
-    (place / "precious.txt").write_bytes(b"mine")
+def test_what_is_not_ours_stays(small_plan: Plan, anywhere: Folder) -> None:
+    if isinstance(anywhere, Path):
+        anywhere.mkdir()
+    (anywhere / "precious.txt").write_bytes(b"mine")
     for restart in (False, True):
         with pytest.raises(store.Mismatch, match="not a store of sonarsynth"):
-            schedule.build(small_plan, place, workers=0, restart=restart)
-    assert contents(place) == {"precious.txt": b"mine"}
+            schedule.build(small_plan, anywhere, workers=0, restart=restart)
+    assert contents(anywhere) == {"precious.txt": b"mine"}
 
 
 def test_another_recipe_is_refused_and_restart_begins_anew(small_plan: Plan, copy: Remote, small_text: str) -> None:
@@ -150,11 +152,11 @@ def test_failed_frames_are_known_the_next_time(
     assert contents(place) == contents(whole)
 
 
-def test_a_second_build_is_refused_while_the_first_runs(small_plan: Plan, place: Remote) -> None:
-    with store.lock(place), pytest.raises(store.StoreLocked, match=r"is being built by process \d+ on"):
-        schedule.build(small_plan, place, frames=FRAMES, workers=0)
-    assert not place.exists()
-    assert not store.beside(place, "lock").exists()
+def test_a_second_build_is_refused_while_the_first_runs(small_plan: Plan, anywhere: Folder) -> None:
+    with store.lock(anywhere), pytest.raises(store.StoreLocked, match=r"is being built by process \d+ on"):
+        schedule.build(small_plan, anywhere, frames=FRAMES, workers=0)
+    assert not anywhere.exists()
+    assert not store.beside(anywhere, "lock").exists()
 
 
 @pytest.fixture(params=["disk", "url"])

@@ -144,16 +144,6 @@ def test_another_recipe_is_refused_with_the_difference(laid_out: Path, small_pla
     assert sorted(p.name for p in laid_out.parent.iterdir()) == [laid_out.name]
 
 
-def test_what_is_no_store_of_ours_is_never_removed(tmp_path: Path, small_plan: Plan) -> None:
-    folder = tmp_path / "photos"
-    folder.mkdir()
-    (folder / "a.jpg").write_text("precious")
-    for restart in (False, True):
-        with pytest.raises(store.Mismatch, match="is not a store of sonarsynth"):
-            store.create(folder, small_plan, restart=restart)
-    assert (folder / "a.jpg").read_text() == "precious"
-
-
 def test_a_layout_that_was_cut_short_leaves_no_store(
     tmp_path: Path, small_plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -55,12 +55,6 @@ def test_kernel_equals_direct_sums(array, grid, bins, focus, allowed):
     np.testing.assert_allclose(fast, exact, atol=allowed * exact.max())
 
 
-@pytest.mark.parametrize("bins", [1, 15, 16, 17, 64, 65, 129, 241])
-def test_kernel_equals_direct_sums_for_any_number_of_bins(bins):
-    fast, exact = both(PlanarLattice(columns=6, rows=5, pitch=0.0495), BeamGrid(azimuths=5, elevations=6), bins, 20.0)
-    np.testing.assert_allclose(fast, exact, atol=1e-6 * exact.max())
-
-
 def test_kernel_takes_masks_without_symmetry_dead_elements_and_weights():
     array = PlanarLattice(columns=7, rows=5, pitch=0.03, mask=MASK, dead=(3,))
     weight = elements(array).gain * np.random.default_rng(3).uniform(0.2, 1.0, elements(array).count)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
 from sonarsynth.equations.scattering.convex_bodies import surface_field
 from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude, triangle_integral
 from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
@@ -14,6 +13,7 @@ from sonarsynth.geometry.surfaces import volume
 from sonarsynth.receiver import PositionTable, elements
 from sonarsynth.scattering.kirchhoff import Kirchhoff
 from sonarsynth.signals import GriddedSynthesis
+from sonarsynth.targets.generated.generation import sphere
 from sonarsynth.targets.generated.smoothing import curved
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
@@ -112,25 +112,11 @@ def _large() -> CaseResult:
     return refused(lambda: synthesised(GriddedSynthesis(), paths, snaps, ONE, 3.9, 100), "corners that are not within")
 
 
-def _icosahedron() -> tuple[Floats, np.ndarray]:
-    from scipy.spatial import ConvexHull
-
-    phi = 0.5 * (1.0 + np.sqrt(5.0))
-    points = np.array([[0, a, b * phi] for a in (1, -1) for b in (1, -1)], float)
-    vertices = np.concatenate([np.roll(points, n, axis=1) for n in range(3)]) / np.hypot(1.0, phi)
-    hull = ConvexHull(vertices)
-    faces = hull.simplices.astype(np.int64)
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    inward = np.einsum("fi,fi->f", np.cross(b - a, c - a), a) < 0
-    faces[inward] = faces[inward, ::-1]
-    return vertices, faces
-
-
 def _smoothing() -> CaseResult:
     """Twenty facets become a sphere; a cube stays a cube; needles and far places change nothing."""
     results = []
     for scale, away in ((1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1.0, 100.0)):
-        vertices, faces = _icosahedron()
+        vertices, faces = sphere(1.0, 2.0)  # an icosahedron
         moved, _ = curved((scale * vertices + away, faces), 0.1 * scale, np.inf, 1.0)
         results.append(
             off(np.linalg.norm(moved - away, axis=1) / scale - 1.0, 1e-9, what=f"{scale:g} m, {away:g} m away:")

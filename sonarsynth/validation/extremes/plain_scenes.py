@@ -104,5 +104,6 @@ def transfer(arrivals: Arrivals, frequency: Floats) -> Floats:
             frequency, rows.coherent, rows.corner_delays, rows.coherent_fraction, rows.height_delay_std, rows.centre
         )  # fmt: skip
         phase = rows.phase[:, None] - 2.0 * np.pi * rows.delay[:, None] * frequency
-        total += (rows.amplitude[:, None] * shape * np.exp(1j * phase)).sum(axis=0)
+        blur = np.exp(-0.5 * (2.0 * np.pi * rows.delay_std[:, None] * frequency) ** 2)
+        total += (rows.amplitude[:, None] * shape * blur * np.exp(1j * phase)).sum(axis=0)
     return np.asarray(total)
