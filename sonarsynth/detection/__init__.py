@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 from sonarsynth.description import BY_KIND, FieldError
 from sonarsynth.detection.cell_averaging import CellAveraging
 from sonarsynth.detection.detection_method import DetectionMethod, Region, detections_of
-from sonarsynth.detection.detections import Detections, DetectionsError, from_rows, read
+from sonarsynth.detection.detections import Detections, from_rows, read
 from sonarsynth.detection.image_peaks import ImagePeaks
 from sonarsynth.detection.sonar_view import SonarView, beam_width, views
 from sonarsynth.store import chosen_frames, open_store
@@ -23,7 +23,6 @@ __all__ = [
     "CellAveraging",
     "DetectionMethod",
     "Detections",
-    "DetectionsError",
     "Detector",
     "ImagePeaks",
     "Region",

@@ -2,9 +2,7 @@
 and beams (SONAR-netCDF4), and of the water for Bellhop."""
 
 from sonarsynth.export.bellhop_files import write_bellhop
-from sonarsynth.export.coco_files import write_coco
 from sonarsynth.export.fused_points import points
 from sonarsynth.export.point_files import FORMATS, write_points
-from sonarsynth.export.sonar_netcdf import write_sonar_netcdf
 
-__all__ = ["FORMATS", "points", "write_bellhop", "write_coco", "write_points", "write_sonar_netcdf"]
+__all__ = ["FORMATS", "points", "write_bellhop", "write_points"]

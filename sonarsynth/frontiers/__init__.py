@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sonarsynth.conventions import finite_json
-from sonarsynth.frontiers.exact_frame import ExactFrame, exact_frame, synthesis_check
+from sonarsynth.frontiers.exact_frame import exact_frame, synthesis_check
 from sonarsynth.frontiers.full_frame import FullFrame, whole_points
 from sonarsynth.frontiers.image_knobs import image_points, range_points
 from sonarsynth.frontiers.peer_rows import image_peers, synthesis_peers
@@ -22,7 +22,7 @@ from sonarsynth.planning import Plan, arrivals_of
 from sonarsynth.planning import plan as plan_of
 from sonarsynth.recipe import Recipe
 
-__all__ = ["AccuracyReport", "ExactFrame", "Point", "Verdict", "exact_frame", "measure", "usual_frames"]
+__all__ = ["AccuracyReport", "Point", "Verdict", "exact_frame", "measure", "usual_frames"]
 
 Say = Callable[[str], None]
 

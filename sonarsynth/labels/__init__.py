@@ -5,13 +5,12 @@ from sonarsynth.labels.echo_levels import echo_levels
 from sonarsynth.labels.frame_truth import label
 from sonarsynth.labels.level_band import SLICES, Band
 from sonarsynth.labels.link_budget import link_budget
-from sonarsynth.labels.path_powers import Powers, family, path_powers
+from sonarsynth.labels.path_powers import family, path_powers
 from sonarsynth.labels.point_labels import label_points
 
 __all__ = [
     "SLICES",
     "Band",
-    "Powers",
     "SonarTiming",
     "echo_levels",
     "family",

@@ -19,8 +19,8 @@ from sonarsynth.planning.measured.thinned_profile import thinned
 from sonarsynth.planning.notes.omissions import left_out
 from sonarsynth.planning.notes.plan_notes import notes, stored_validity
 from sonarsynth.planning.notes.scene_checks import check_frame, check_located, check_methods, read_inputs
-from sonarsynth.planning.plan_tables import Omission, Stage
-from sonarsynth.planning.plans import Errors, Plan, Windows
+from sonarsynth.planning.plan_tables import Stage
+from sonarsynth.planning.plans import Plan, Windows
 from sonarsynth.receiver import elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
@@ -28,14 +28,10 @@ from sonarsynth.recipe.sequence_checks import check_spanned, most_emissions
 from sonarsynth.threads import in_one_thread
 
 __all__ = [
-    "ALL_PRODUCTS",
     "OF_BEAMS",
     "PRODUCTS",
     "Choices",
-    "Errors",
-    "Omission",
     "Plan",
-    "Stage",
     "Windows",
     "arrivals_of",
     "behind_baffle",
@@ -44,7 +40,6 @@ __all__ = [
     "chosen_products",
     "context_of",
     "frame_start",
-    "listening_windows",
     "plan",
     "receiver_of",
     "survey_of",

@@ -27,7 +27,6 @@ from sonarsynth.receiver.hydrophones import Array, Elements, PlanarLattice, Posi
 from sonarsynth.receiver.sensor_errors import Electronics, Overload, SensorErrors
 
 __all__ = [
-    "Array",
     "Band",
     "BandPass",
     "BeamGrid",

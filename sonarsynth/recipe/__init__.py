@@ -19,7 +19,7 @@ from sonarsynth.environment.sound_speed import Cast
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.recorded_track import RecordedTrack
 from sonarsynth.propagation.ray_request import RayRequest
-from sonarsynth.recipe.citation import Attribution, Creator
+from sonarsynth.recipe.citation import Attribution
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences
 from sonarsynth.recipe.splits import Splits
@@ -36,7 +36,6 @@ from sonarsynth.recipe.variation.random_variations import (
     Uniform,
     Variation,
 )
-from sonarsynth.recipe.variation.values import Plain
 from sonarsynth.sources.noise_source import NoiseRecording
 from sonarsynth.sources.snap_models import RecordedSnap
 from sonarsynth.targets.shapes import MeshFile
@@ -44,14 +43,11 @@ from sonarsynth.targets.shapes import MeshFile
 __all__ = [
     "FILE_KINDS",
     "Accuracy",
-    "Attribution",
     "Axis",
     "Choice",
-    "Creator",
     "Integers",
     "LogUniform",
     "Normal",
-    "Plain",
     "Recipe",
     "Sobol",
     "Splits",

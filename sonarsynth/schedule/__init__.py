@@ -21,7 +21,7 @@ from sonarsynth.store import Damage, Folder, Mismatch, cards, provenance
 from sonarsynth.store.creating import plain_recipe, spelled
 from sonarsynth.store.files.json_lines import append_lines, read_lines, write_lines
 
-__all__ = ["BuildReport", "Failure", "Prediction", "Progress", "TooLarge", "brief", "build", "predict", "usable_cores"]
+__all__ = ["BuildReport", "Prediction", "Progress", "TooLarge", "brief", "build", "predict", "usable_cores"]
 
 LEAST_MEMORY: Final = 300_000_000
 """Bytes that a worker needs before it has done anything."""

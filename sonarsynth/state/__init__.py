@@ -29,7 +29,6 @@ __all__ = [
     "Receiver",
     "Survey",
     "Tolerances",
-    "TravelTime",
     "Trigger",
     "WorldState",
     "meeting_times",

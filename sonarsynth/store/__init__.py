@@ -19,15 +19,15 @@ from sonarsynth.store.opening import built_frames, chosen_frames, open_store, ro
 if TYPE_CHECKING:
     from sonarsynth.store.checking.examining import Findings, Problem, examine, must_be_store, ranges
     from sonarsynth.store.checking.verifying import Report, verify
-    from sonarsynth.store.creating import create, identity
-    from sonarsynth.store.layout import Layout, layout_of
+    from sonarsynth.store.creating import create
+    from sonarsynth.store.layout import layout_of
     from sonarsynth.store.writing import frames_there, missing, write_shard
 
 _WRITERS = {
     "checking.examining": "Findings Problem examine must_be_store ranges",
     "checking.verifying": "Report verify",
-    "creating": "create identity",
-    "layout": "Layout layout_of",
+    "creating": "create",
+    "layout": "layout_of",
     "writing": "frames_there missing write_shard",
 }
 
@@ -36,7 +36,6 @@ __all__ = [
     "Damage",
     "Findings",
     "Folder",
-    "Layout",
     "Mark",
     "Mismatch",
     "Problem",
@@ -53,7 +52,6 @@ __all__ = [
     "folder_of",
     "frames_there",
     "here",
-    "identity",
     "layout_of",
     "lock",
     "missing",

@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import FORMAT_VERSION
 from sonarsynth.pipeline.variables.static_variables import coordinates
-from sonarsynth.pipeline.variables.truth_variables import HOW_LEVELS_ADD_UP
 from sonarsynth.pipeline.variables.variable import Variable, flags
 from sonarsynth.pipeline.variables.variable_groups import VARIABLES
 from sonarsynth.planning import OF_BEAMS, Plan
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "HOW_LEVELS_ADD_UP",
     "VARIABLES",
     "Variable",
     "attributes",

@@ -10,11 +10,11 @@ from pathlib import Path
 
 from sonarsynth.store import Damage, Folder, Mismatch, absolute, beside, folder_of
 from sonarsynth.store.cards.croissant import croissant
-from sonarsynth.store.cards.facts import Facts, facts_of
+from sonarsynth.store.cards.facts import facts_of
 from sonarsynth.store.cards.markdown import markdown
 from sonarsynth.store.files.place import read_beside, write_atomically
 
-__all__ = ["Facts", "croissant", "facts_of", "markdown", "write"]
+__all__ = ["croissant", "facts_of", "markdown", "write"]
 
 
 def write(store: Folder | str, folder: Folder | str | None = None) -> tuple[Folder, Folder]:
