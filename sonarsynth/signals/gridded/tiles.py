@@ -111,14 +111,17 @@ def _views(front: Wavefronts, aim: TileSettings, missed: bool) -> _Views:
 def _columns(front: Wavefronts, probes: Floats, gradient: Floats) -> Floats:
     """Columns of `_Views` of fronts; slownesses are -c times the gradient of delay: directions where rays are
     straight."""
-    v = front.direction.T - front.curvature * probes[:, :, None]  # (point, xyz, path)
-    u = v / np.sqrt(v[:, 0] ** 2 + v[:, 1] ** 2 + v[:, 2] ** 2)[:, None]
-    columns = [front.direction.T, front.curvature[None], front.loss[None], front.expansion.delay.T]
+    from sonarsynth.signals.gridded.tile_kernels import directions_at
+
     terms = front.expansion.delay
+    given = [front.direction.T, front.curvature[None], front.loss[None], terms.T]
+    columns = np.concatenate([*given, np.empty((probes.size, front.count))])
+    slowness = columns[-probes.size :]
+    directions_at(front.direction, front.curvature, probes, slowness)
     if terms.shape[1]:
-        u = u - front.sound_speed * np.einsum("et,ipt->pie", terms, gradient[:, :, : terms.shape[1]])
-    columns.append(u.reshape(-1, front.count))
-    return np.ascontiguousarray(np.concatenate(columns))
+        bent = np.einsum("et,ipt->pie", terms, gradient[:, :, : terms.shape[1]])
+        slowness -= front.sound_speed * bent.reshape(slowness.shape)
+    return columns
 
 
 class _Extent(NamedTuple):
@@ -150,9 +153,9 @@ class _Trial:
 def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     if paths.size == 1:
         return _Trial(_alone(paths, views.front, aim), None)
-    all_paths = paths.size == views.front.count
-    columns = views.columns if all_paths else np.take(views.columns, paths, axis=1)
-    low, high = columns.min(axis=1), columns.max(axis=1)
+    from sonarsynth.signals.gridded.tile_kernels import extremes
+
+    low, high = extremes(views.columns, paths)
     over = rest(views.front, paths, aim.changes, 0.1 * aim.tolerance)
     reference = reference_of(views.front, 0.5 * (low + high), over.phase, over.delay_variance)
     probes = views.probes
@@ -162,7 +165,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     _, dy, dz = slope.tolist()
     wave = aim.highest / reference.sound_speed  # 1/m
     turn, loss = (aim.elements.face * wave * dy, aim.elements.face * wave * dz), float(far[4])
-    bend = np.take(views.bend, paths, axis=1).max(axis=1)
+    bend = extremes(views.bend, paths)[1]
     phase = np.full(3, np.inf) if views.own else (2.0 * np.pi * wave * slope + bend) * probes.size
     modes, sizes = np.zeros((0, 0)), PLAIN
     if views.front.modes.shape[1]:
@@ -172,7 +175,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
         paths=paths.size,
         phase=tuple(phase.tolist()),
         drift=tuple(_drift(reference, aim).tolist()),
-        degrees=degrees(views.amplitude if all_paths else np.take(views.amplitude, paths, axis=1)),
+        degrees=degrees(views.amplitude, paths),
         turn=turn,
         decay=NEPER * (loss * aim.steepest + farther * aim.fading),
         modes=sizes,
