@@ -202,20 +202,6 @@ def depth(position: npt.ArrayLike) -> Floats:
     return -np.asarray(position, float)[..., 2]
 
 
-def picked(mask: Bools) -> Ints | slice:
-    """The rows that a mask (row,) picks; where it picks all, a slice, which copies nothing."""
-    rows = np.flatnonzero(mask)
-    return slice(None) if len(rows) == len(mask) else rows
-
-
-def rows_of(column: np.ndarray, keep: Bools | Ints | Sequence[int] | slice) -> np.ndarray:
-    """The rows of a column (row, ...) that a mask, indices or a slice pick; wide ones are copied whole, to be fast."""
-    if isinstance(keep, slice):
-        return column[keep]
-    rows = np.asarray(keep)
-    return column.take(np.flatnonzero(rows) if rows.dtype == bool else rows, axis=0)
-
-
 def evenly(count: int, limit: int) -> list[int]:
     """At most `limit` of the numbers 0 to count - 1, evenly spread, both ends among them."""
     return sorted({int(n) for n in np.linspace(0, count - 1, min(limit, count)).round()})

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Bools, Floats, Ints, rows_of
+from sonarsynth.columns import Columns
+from sonarsynth.conventions import Bools, Floats, Ints
 
 QUANTITIES = ("delay", "amplitude", "phase", "delay_variance")
 """What varies over the aperture."""
@@ -45,7 +46,7 @@ def _kept_terms(position: bytes, aperture: float, terms: int) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class ArrayExpansion:
+class ArrayExpansion(Columns):
     """Paths over an aperture: polynomials through values at probe sensors, and one matrix from there to all sensors.
 
     Terms belong to the polynomials b(q) of a place q in the sonar frame (`aperture_terms`), the first to 1; a
@@ -73,8 +74,7 @@ class ArrayExpansion:
 
     def __getitem__(self, rows: Bools | Ints | slice) -> ArrayExpansion:
         """The paths picked by a mask, by indices or by a slice."""
-        columns: dict[str, Any] = {name: rows_of(getattr(self, name), rows) for name in (*QUANTITIES, "error")}
-        return ArrayExpansion(**columns, aperture=self.aperture)
+        return self.select(rows)
 
     def without(self, *names: str) -> ArrayExpansion:
         """The same, but of some quantities all sensors have what the middle has."""

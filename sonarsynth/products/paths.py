@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Bools, Bytes, Floats, Ints, rows_of
+from sonarsynth.columns import Columns
+from sonarsynth.conventions import Bools, Bytes, Floats, Ints
 from sonarsynth.products.array_expansion import ArrayExpansion
 
 
@@ -54,7 +55,7 @@ class Kind(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Arrivals:
+class Arrivals(Columns):
     """Every path of a frame as it reaches the array. xyz: in the sonar frame, but for `point`.
 
     geometry
@@ -130,13 +131,6 @@ class Arrivals:
     centre: float  # f_c, Hz: centre of the band, where amplitudes hold
     sound_speed: float  # c, m/s of the water at the array centre
     amplitude_error: float = 0.0  # largest error of the expansion's amplitudes at its probes, over the strongest echo
-
-    def select(self, keep: Bools | Ints) -> Arrivals:
-        """The arrivals picked by a mask or by indices (path,)."""
-        rows: dict[str, Any] = {
-            name: rows_of(value, keep) if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
-        }
-        return Arrivals(**rows | {"expansion": self.expansion[keep]})
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:

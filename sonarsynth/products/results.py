@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from sonarsynth.columns import Columns
 from sonarsynth.conventions import Floats, Ints
 
 
@@ -81,7 +82,7 @@ class EnergyImage:
 
 
 @dataclass(frozen=True, eq=False)
-class PointCloud:
+class PointCloud(Columns):
     """Where the echoes of a frame come from: a list of points, in the order of their beams. Sonar frame."""
 
     position: npt.NDArray[np.float32]  # (point, xyz) m
@@ -99,11 +100,6 @@ class PointCloud:
     def __len__(self) -> int:
         """Number of points."""
         return len(self.range)
-
-    def select(self, rows: Ints) -> PointCloud:
-        """Some of the points."""
-        columns = {name: value[rows] for name, value in vars(self).items() if name != "overflow"}
-        return PointCloud(**columns, overflow=self.overflow)
 
     def loudest(self, count: int) -> PointCloud:
         """At most so many points, those of most energy, in the order in which they are; the others are counted."""

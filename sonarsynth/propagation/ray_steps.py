@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from sonarsynth.casting.ray_casting import OFFSET, first_hit
-from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints, depth
+from sonarsynth.columns import Columns
+from sonarsynth.conventions import NO_TARGET, Floats, Ints, depth
 from sonarsynth.equations.rays import ray_arcs
 from sonarsynth.equations.rays.ray_solutions import Water
 from sonarsynth.geometry import unit
@@ -19,7 +20,7 @@ ON, TURN, SURFACE, BOTTOM, END, FACET, LAUNCH, ARRIVAL = range(len(EVENTS))
 
 
 @dataclass(frozen=True, eq=False)
-class Rays:
+class Rays(Columns):
     """Rays on their way: where they are now."""
 
     ray: Ints
@@ -33,10 +34,6 @@ class Rays:
     bounces: Ints
     until: Floats  # s: when the ray ends
     clear: Floats  # position moved off the facet last met
-
-    def select(self, keep: Bools | Ints) -> Rays:
-        """The rays picked by a mask or by indices."""
-        return Rays(**{f.name: getattr(self, f.name)[keep] for f in fields(self)})
 
 
 def launch(

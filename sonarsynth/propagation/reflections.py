@@ -30,7 +30,8 @@ def reflections(environment: Environment, profile: Profile, paths: Paths, centre
     changed = at_boundaries(
         environment, profile, paths.surface_grazing, paths.surface, paths.bottom_grazing, paths.bottom, centre
     )
-    return Reflections(changed.modulus, changed.phase + 0.5 * np.pi * paths.caustics, changed.delay_std)
+    phase = changed.phase + 0.5 * np.pi * paths.caustics if paths.caustics.any() else changed.phase
+    return Reflections(changed.modulus, phase, changed.delay_std)
 
 
 def at_boundaries(
@@ -44,7 +45,8 @@ def at_boundaries(
 ) -> Reflections:
     """Of so many reflections (path,) at grazing angles (path,) in rad."""
     if not (surface.any() or bottom.any()):
-        return Reflections(np.ones(surface.shape), np.zeros(surface.shape), np.zeros(surface.shape))
+        none = np.broadcast_to(0.0, surface.shape)
+        return Reflections(np.broadcast_to(1.0, surface.shape), none, none)
     over = bounces(environment.surface, surface_grazing, surface, float(profile.at(0.0)), centre)
     under = bounces(environment.bottom, bottom_grazing, bottom, float(profile.at(environment.depth)), centre)
     return Reflections(

@@ -65,14 +65,14 @@ class Straight(PathModel):
         columns = []
         for image in images(z1, z2, environment_depth, self.bounces):
             length, departure, spreading = straight_rays(level, image.climb)
-            mean, height, none = 1.0 / speed, np.abs(image.climb), np.zeros(len(length), int)
+            mean, height, none = 1.0 / speed, np.abs(image.climb), np.broadcast_to(0, len(length))
             if not profile.uniform:
                 heights = (image.above, image.between, image.below)
                 crossed = sum(h * s for h, s in zip(heights, slowness, strict=True))
                 mean = np.divide(crossed, height, out=slowness[1].copy(), where=height > 0)
-            grazing = np.full(len(length), np.nan)
+            missing = grazing = np.broadcast_to(np.nan, len(length))
             if image.surface or image.bottom:
-                grazing = np.arcsin(np.divide(height, length, out=grazing, where=length > 0))
+                grazing = np.arcsin(np.divide(height, length, out=missing.copy(), where=length > 0))
             columns.append(
                 {
                     "pair": np.arange(len(length)),
@@ -81,12 +81,12 @@ class Straight(PathModel):
                     "departure": departure,
                     "arrival": departure if image.turns > 0 else departure * [1.0, 1.0, -1.0],
                     "spreading": spreading,
-                    "surface": none + image.surface,
-                    "bottom": none + image.bottom,
+                    "surface": np.broadcast_to(image.surface, len(length)),
+                    "bottom": np.broadcast_to(image.bottom, len(length)),
                     "turning": none,
                     "caustics": none,
-                    "surface_grazing": grazing if image.surface else np.full(len(length), np.nan),
-                    "bottom_grazing": grazing if image.bottom else np.full(len(length), np.nan),
+                    "surface_grazing": grazing if image.surface else missing,
+                    "bottom_grazing": grazing if image.bottom else missing,
                     "flag": np.where(length > 0, GOOD, COINCIDENT),
                 }
             )

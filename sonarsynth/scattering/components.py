@@ -265,6 +265,7 @@ def size_at(
     for component in components:
         pulse = component.pulses(incident, scattered, patch, sound_speed)
         amplitude = component.amplitude(incident, scattered, patch, 2.0 * np.pi * frequency / sound_speed)
-        response = facet_response(np.array([frequency]), *pulse[:4], frequency)[:, 0]
+        rough = pulse.coherent_fraction, pulse.height_delay_std
+        response = facet_response(np.array([frequency]), pulse.coherent, pulse.corner_delays, *rough, frequency)[:, 0]
         power += np.abs(amplitude * response * np.exp(-0.5 * (2.0 * np.pi * frequency * pulse.delay_std) ** 2)) ** 2
     return np.sqrt(power)

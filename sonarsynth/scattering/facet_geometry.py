@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, rows_of
+from sonarsynth.columns import Columns
+from sonarsynth.conventions import Bools, Floats
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.curvature import curvature_radius
 from sonarsynth.geometry.mesh import Mesh
@@ -15,7 +15,7 @@ from sonarsynth.randomness import stream
 
 
 @dataclass(frozen=True, eq=False)
-class FacetGeometry:
+class FacetGeometry(Columns):
     """Facets, one a path, in the frame of their body; the directions that go with them are in that frame too."""
 
     normal: Floats  # (..., xyz)
@@ -24,20 +24,9 @@ class FacetGeometry:
     corners: Floats  # (..., 3, xyz) m from the middle of the facet
     spot: Floats  # (..., xyz) m from the middle: a point of the facet drawn once
 
-    def select(self, rows: Ints | slice) -> FacetGeometry:
-        """The facets picked by indices; columns that are one value for all stay that."""
-        columns: Any = {name: _rows(value, rows) for name, value in vars(self).items()}
-        return FacetGeometry(**columns)
-
     def over(self) -> FacetGeometry:
         """With an axis after the first, for the directions in which each facet is seen."""
         return FacetGeometry(**{name: value[:, None] for name, value in vars(self).items()})
-
-
-def _rows(column: Floats, rows: Ints | slice) -> Floats:
-    if isinstance(rows, slice) or column.strides[0] or not len(column):
-        return rows_of(column, rows)
-    return np.broadcast_to(column[0], (len(rows), *column.shape[1:]))
 
 
 @byte_bounded_cache(32)
@@ -58,7 +47,8 @@ def patches(mesh: Mesh, with_corners: bool = True) -> FacetGeometry:
     return FacetGeometry(mesh.normal, mesh.area, np.isfinite(curvature_radius(mesh)), corners, spot)
 
 
-class PulseResponse(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class PulseResponse(Columns):
     """What facets do to a pulse beside its amplitude, a row a path; columns as in `products.Arrivals`."""
 
     coherent: Bools  # (path,)
@@ -72,16 +62,13 @@ class PulseResponse(NamedTuple):
     @staticmethod
     def plain(count: int) -> PulseResponse:
         """Nothing at all: the pulse is repeated."""
-        zero = np.zeros(count)
-        return PulseResponse(np.zeros(count, bool), np.zeros((count, 3)), zero, zero, zero, zero, zero)
-
-    def select(self, rows: Bools | Ints) -> PulseResponse:
-        """The rows picked by a mask or by indices."""
-        columns: Any = (rows_of(value, rows) for value in self)
-        return PulseResponse(*columns)
+        zero, corners = np.broadcast_to(0.0, count), np.broadcast_to(0.0, (count, 3))
+        return PulseResponse(np.broadcast_to(False, count), corners, zero, zero, zero, zero, zero)
 
     @staticmethod
     def join(responses: list[PulseResponse]) -> PulseResponse:
         """Rows of all, in order."""
-        columns: Any = zip(*responses, strict=True)
+        if len(responses) == 1:
+            return responses[0]
+        columns = zip(*(vars(response).values() for response in responses), strict=True)
         return PulseResponse(*(np.concatenate(column) for column in columns))

@@ -4,11 +4,12 @@ inf)."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Bytes, Floats, Ints, rows_of
+from sonarsynth.columns import Columns
+from sonarsynth.conventions import Bools, Bytes, Floats, Ints
 from sonarsynth.products import ArrayExpansion, Arrivals
 from sonarsynth.products.array_expansion import QUANTITIES
 from sonarsynth.receiver import Elements
@@ -35,7 +36,7 @@ FINITE = (
 
 
 @dataclass(frozen=True, eq=False)
-class Wavefronts:
+class Wavefronts(Columns):
     """When, how loud and from where paths reach points of the array: curvature for radius, and the level of the snap
     inside the amplitude."""
 
@@ -62,14 +63,10 @@ class Wavefronts:
             return np.zeros((self.count, 0), bool)
         return np.unpackbits(self.occluded, axis=1, count=1 + sensors)[:, 1:].astype(bool)
 
-    def select(self, keep: Ints) -> Self:
-        """The paths of these indices; the same where these are all, in order."""
-        if len(keep) == self.count and (keep == np.arange(self.count)).all():
-            return self
-        rows: dict[str, Any] = {
-            name: rows_of(value, keep) if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
-        }
-        return type(self)(**rows | {"expansion": self.expansion[keep]})
+    def select(self, keep: Bools | Ints | slice) -> Self:
+        """As `Columns.select`; the same where these are all, in order."""
+        every = not isinstance(keep, slice) and len(keep) == self.count and (keep == np.arange(self.count)).all()
+        return self if every else super().select(keep)
 
     def without_faint_shadows(self, tolerance: float, sensors: int) -> Self:
         """The paths with some of those that miss a part of so many hydrophones reaching all or none, as is nearer.

@@ -24,7 +24,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, depth, rows_of
+from sonarsynth.columns import Columns
+from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.kernels import moving_ends
 from sonarsynth.equations.kernels.row_products import row_products
@@ -51,7 +52,7 @@ class Meeting:
 
 
 @dataclass(frozen=True, eq=False)
-class MotionTerms:
+class MotionTerms(Columns):
     """How paths (path,) differ from those that were traced, by the remainder of the motion."""
 
     met: Floats  # s: of the poses of bodies
@@ -59,10 +60,6 @@ class MotionTerms:
     velocity: Floats  # (path, xyz) m/s of the facet, world
     spin: Floats  # (path, xyz) rad/s of its body
     apart: Floats  # (path, xyz) m: by what the array, or its image, is farther from the facet
-
-    def select(self, rows: Bools | Ints | slice) -> MotionTerms:
-        """The paths picked by a mask or by indices."""
-        return MotionTerms(**{name: rows_of(value, rows) for name, value in vars(self).items()})
 
     @staticmethod
     def direct(count: int, snap: Emission) -> MotionTerms:
@@ -93,12 +90,11 @@ class MotionTerms:
 def velocities(scattering: tuple[Scatterers, ...], owner: Ints, point: Floats) -> tuple[Floats, Floats]:
     """Velocity (point, xyz) m/s of surface elements (owner of each), world, and the spin of their owner rad/s."""
     tracks = [surface.track for surface in scattering]
-    motion, spins = (
-        np.array([getattr(t, name) for t in tracks]).reshape(-1, 3)[owner] for name in ("velocity", "spin")
-    )
+    own = [np.array(column).reshape(-1, 3) for column in zip(*((t.velocity, t.spin) for t in tracks), strict=True)]
+    motion, spins = (np.broadcast_to(of, point.shape) if len(of) == 1 else of[owner] for of in own)
     if spins.any():
         middle = np.array([track.pose.position for track in tracks])[owner]
-        motion += np.cross(spins, point - middle)
+        motion = motion + np.cross(spins, point - middle)
     return motion, spins
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, depth, picked, rows_of
+from sonarsynth.columns import Columns, picked, rows_of
+from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.scattering import Component, Scatterers
 from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse
 from sonarsynth.tracing.doppler import MotionTerms
@@ -22,7 +23,7 @@ PRUNE_MARGIN = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class EchoBatch:
+class EchoBatch(Columns):
     """Echoes by one part of the law of one owner, in its frame."""
 
     surface: Scatterers
@@ -34,11 +35,6 @@ class EchoBatch:
     wavenumber: Floats  # (echo,) rad/m at the centre of the band
     amplitude: Floats  # (echo,) m
     sign: Floats  # (echo,)
-
-    def select(self, keep: Ints | slice) -> EchoBatch:
-        """The echoes picked by indices."""
-        rows: dict[str, Any] = {k: rows_of(v, keep) for k, v in vars(self).items() if isinstance(v, np.ndarray)}
-        return replace(self, patch=self.patch.select(keep), **rows)
 
     def over(self, away: Floats) -> Floats:
         """Amplitudes (echo, probe) in directions (echo, probe, xyz)."""

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, depth, picked, rows_of
+from sonarsynth.columns import picked, rows_of
+from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET, Bools, Ints, picked
+from sonarsynth.columns import picked
+from sonarsynth.conventions import NO_TARGET, Bools, Ints
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.kernels.placing import in_front
 from sonarsynth.geometry.mesh import in_blocks

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from sonarsynth.casting.ray_casting import OFFSET, clear_of_own_body
-from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth, picked, rows_of
+from sonarsynth.columns import Columns, picked, rows_of
+from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth
 from sonarsynth.equations.kernels.placing import placed
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, TOLERANCE
 from sonarsynth.equations.scattering.lobes import dot
@@ -31,7 +32,7 @@ SEEN, DOUBTFUL = 1, 2
 
 
 @dataclass(frozen=True, eq=False)
-class ReceivePaths:
+class ReceivePaths(Columns):
     """Rays from points in the water to the array centre."""
 
     point: Floats  # (leg, xyz) m, world: where it starts
@@ -52,10 +53,6 @@ class ReceivePaths:
     delay_std: Floats  # (leg,) s
     occluded: Bytes  # (leg, byte) as of `Arrivals`
     open: Ints  # (leg,) not 0: bodies hide it from hydrophones, not known yet which (`sensor_occlusion.Occlusion`)
-
-    def select(self, keep: Bools | Ints | slice) -> ReceivePaths:
-        """The legs picked by a mask, by indices, or by a slice, which copies nothing."""
-        return ReceivePaths(**{name: rows_of(value, keep) for name, value in vars(self).items()})
 
     def numbered(self, row: Ints) -> ReceivePaths:
         """The legs with other numbers (leg,) for the points that they start from."""
@@ -88,7 +85,7 @@ class ReceivePaths:
 
 
 @dataclass(frozen=True, eq=False)
-class Facets:
+class Facets(Columns):
     """All surface elements of a frame, placed in the world."""
 
     owner: Ints  # (facet,) index into `FrameContext.scattering`: of the body, where it has one
@@ -119,24 +116,15 @@ class Facets:
         x, y, z = self.normal.T
         return np.asarray((x == 0.0) & (y == 0.0) & (z == 0.0))
 
-    def select(self, keep: Bools | Ints | slice) -> Facets:
-        """The facets picked by a mask, by indices, or by a slice, which copies nothing."""
-        return Facets(**{name: rows_of(value, keep) for name, value in vars(self).items()})
-
 
 @dataclass(frozen=True, eq=False)
-class Starts:
+class Starts(Columns):
     """Where legs start; without normals, owners and facets: anywhere in the water."""
 
     point: Floats  # (leg, xyz) m, world: clear of the facet that it is on
     normal: Floats | None = None  # (leg, xyz) of the side of it that the leg leaves on
     owner: Ints | None = None  # (leg,) index into the bodies that are looked at
     facet: Ints | None = None  # (leg,) index among those of its owner
-
-    def select(self, rows: Ints) -> Starts:
-        """Those of some legs."""
-        columns = {name: rows_of(column, rows) for name, column in vars(self).items() if column is not None}
-        return Starts(**columns)
 
     def clear_of_own(
         self, bodies: tuple[PlacedTarget, ...], direction: Floats, slope: Floats | float = 0.0
@@ -189,7 +177,7 @@ def rays_to_centre(medium: Medium, point: Floats, receiver: Receiver, propagatio
         phase=bounced.phase[keep],
         delay_std=bounced.delay_std[keep],
         occluded=np.zeros((len(start), 0), np.uint8),
-        open=np.zeros(len(start), int),
+        open=np.broadcast_to(0, len(start)),
     )
 
 

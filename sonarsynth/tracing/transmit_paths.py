@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, picked, rows_of
+from sonarsynth.columns import Columns, picked
+from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind, Paths
 from sonarsynth.products.array_expansion import stacked
 from sonarsynth.propagation.reflections import Reflections, as_sign
@@ -20,7 +21,7 @@ COINCIDENCE_TIME = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class TransmitPaths:
+class TransmitPaths(Columns):
     """Ways from a snap to facets."""
 
     facet: Ints  # (way,) which facet
@@ -41,10 +42,11 @@ class TransmitPaths:
     def of(paths: Paths, bounced: Reflections, facet: Ints, snap: Emission, speed: float) -> TransmitPaths:
         """Of paths to facets (path,) from a snap where sound has this speed (m/s)."""
         loud, turned = directed(snap, paths.departure)
+        approach = paths.departure @ snap.velocity / speed if snap.velocity.any() else np.broadcast_to(0.0, len(facet))
         return TransmitPaths(
             facet, paths.arrival, paths.travel_time, paths.length, paths.spreading * loud, paths.surface, paths.bottom,
-            paths.turning, paths.caustics, bounced.modulus, bounced.phase + turned, bounced.delay_std,
-            paths.departure @ snap.velocity / speed,
+            paths.turning, paths.caustics, bounced.modulus, bounced.phase + turned if np.any(turned) else bounced.phase,
+            bounced.delay_std, approach,
         )  # fmt: skip
 
     @staticmethod
@@ -54,10 +56,6 @@ class TransmitPaths:
         return TransmitPaths(
             none, np.zeros((count, 3)), zero, zero, zero + 1.0, none, none, none, none, zero + 1.0, zero, zero, zero
         )
-
-    def select(self, keep: Bools | Ints | slice) -> TransmitPaths:
-        """The ways picked by a mask or by indices."""
-        return TransmitPaths(**{name: rows_of(value, keep) for name, value in vars(self).items()})
 
     def merged(self) -> TransmitPaths:
         """The ways with those that coincide added up: from a snap on the bottom, say, and its image there."""

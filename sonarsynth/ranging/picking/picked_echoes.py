@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.columns import Columns
+from sonarsynth.conventions import Floats
 from sonarsynth.products import EnergyImage
 
 
 @dataclass(frozen=True, eq=False)
-class PickedEchoes:
+class PickedEchoes(Columns):
     """Echoes in the order of their beams. Errors are predicted standard errors."""
 
     azimuth: Floats  # (echo,) rad
@@ -25,11 +26,6 @@ class PickedEchoes:
     snr: Floats  # (echo,) dB: power of the peak over the mean power of noise in its beam
     slope: Floats  # (echo,) m/m: by how much the range may differ across `azimuth_error`, beside what geometry says
     overflow: int = 0  # beams that were not looked at, the faintest
-
-    def select(self, rows: Ints | Bools) -> PickedEchoes:
-        """Some of the echoes."""
-        columns = {name: value[rows] for name, value in vars(self).items() if name != "overflow"}
-        return PickedEchoes(**columns, overflow=self.overflow)
 
 
 def no_echoes(image: EnergyImage, overflow: int = 0) -> PickedEchoes:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonarsynth.columns import Columns
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.randomness import uniforms
 from sonarsynth.sources.chorus.shrimp_chorus import WIDTHS, Chorus
@@ -52,7 +53,7 @@ class ListeningWindow(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class ChorusSnaps:
+class ChorusSnaps(Columns):
     """Snaps of a chorus that may be heard in a window.
 
     position    (snap, xy)   m    on the bottom, world
@@ -71,10 +72,6 @@ class ChorusSnaps:
     sign: Floats
     thinning: Floats
     key: Ints
-
-    def select(self, keep: Ints) -> ChorusSnaps:
-        """The snaps of these indices."""
-        return ChorusSnaps(**{name: value[keep] for name, value in vars(self).items()})
 
 
 def draw_snaps(chorus: Chorus, seed: int, listening: ListeningWindow) -> ChorusSnaps:

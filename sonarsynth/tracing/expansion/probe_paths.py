@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints, depth, rows_of
+from sonarsynth.columns import rows_of
+from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.equations.kernels.unit_vectors import to_images
 from sonarsynth.geometry import Pose
 from sonarsynth.propagation.path_model import KnownRays

@@ -11,7 +11,8 @@ import numpy as np
 
 from sonarsynth.casting.cones import CLOSED, UNKNOWN, classify_cones
 from sonarsynth.casting.shadows import hide
-from sonarsynth.conventions import Bools, Floats, Ints, picked
+from sonarsynth.columns import picked
+from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements
