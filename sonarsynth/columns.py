@@ -16,11 +16,12 @@ class Columns:
     A column of one value for all rows (`numpy.broadcast_to`) stays that.
     """
 
-    def select(self, keep: Bools | Ints | slice) -> Self:
+    def select(self, keep: Bools | Ints | Sequence[int] | slice) -> Self:
         """The rows picked by a mask, by indices, or by a slice, which copies nothing."""
         if isinstance(keep, slice) and keep == slice(None):
             return self
-        rows: Any = keep if isinstance(keep, slice) or keep.dtype != bool else np.flatnonzero(keep)
+        rows: Any = keep if isinstance(keep, slice) else np.asarray(keep)
+        rows = rows if isinstance(keep, slice) or rows.dtype != bool else np.flatnonzero(rows)
         columns, values, copied = dict[str, Any](), vars(self), not isinstance(rows, slice)
         for name in self.__dataclass_fields__:  # type: ignore[attr-defined]  # of the dataclass that it is a base of
             value = values[name]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.noise.path_sums import budget_sums
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.labels.level_band import SLICES, Band
 from sonarsynth.labels.path_powers import Powers, family
@@ -26,12 +27,10 @@ def link_budget(
     error: bound (dB) on each level from the approximations of the chain.
     """
     shape = (len(snap_level), targets + 1, len(FAMILIES))
-    cell = _cells(arrivals, shape)
-    size = int(np.prod(shape))
-    paths = np.bincount(cell, minlength=size)
-    sums = np.array([np.bincount(cell, step, size) for step in powers.steps])
-    alone = np.where(arrivals.coherent, 0.0, powers.steps[-1])
-    total = np.bincount(cell, alone, size) + np.bincount(cell[powers.whole], powers.whole_power, size)
+    own = arrivals.snap, arrivals.target, family(arrivals), powers.steps, arrivals.coherent
+    cell, paths, sums, apart, best = budget_sums(*own, shape)
+    size = len(paths)
+    total = apart + np.bincount(cell[powers.whole], powers.whole_power, size)
     source = np.repeat(np.asarray(snap_level, float), shape[1] * shape[2])
     direct = np.arange(size) // len(FAMILIES) % (targets + 1) == targets
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -42,10 +41,12 @@ def link_budget(
     scattering = np.where(direct, 0.0, scattering)
     levels = np.stack([source, out, scattering, back, absorption, boundary, received], axis=-1) + 0.0
     levels[~((sums[-1] > 0.0) & (total > 0.0))] = np.nan
-    best = _loudest(arrivals, powers, band, cell, size)
-    isolated = arrivals.select(best[best >= 0])
+    met = np.flatnonzero(best >= 0)
+    power, sends = powers.steps[-1, best[met]], band.energy.sum(axis=1) > 0.0
+    met = met[(power > QUIET * arrivals.amplitude[best[met]] ** 2) & sends[arrivals.snap[best[met]]]]
+    isolated = arrivals.select(best[met])
     alone_level = np.full(size, np.nan)
-    alone_level[best >= 0] = source[best >= 0] + 10.0 * np.log10(exact_powers(isolated, band))
+    alone_level[met] = source[met] + 10.0 * np.log10(exact_powers(isolated, band))
     return LinkBudget(
         level=levels.reshape(*shape, len(LINK_BUDGET)),
         paths=paths.reshape(shape),
@@ -53,24 +54,6 @@ def link_budget(
         isolated_level=alone_level.reshape(shape),
         isolated=isolated,
     )
-
-
-def _cells(arrivals: Arrivals, shape: tuple[int, int, int]) -> Ints:
-    """(path,) number of its snap, target (the direct path after them) and family, of a table of that shape."""
-    which = np.where(arrivals.direct, shape[1] - 1, arrivals.target)
-    return np.asarray((arrivals.snap * shape[1] + which) * shape[2] + family(arrivals))
-
-
-def _loudest(arrivals: Arrivals, powers: Powers, band: Band, cell: Ints, size: int) -> Ints:
-    """(cell,) the path of most power in each, the first of equals; -1 where there is none, or it is silent."""
-    power = powers.steps[-1]
-    strongest = np.zeros(size)
-    np.maximum.at(strongest, cell, power)
-    audible = (power > QUIET * arrivals.amplitude**2) & (band.energy.sum(axis=1) > 0.0)[arrivals.snap]
-    best = np.full(size, -1)
-    rows = np.flatnonzero((power == strongest[cell]) & audible)[::-1]
-    best[cell[rows]] = rows
-    return best
 
 
 def exact_powers(paths: Arrivals, band: Band) -> Floats:

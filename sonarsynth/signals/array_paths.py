@@ -3,6 +3,7 @@ inf)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -63,9 +64,9 @@ class Wavefronts(Columns):
             return np.zeros((self.count, 0), bool)
         return np.unpackbits(self.occluded, axis=1, count=1 + sensors)[:, 1:].astype(bool)
 
-    def select(self, keep: Bools | Ints | slice) -> Self:
+    def select(self, keep: Bools | Ints | Sequence[int] | slice) -> Self:
         """As `Columns.select`; the same where these are all, in order."""
-        every = not isinstance(keep, slice) and len(keep) == self.count and (keep == np.arange(self.count)).all()
+        every = not isinstance(keep, slice) and len(keep) == self.count and np.array_equal(keep, np.arange(self.count))
         return self if every else super().select(keep)
 
     def without_faint_shadows(self, tolerance: float, sensors: int) -> Self:

@@ -185,3 +185,43 @@ def mean_powers(
                 power *= math.exp(-(omega[k] ** 2) * others)
             out[3, e] += power
     return out
+
+
+@compiled
+def budget_sums(
+    snap: Ints, target: Ints, family: Ints, steps: Floats, coherent: Bools, shape: tuple[int, int, int]
+) -> tuple[Ints, Ints, Floats, Floats, Ints]:
+    """Cell (path,) of a table (snap, target, family), whose last target is none, and of each cell how many paths there
+    are, the sums of their powers (step, cell), of the last step those of paths that are not coherent, and the path of
+    most power there, the first of equals, -1 where there is none."""
+    size = shape[0] * shape[1] * shape[2]
+    cell, count, loudest = np.empty(len(snap), np.int64), np.zeros(size, np.int64), np.full(size, -1)
+    sums, apart = np.zeros((len(steps), size)), np.zeros(size)
+    for e in range(len(snap)):
+        met = target[e] if target[e] >= 0 else shape[1] - 1
+        c = cell[e] = (snap[e] * shape[1] + met) * shape[2] + family[e]
+        count[c] += 1
+        for step in range(len(steps)):
+            sums[step, c] += steps[step, e]
+        if not coherent[e]:
+            apart[c] += steps[-1, e]
+        if loudest[c] < 0 or steps[-1, e] > steps[-1, loudest[c]]:
+            loudest[c] = e
+    return cell, count, sums, apart, loudest
+
+
+@compiled
+def echo_sums(
+    target: Ints, family: Ints, coherent: Bools, power: Floats, direction: Floats, shape: tuple[int, int]
+) -> Floats:
+    """Powers of echoes that are not coherent (path,), and those times their directions (path, xyz), summed: (target *
+    family, 1 + xyz); of a target less than 0, which is none, nothing."""
+    sums = np.zeros((shape[0] * shape[1], 4))
+    for e in range(len(target)):
+        if target[e] < 0 or coherent[e]:
+            continue
+        c = target[e] * shape[1] + family[e]
+        sums[c, 0] += power[e]
+        for x in range(3):
+            sums[c, 1 + x] += power[e] * direction[e, x]
+    return sums
