@@ -114,8 +114,9 @@ def shape_modes(
         powers, waves = _powers(front.corner_delays, frequency, spectrum, tolerance)
         fewer = reduction(powers, waves * spectrum, loudness, tolerance)
         weight, factor = _times(weight, factor, powers @ fewer.onto, fewer.back @ waves)
-    doppler = polynomials(front.doppler / (widest or 1.0), len(series) or 1)
-    weight, spectra = _times(weight, factor, doppler, series if len(series) else spectrum[None])
+    spectra = factor * spectrum
+    if len(series):
+        weight, spectra = _times(weight, factor, polynomials(front.doppler / widest, len(series)), series)
     if front.phase.any():
         turn = front.phase[:, None]
         weight = np.concatenate([weight * np.cos(turn), weight * np.sin(turn)], axis=1)

@@ -8,6 +8,7 @@ passes the array centre; the plane wave is k = 0, no special case. Sensors at q 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -78,8 +79,7 @@ def plane_wave(
     component = -sound_speed * (u_[:, :rank].T @ (root[:, 0] * (t - t0))) / s[:rank]
     u = component @ axes[:rank]
     if rank == 2:
-        normal = np.cross(axes[0], axes[1])
-        normal_square = 1 - u @ u
+        normal, normal_square = axes[2], 1 - u @ u
         if normal_square < 0:
             return nothing
         u = u + np.sqrt(normal_square) * normal * (1.0 if normal[0] >= 0 else -1.0)
@@ -105,14 +105,44 @@ def spherical_wave(
     Fisher matrix and bound follow: `covariance` times the variance of a delay of weight one is the Cramer-Rao bound
     (physics: independent Gaussian errors; Van Trees 2002, section 8.4).
     """
-    t, q, w = (np.asarray(a, float) for a in (delay, position, weight))
-    u, k = np.asarray(start, float), float(curvature)
-    size = float(np.sqrt(np.einsum("qi,qi->q", q, q).max(initial=0.0)))
+    t, q, w, u = (np.asarray(a, float) for a in (delay, position, weight, start))
+    size = _size(q)
     if not (np.all(np.isfinite(u)) and size > 0):
         return None
     from sonarsynth.equations.arrays.spherical_wave_kernel import gauss_newton
 
-    found, *wave = gauss_newton(q, t, w, (u, k), float(sound_speed), size, curved, iterations)
+    wave = gauss_newton(q, t, w, (u, float(curvature)), float(sound_speed), size, curved, iterations)
+    return _wavefront(wave, curved)
+
+
+def robust_wave(
+    delay: Floats, position: Floats, sound_speed: float, weight: Floats, *, steps: int, rounds: int, settled: float
+) -> Wavefront | None:
+    """The spherical wave that fits delays (sensor,) best of which some may be wrong; a plane where there are too few
+    for a sphere, None where none fits.
+
+    Begins with `plane_wave` and so many steps of `spherical_wave`; then weights are those given times Tukey's biweight
+    of the residuals over six times their median, anew after each step, until no delay moves by `settled` (s) or for so
+    many rounds.
+    """
+    direction, time = plane_wave(delay, position, sound_speed, weight)
+    if not np.isfinite(time):
+        return None
+    from sonarsynth.equations.arrays.spherical_wave_kernel import robust_fit
+
+    size, start = _size(position), (direction, 0.0)
+    curved, wave = robust_fit(position, delay, weight, start, sound_speed, size, steps, rounds, settled)
+    return _wavefront(wave, curved)
+
+
+def _size(position: Floats) -> float:
+    """Distance (m) of the sensor (sensor, xyz) that is farthest out."""
+    return float(np.sqrt(np.einsum("qi,qi->q", position, position).max(initial=0.0)))
+
+
+def _wavefront(fit: tuple[Any, ...], curved: bool) -> Wavefront | None:
+    """What a kernel fitted, if it found a fit; not `curved`: nothing is known of the curvature."""
+    found, *wave = fit
     if not found:
         return None
     if not curved:

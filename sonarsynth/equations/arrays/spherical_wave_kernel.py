@@ -110,6 +110,34 @@ def gauss_newton(
 
 
 @compiled
+def curved_or_plane(position: Any, delay: Any, weight: Any, start: Any, speed: float, size: float, steps: int) -> Any:
+    """`gauss_newton`, without the curvature where there is no fit with it; and whether there is."""
+    wave = gauss_newton(position, delay, weight, start, speed, size, True, steps)
+    return (True, wave) if wave[0] else (False, gauss_newton(position, delay, weight, start, speed, size, False, steps))
+
+
+@compiled
+def robust_fit(
+    position: Any, delay: Any, loud: Any, start: Any, speed: float, size: float, steps: int, rounds: int, settled: float
+) -> Any:
+    """As `curved_or_plane`, by so many steps; then weights loud (sensor,) are made anew, outliers counting for nothing,
+    at most so many times, until no delay moves by more than `settled` (s)."""
+    curved, wave = curved_or_plane(position, delay, loud, start, speed, size, steps)
+    for _ in range(rounds):
+        if not wave[0]:
+            break
+        late, before = np.abs(wave[7]), wave[3] + delays_after_centre(position, wave[1], wave[2], speed)
+        order = np.argsort(late)
+        share = np.cumsum(loud[order])
+        scale = max(6.0 * late[order[np.searchsorted(share, 0.5 * share[-1])]], 1e-7)
+        weight = loud * np.maximum(1.0 - (late / scale) ** 2, 0.0) ** 2
+        curved, wave = curved_or_plane(position, delay, weight, (wave[1], wave[2]), speed, size, 1)
+        if np.abs(wave[3] + delays_after_centre(position, wave[1], wave[2], speed) - before).max() < settled:
+            break
+    return curved, wave
+
+
+@compiled
 def climb_envelope(wave: Any, omega: Any, time: float, longest: float) -> tuple[float, float, float]:
     """By Newton's steps, no longer than `longest` (s), from `time` (s) to the top of the envelope of a pulse with
     spectrum `wave` (bin,) at `omega` (bin,) rad/s: when that is, the envelope's second derivative there, and the rate

@@ -32,9 +32,12 @@ def round_off(values: npt.NDArray[Any], step: Any, limit: Any, out: npt.NDArray[
     clipped = unknown = 0
     for i in range(values.shape[0]):
         row, rounded = values[i], out[i]
+        beyond: Any = np.int32(0)  # one count of the size of the numbers: what is beyond is seldom
         for j in range(len(row)):
             count = np.rint(row[j] / step)
-            clipped += 1 if abs(count) > limit else 0
-            unknown += 1 if np.isnan(count) else 0
+            beyond += np.int32(not abs(count) <= limit)
             rounded[j] = min(max(count, -limit), limit) * step
+        if beyond > 0:
+            nothing = int(np.isnan(row).sum())
+            clipped, unknown = clipped + beyond - nothing, unknown + nothing
     return clipped, unknown

@@ -9,13 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.equations.arrays.spherical_wave import (
-    Wavefront,
-    plane_wave,
-    plane_wavefront,
-    spherical_wave,
-    wavefront_delays,
-)
+from sonarsynth.equations.arrays.spherical_wave import Wavefront, robust_wave, spherical_wave, wavefront_delays
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.candidates import Candidate, Candidates
@@ -182,11 +176,13 @@ def fit_pulse(
     c, q, still = sonar.assumed_sound_speed, elements.position, not velocity.any()
     cut, start = pulse_times.excerpt(signals, centre, half)
     delay, height = pulse_times.envelope_peaks(cut, signals.sampling_frequency, sonar.band)
-    wave = _robust_wave(start + delay, height * (elements.gain != 0), q, c)
+    loud = height**2 * (elements.gain != 0)  # who hears more counts more
+    times, settled = start + delay, pulse_times.FLOOR
+    wave = robust_wave(times, q, c, loud, steps=FIRST_STEPS, rounds=ROBUST_ROUNDS, settled=settled)
     if wave is not None and not still:
         times = _times(wave, q, c)
         q = q + np.outer(times - wave.time, velocity)
-        wave = fit_wave(times, q, c, height**2 * (elements.gain != 0), wave)
+        wave = fit_wave(times, q, c, loud, wave)
     if wave is None:
         return UNFIT
     expected, rest = _times(wave, q, c), elements
@@ -224,29 +220,6 @@ def fit_wave(
     wave = spherical_wave(delay, position, sound_speed, weight, u, k, iterations=steps)
     if wave is None:
         wave = spherical_wave(delay, position, sound_speed, weight, u, curved=False, iterations=steps)
-    return wave
-
-
-def _robust_wave(delay: Floats, height: Floats, position: Floats, sound_speed: float) -> Wavefront | None:
-    """Sphere through envelope peaks: who hears more counts more, outliers count for nothing (Tukey's biweight)."""
-    loud = height**2
-    direction, time = plane_wave(delay, position, sound_speed, loud)
-    if not np.isfinite(time):
-        return None
-    wave = fit_wave(delay, position, sound_speed, loud, plane_wavefront(direction, time), FIRST_STEPS)
-    for _ in range(ROBUST_ROUNDS):
-        if wave is None:
-            return None
-        last = wave
-        late = np.abs(wave.residual)
-        order = np.argsort(late)
-        share = np.cumsum(loud[order])
-        middle = late[order[np.searchsorted(share, 0.5 * share[-1])]]
-        scale = max(6 * middle, 1e-7)
-        weight = loud * np.maximum(1 - (late / scale) ** 2, 0.0) ** 2
-        wave = fit_wave(delay, position, sound_speed, weight, wave, 1)
-        if wave is not None and _settled(wave, last, position, sound_speed):
-            break
     return wave
 
 

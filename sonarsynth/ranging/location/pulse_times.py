@@ -124,11 +124,10 @@ def excerpt(signals: Signals, centre: float, half: float) -> tuple[npt.NDArray[n
     rate = signals.sampling_frequency
     first = int(np.floor((centre - half - signals.start) * rate))
     count = int(np.ceil(2 * half * rate)) + 1
-    samples = signals.pressure.shape[1]
-    a, b = max(first, 0), min(first + count, samples)
-    cut = np.zeros((signals.pressure.shape[0], count), np.float32)
-    if b > a:
-        cut[:, a - first : b - first] = signals.pressure[:, a:b]
+    cut = signals.pressure[:, max(first, 0) : max(first + count, 0)]
+    if cut.shape[1] < count:
+        early = min(max(-first, 0), count - cut.shape[1])
+        cut = np.pad(cut, ((0, 0), (early, count - cut.shape[1] - early)))
     return cut, signals.start + first / rate
 
 

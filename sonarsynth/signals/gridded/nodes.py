@@ -71,7 +71,11 @@ def interpolation(x: Floats, axis: Axis) -> Floats:
 
 def polynomials(x: Floats, count: int) -> Floats:
     """Chebyshev polynomials (point, degree) at x (point,), -1 to 1, of degrees below `count`."""
-    return np.asarray(np.cos(np.outer(np.arccos(np.clip(x, -1.0, 1.0)), np.arange(count))))
+    value = np.ones((count, x.size))
+    value[1:2] = np.clip(x, -1.0, 1.0)
+    for degree in range(2, count):
+        value[degree] = 2.0 * value[1] * value[degree - 1] - value[degree - 2]
+    return np.ascontiguousarray(value.T)
 
 
 def _waves(x: Floats, axis: Axis) -> Floats:
