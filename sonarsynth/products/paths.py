@@ -15,7 +15,7 @@ from sonarsynth.products.array_expansion import ArrayExpansion
 
 
 @dataclass(frozen=True, eq=False)
-class Paths:
+class Paths(Columns):
     """Rays that join pairs of points in the water, from a propagation model. World frame.
 
     A pair may have no path (a shadow zone) or several; paths are sorted by pair, then by travel time.

@@ -94,4 +94,4 @@ class Straight(PathModel):
             return Paths(**columns[0])
         joined = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
         rows = order(joined["travel_time"].reshape(len(columns), -1))
-        return Paths(**{name: value[rows] for name, value in joined.items()})
+        return Paths(**joined).select(rows)

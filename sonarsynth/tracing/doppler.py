@@ -62,10 +62,16 @@ class MotionTerms(Columns):
     apart: Floats  # (path, xyz) m: by what the array, or its image, is farther from the facet
 
     @staticmethod
+    def none(count: int) -> MotionTerms:
+        """Paths of which nothing moves."""
+        zero, none = np.zeros(count), np.zeros((count, 3))
+        return MotionTerms(zero, zero, none, none, none)
+
+    @staticmethod
     def direct(count: int, snap: Emission) -> MotionTerms:
         """Paths from a snap itself, which is where it is when it sounds."""
-        zero, none = np.zeros(count), np.zeros((count, 3))
-        return MotionTerms(zero + snap.time, zero, none + snap.velocity, none, none)
+        none = MotionTerms.none(count)
+        return replace(none, met=none.met + snap.time, velocity=none.velocity + snap.velocity)
 
     def departure(self, length: Floats, away: Floats, body: Pose | None = None) -> Floats:
         """Directions (path, ..., xyz) to the array or probes of it, of rays of some length (path,) m that left in

@@ -10,6 +10,7 @@ import numpy as np
 
 from sonarsynth.columns import picked, rows_of
 from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.equations.kernels.unit_vectors import to_moved_images
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind
@@ -210,11 +211,13 @@ def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -
 def _away(array: FacetPaths, leg: Ints, carried: MotionTerms | None, group: EchoBatch, some: slice) -> Floats:
     """Where some probes are seen from the facets of a group (echo, probe, xyz), in the frame of its body; leg, carried:
     of all pairs (pair,)."""
-    rows = leg[group.row]
-    away, pose = array.fronts.departure(rows, some), group.surface.pose
-    if carried is None:
-        return pose.turn_to_body(away)
-    return carried.select(group.row).departure(array.legs.length[rows], away, pose)
+    rows, body, fronts, legs = leg[group.row], group.surface.pose, array.fronts, array.legs
+    motion = MotionTerms.none(len(rows)) if carried is None else carried.select(group.row)
+    if fronts.probe_departure is not None:
+        return motion.departure(legs.length[rows], fronts.departure(rows, some), body)
+    offset = array.context.receiver.pose.turn_to_world(fronts.place.probe.position[some])
+    ray = legs.length[rows], rows_of(legs.departure, rows), legs.bounces[rows] % 2 == 1
+    return np.asarray(to_moved_images(*ray, offset, motion.apart, motion.turn, body.rotation))
 
 
 def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:
@@ -228,12 +231,10 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     row = np.flatnonzero(may_face_receiver(facets, snap.position, array.propagation.bounces, medium))
     start = np.broadcast_to(snap.position, (len(row), 3))
     paths = array.propagation.connect(medium.profile, medium.depth, start, rows_of(facets.point, row))
-    facet = row[paths.pair]
-    lit = usable(paths) & facets.lit(facet, paths.arrival)
+    paths = paths.select(picked(usable(paths) & facets.lit(row[paths.pair], paths.arrival)))
     bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
-    speed = float(medium.profile.at(depth(snap.position)))
-    out = TransmitPaths.of(paths, bounced, facet, snap, speed)
-    out = out.select(picked(lit & (out.spreading != 0.0))).merged()
+    out = TransmitPaths.of(paths, bounced, row[paths.pair], snap, float(medium.profile.at(depth(snap.position))))
+    out = out.select(picked(out.spreading != 0.0)).merged()
     own = facets.clear_of_own(bodies, out.facet, -out.arrival)
     out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet), own)))
     for number, before in overlapping(bodies):

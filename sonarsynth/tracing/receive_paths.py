@@ -68,20 +68,8 @@ class ReceivePaths(Columns):
         return np.asarray(self.surface + self.bottom)
 
     def swerve(self, medium: Medium, receiver: Receiver, spread: Floats | float) -> Floats:
-        """(leg,) rad as `ray_cones.max_launch_deviation`, of those to within `spread` (m) of the array centre."""
-        return max_launch_deviation(
-            medium.depth,
-            medium.profile,
-            self.point,
-            float(depth(receiver.pose.position)),
-            self.departure,
-            self.length,
-            spreading=self.spreading,
-            surface=self.surface,
-            bottom=self.bottom,
-            turning=self.turning,
-            spread=spread,
-        )
+        """As `swerve`."""
+        return swerve(self, self.point, medium, receiver, spread)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,30 +140,54 @@ def usable(paths: Paths) -> Bools:
     return np.asarray((paths.flag != COINCIDENT) & np.isfinite(paths.spreading))
 
 
-def rays_to_centre(medium: Medium, point: Floats, receiver: Receiver, propagation: Propagation) -> ReceivePaths:
-    """All rays from points (point, xyz) in the world to the array centre, sorted by point."""
+def swerve(
+    paths: Paths | ReceivePaths, start: Floats, medium: Medium, receiver: Receiver, spread: Floats | float
+) -> Floats:
+    """(path,) rad as `ray_cones.max_launch_deviation`, of paths from places (path, xyz) to within `spread` (m) of the
+    array centre."""
+    return max_launch_deviation(
+        medium.depth,
+        medium.profile,
+        start,
+        float(depth(receiver.pose.position)),
+        paths.departure,
+        paths.length,
+        spreading=paths.spreading,
+        surface=paths.surface,
+        bottom=paths.bottom,
+        turning=paths.turning,
+        spread=spread,
+    )
+
+
+def rays_to_centre(
+    medium: Medium, point: Floats, receiver: Receiver, propagation: Propagation,
+    chosen: Callable[[Paths], Bools] = usable,
+) -> ReceivePaths:  # fmt: skip
+    """Rays from points (point, xyz) in the world to the array centre, sorted by point: all, or those that are chosen
+    (path,) of the usable ones."""
     end = np.broadcast_to(receiver.pose.position, point.shape)
     paths = propagation.connect(medium.profile, medium.depth, point, end)
-    keep = picked(usable(paths))
-    start = point[paths.pair[keep]]
+    paths = paths.select(picked(usable(paths) & chosen(paths)))
+    start = rows_of(point, paths.pair)
     bounced: Reflections = reflections(medium.environment, medium.profile, paths, receiver.centre)
     return ReceivePaths(
         point=start,
-        row=paths.pair[keep],
-        departure=paths.departure[keep],
-        arrival=paths.arrival[keep],
-        direction=-receiver.pose.turn_to_body(paths.arrival[keep]),
-        radius=paths.length[keep],
-        travel_time=paths.travel_time[keep],
-        length=paths.length[keep],
-        spreading=paths.spreading[keep],
-        surface=paths.surface[keep],
-        bottom=paths.bottom[keep],
-        turning=paths.turning[keep],
-        caustics=paths.caustics[keep],
-        boundary=bounced.modulus[keep],
-        phase=bounced.phase[keep],
-        delay_std=bounced.delay_std[keep],
+        row=paths.pair,
+        departure=paths.departure,
+        arrival=paths.arrival,
+        direction=-receiver.pose.turn_to_body(paths.arrival),
+        radius=paths.length,
+        travel_time=paths.travel_time,
+        length=paths.length,
+        spreading=paths.spreading,
+        surface=paths.surface,
+        bottom=paths.bottom,
+        turning=paths.turning,
+        caustics=paths.caustics,
+        boundary=bounced.modulus,
+        phase=bounced.phase,
+        delay_std=bounced.delay_std,
         occluded=np.zeros((len(start), 0), np.uint8),
         open=np.broadcast_to(0, len(start)),
     )
@@ -216,11 +228,15 @@ def receive_paths(
 
     Or that may on their way to a point within `slack` (m) of the array centre.
     """
-    legs = rays_to_centre(medium, facets.point, receiver, propagation)
-    ahead = dot(rows_of(facets.normal, legs.row), legs.departure) * legs.length
-    if slack and propagation.bends:
-        ahead += legs.swerve(medium, receiver, slack) * (legs.length + slack)
-    return legs.select(picked((ahead > -slack) | facets.sideless[legs.row]))
+
+    def chosen(paths: Paths) -> Bools:
+        ahead = dot(rows_of(facets.normal, paths.pair), paths.departure) * paths.length
+        if slack and propagation.bends:
+            start = rows_of(facets.point, paths.pair)
+            ahead += swerve(paths, start, medium, receiver, slack) * (paths.length + slack)
+        return np.asarray((ahead > -slack) | facets.sideless[paths.pair])
+
+    return rays_to_centre(medium, facets.point, receiver, propagation, chosen)
 
 
 def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Medium, slack: float = 0.0) -> Bools:

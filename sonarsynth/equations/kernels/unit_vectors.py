@@ -56,3 +56,24 @@ def moved(length: Floats, away: Floats, apart: Floats, turn: Floats, rotation: F
             for n in range(3):
                 out[i, j, n] = rotation[0, n] * x + rotation[1, n] * y + rotation[2, n] * z
     return out
+
+
+@compiled
+def to_moved_images(
+    length: Floats, departure: Floats, mirrored: Bools, offset: Floats, apart: Floats, turn: Floats, rotation: Floats
+) -> Floats:  # fmt: skip
+    """As `to_images`, of places that are farther by apart (leg, xyz), turned back and in axes as of `moved`."""
+    out = np.empty((len(length), len(offset), 3))
+    for i in range(len(length)):
+        tx, ty, tz = turn[i, 0], turn[i, 1], turn[i, 2]
+        for j in range(len(offset)):
+            up = -offset[j, 2] if mirrored[i] else offset[j, 2]
+            x = length[i] * departure[i, 0] + offset[j, 0] + apart[i, 0]
+            y = length[i] * departure[i, 1] + offset[j, 1] + apart[i, 1]
+            z = length[i] * departure[i, 2] + up + apart[i, 2]
+            x, y, z = x - (ty * z - tz * y), y - (tz * x - tx * z), z - (tx * y - ty * x)
+            far = math.sqrt(x * x + y * y + z * z)
+            x, y, z = x / far, y / far, z / far
+            for n in range(3):
+                out[i, j, n] = rotation[0, n] * x + rotation[1, n] * y + rotation[2, n] * z
+    return out

@@ -232,7 +232,7 @@ def _towards(legs: ReceivePaths, offset: Floats) -> tuple[Floats, Floats]:
     ahead = legs.length[:, None] * legs.departure + offset
     odd = np.asarray(legs.bounces % 2 == 1)
     ahead[odd, 2] -= 2.0 * offset[odd, 2]  # of the mirrored array
-    length = np.linalg.norm(ahead, axis=1)
+    length = np.sqrt(dot(ahead, ahead))
     return ahead / np.maximum(length, 1e-300)[:, None], length
 
 
