@@ -11,7 +11,7 @@ import pytest
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind
-from sonarsynth.receiver import BandPass, Elements, LowPass, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import BandPass, Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import fir
@@ -305,16 +305,6 @@ def test_several_snaps_of_different_kinds_and_levels() -> None:
     assert error(got.pressure, exact) < 1e-4
     parts = sum(exact_signals(of.select(of.snap == i), snaps, array, SONAR, None, start, samples)[0] for i in range(3))
     np.testing.assert_allclose(parts, exact, atol=1e-12)
-
-
-def test_low_pass_of_the_thesis() -> None:
-    sonar = Sonar(filter=LowPass(cutoff=110e3), sampling_frequency=250e3)
-    array = some_of(FACES, 60)
-    of = target_at(15.0, 20, 8, direct=False)
-    start, samples = window(of, sonar, array)
-    exact, _ = exact_signals(of, SNAPS, array, sonar, None, start, samples)
-    got = GriddedSynthesis().signals(of, SNAPS, array, sonar, None, start, samples)
-    assert error(got.pressure, exact) < 1e-4
 
 
 # ---- laws ------------------------------------------------------------------------------------------------------------

@@ -231,16 +231,6 @@ def test_refracted_wavefronts_fit_rays_traced_to_every_sensor() -> None:
     np.testing.assert_array_equal(some.expansion.over("delay", np.zeros((1, 3))), 0.0)
 
 
-def test_a_slight_gradient_goes_over_into_uniform_water() -> None:
-    slight = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1540.0 + 1e-7]))
-    a, b = run(), run(profile=slight)
-    assert np.array_equal(a.facet, b.facet)
-    np.testing.assert_allclose(b.delay, a.delay, rtol=1e-9)
-    np.testing.assert_allclose(b.direction, a.direction, atol=1e-8)
-    np.testing.assert_allclose(b.amplitude, a.amplitude, rtol=1e-6)
-    assert np.abs(b.expansion.delay).max() < 1e-12
-
-
 def test_straight_rays_take_the_mean_slowness_of_their_depths() -> None:
     start, end = np.array([[0.0, 0.0, -2.0], [0.0, 0.0, -13.0]]), np.array([[30.0, 4.0, -25.0], [9.0, 0.0, -13.0]])
     paths = Straight().connect(LAYERED, 30.0, start, end)
@@ -248,14 +238,6 @@ def test_straight_rays_take_the_mean_slowness_of_their_depths() -> None:
     mean = np.mean(1 / LAYERED.at(0.5 * (z[1:] + z[:-1])))
     np.testing.assert_allclose(paths.travel_time, paths.length * [mean, 1 / 1535.0], rtol=1e-10)
     np.testing.assert_allclose(paths.spreading, 1 / np.linalg.norm(end - start, axis=1), rtol=1e-15)
-
-
-def test_snells_law_gives_no_path_in_a_shadow() -> None:
-    falling = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1500.0]))
-    far = np.array([[400.0, 0.0, -2.0]])
-    assert len(Refracted().connect(falling, 30.0, np.array([[0.0, 0.0, -2.0]]), far).pair) == 0
-    found = run((body((20.0, 1.0, -11.0)),), (snap((-400.0, 0.0, -3.0)),), falling)
-    assert len(found.delay) == 0
 
 
 def test_probes_spread_over_the_aperture_and_small_arrays_use_what_they_have() -> None:

@@ -12,8 +12,6 @@ from sonarsynth.equations.bubble.snap_pressure import spectrum
 from sonarsynth.equations.noise.filters import response
 from sonarsynth.pipeline import beamform_frame, render, synthesise, trace_frame
 from sonarsynth.planning import PRODUCTS, plan
-from sonarsynth.products import FAMILIES, LINK_BUDGET
-from sonarsynth.receiver import PositionTable
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import MirrorLobe
 from sonarsynth.signals.filtered_pulse import fir
@@ -70,34 +68,6 @@ def test_the_image_of_a_point_peaks_at_its_place() -> None:
             assert abs(image.azimuth[column] - azimuth) <= half and abs(image.elevation[row] - elevation) <= half
 
 
-def _echo_level(recipe: Recipe) -> float:
-    """Energy level (dB) of an echo: unlike its largest sample, it does not depend on where the samples fall."""
-    made, traced, _ = _one_facet(recipe)
-    return float(10 * np.log10(np.sum(synthesise(made, traced).pressure.astype(float) ** 2)))
-
-
-def test_source_and_hydrophone_may_change_places() -> None:
-    """Reciprocity: one hydrophone without a face hears the same echo when it and the shrimp change places."""
-    point = {"array": PositionTable(positions=((0.0, 0.0, 0.0),)), "beams": {"azimuths": 3, "elevations": 3}}
-    array, snap, target = (0.0, 0.0, -50.0), (15.0, -6.0, -56.0), (20.0, 4.0, -47.0)
-    first = _one_facet(point_scene(target, snap, array, **point))
-    second = _one_facet(point_scene(target, array, snap, **point))
-    # facets of the tiny sphere differ between the two; the one at the same place is compared
-    there = trace_frame(_planned(point_scene(target, array, snap, **point), SIGNALS), 0)
-    match = np.flatnonzero(np.linalg.norm(there.arrivals.point - first[2], axis=1) < 1e-12)
-    match = match[~there.arrivals.direct[match]]
-    one = synthesise(first[0], first[1]).pressure
-    other = synthesise(second[0], replace(there, arrivals=there.arrivals.select(match[:1]))).pressure
-    assert len(match) and np.abs(one).max() == pytest.approx(np.abs(other).max(), rel=1e-4)
-
-
-def test_halving_every_range_raises_an_echo_by_12_db() -> None:
-    point = {"array": PositionTable(positions=((0.0, 0.0, 0.0),)), "beams": {"azimuths": 3, "elevations": 3}}
-    far = _echo_level(point_scene((40.0, 0.0, -50.0), (20.0, -20.0, -50.0), **point))
-    near = _echo_level(point_scene((20.0, 0.0, -50.0), (10.0, -10.0, -50.0), **point))
-    assert near - far == pytest.approx(12.041, abs=0.002)
-
-
 def test_render_is_pure_and_labelled() -> None:
     recipe = remus()
     first, second = render(recipe, 1), render(recipe, 1)
@@ -124,25 +94,6 @@ def test_truth_agrees_with_the_arrivals_that_made_the_signals() -> None:
     assert low_az <= azimuth.min() and azimuth.max() <= high_az
     assert low_el <= elevation.min() and elevation.max() <= high_el
     assert 0.9 < truth.visible_fraction[0] <= 1.0
-
-
-def test_the_link_budget_adds_up_and_matches_the_arrivals() -> None:
-    traced = trace_frame(_planned(remus()), 0)
-    terms = dict(zip(LINK_BUDGET, np.moveaxis(traced.budget.level, -1, 0), strict=True))
-    total = terms["source_level"] + terms["scattering"]
-    for loss in ("transmission_loss_out", "transmission_loss_in", "absorption_loss", "boundary_loss"):
-        total = total - terms[loss]
-    filled = np.isfinite(terms["received_level"])
-    assert filled[0, :, FAMILIES.index("direct")].all()
-    assert total[filled] == pytest.approx(terms["received_level"][filled], abs=1e-9)
-    arrivals = traced.arrivals
-    direct = arrivals.amplitude[arrivals.direct][0]
-    distance = np.linalg.norm(traced.truth.snap_position[0] - traced.truth.sonar_position)
-    assert terms["transmission_loss_out"][0, -1, 0] == pytest.approx(20 * np.log10(distance))
-    assert terms["received_level"][0, -1, 0] - terms["source_level"][0, -1, 0] == pytest.approx(
-        20 * np.log10(direct),
-        abs=0.1,  # absorption is a mean over the band
-    )
 
 
 def test_what_nobody_asked_for_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
