@@ -200,10 +200,10 @@ def folded(phase: Floats) -> tuple[Floats, Floats]:
 def towards(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:
     """Unit vectors u = (R d - q)/|R d - q| (path, point, xyz) and |R d - q|/R (path, point) at points q (point,
     xyz)."""
-    v = front.direction[:, None, :] - front.curvature[:, None, None] * points
-    n = np.sqrt(np.einsum("epi,epi->ep", v, v))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return v / n[:, :, None], n
+    from sonarsynth.equations.kernels.unit_vectors import towards_sources
+
+    u, n = towards_sources(front.direction, front.curvature, points)
+    return np.ascontiguousarray(np.moveaxis(u, 2, 0)), np.ascontiguousarray(n.T)
 
 
 BENT = 4

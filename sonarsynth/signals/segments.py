@@ -82,17 +82,17 @@ def layout(
     cut = ~silent & ((early < start) | (late > start + (samples - 1) / fs))
     audible = ~silent & (late > start) & (early < start + (samples - 1) / fs)
     stretches: list[Segment] = []
-    waveforms = [s.waveform for s in snaps]
+    waveforms, kind = [s.waveform for s in snaps], 2 * front.coherent + ~arrivals.direct
     for waveform in dict.fromkeys(waveforms):
         same = np.array([w == waveform for w in waveforms])[arrivals.snap] & audible
-        for coherent, direct in ((False, True), (False, False), (True, True), (True, False)):
-            rows = np.flatnonzero(same & (front.coherent == coherent) & (arrivals.direct == direct))
+        for number in range(4):
+            rows = np.flatnonzero(same & (kind == number))
             for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
                 sooner, later = longer[:, chosen].max(axis=1)
                 delay, spread = front.delay[chosen] - start, steered_spread(front, chosen)
                 first = int(np.floor((delay.min() - sooner - spread) * fs)) - GUARD
                 length = fast_length(int(np.ceil((delay.max() + later + spread) * fs)) + GUARD + 1 - first)
-                stretches.append(Segment(chosen, waveform, coherent, first, length, float(sooner), float(later)))
+                stretches.append(Segment(chosen, waveform, number > 1, first, length, float(sooner), float(later)))
     return Layout(tuple(stretches), audible, int((cut & (arrivals.kind != Kind.REVERBERATION)).sum()), support)
 
 

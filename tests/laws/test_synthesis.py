@@ -217,6 +217,23 @@ def test_nodes_over_the_aperture_serve_the_whole_array() -> None:
     assert error(got, exact) < 1e-4
 
 
+def test_bodies_heard_one_after_the_other_are_each_where_they_belong() -> None:
+    """Pulses that overlap in a chain are one stretch of time, of which each direction has but a part."""
+    body = target_at(20.0, 300, 5, direct=False)
+    sides = np.array([[1, 1, 1], [1, -1, 1], [1, 1, -1], [1, -1, -1], [1, 3, 1], [1, -3, 1]])
+    of = arrivals(
+        np.concatenate([body.delay + 1.5e-3 * n for n in range(len(sides))]),
+        np.concatenate([body.direction * side for side in sides]),
+        np.tile(body.radius, len(sides)),
+        np.tile(body.amplitude, len(sides)),
+        loss=np.tile(body.absorption, len(sides)),
+    )
+    start, samples = window(of, SONAR, FACES)
+    got = GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure[::127]
+    exact, _ = exact_signals(of, SNAPS, some_of(FACES, 127), SONAR, absorption, start, samples)
+    assert error(got, exact) < 1e-4
+
+
 @pytest.mark.parametrize("size", [0.1, 1.0, 10.0])
 def test_lobes_that_vary_over_the_aperture(size: float) -> None:
     """Amplitudes that are cubics of any size, each path its own: from broad lobes to those that miss half the array."""

@@ -24,6 +24,21 @@ def straight_rays(level: Floats, climb: Floats) -> tuple[Floats, Floats, Floats]
 
 
 @compiled
+def towards_sources(direction: Floats, curvature: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors (point, xyz, source) towards sources at direction/curvature (source, xyz) from points (point, xyz),
+    and how far that is times the curvature (point, source)."""
+    out, far = np.empty((len(points), 3, len(curvature))), np.empty((len(points), len(curvature)))
+    for i in range(len(points)):
+        px, py, pz = points[i, 0], points[i, 1], points[i, 2]
+        for j in range(len(curvature)):
+            k = curvature[j]
+            x, y, z = direction[j, 0] - k * px, direction[j, 1] - k * py, direction[j, 2] - k * pz
+            far[i, j] = math.sqrt(x * x + y * y + z * z)
+            out[i, 0, j], out[i, 1, j], out[i, 2, j] = x / far[i, j], y / far[i, j], z / far[i, j]
+    return out, far
+
+
+@compiled
 def to_images(length: Floats, departure: Floats, mirrored: Bools, offset: Floats) -> Floats:
     """Unit vectors (leg, place, xyz) from where legs of some length (leg,) in directions (leg, xyz) start to places
     beside their ends (place, xyz), or beside what a level surface mirrors them to."""

@@ -16,7 +16,16 @@ from sonarsynth.signals.array_paths import NEPER, Wavefronts, delay_and_gain, st
 from sonarsynth.signals.gridded.bins import Bins
 from sonarsynth.signals.gridded.interpolation import to_sensors
 from sonarsynth.signals.gridded.low_rank import face_pairs, spectral_quantiles, term_products
-from sonarsynth.signals.gridded.spectral_factors import Stage, Steering, absorbed, faces, kernel, power, responses
+from sonarsynth.signals.gridded.spectral_factors import (
+    Kernel,
+    Stage,
+    Steering,
+    absorbed,
+    faces,
+    kernel,
+    power,
+    responses,
+)
 from sonarsynth.signals.gridded.tiles import Tile, TileSettings, tiles
 from sonarsynth.signals.pulse_variation import PulseVariation, changed, shares
 from sonarsynth.signals.segments import GUARD, Segment
@@ -43,10 +52,7 @@ def add_segment(
     """
     samples = segment.samples
     width, oversampling, dtype, tolerance = method
-    circle = 2 * int(next_fast_len(int(np.ceil(highest * oversampling / bins.step)) + width, real=True))
-    used = min(bins.frequency.size, circle // 2 - bins.first)
-    bins = bins.cut(used)
-    grid = kernel(width, circle * bins.step / (2.0 * highest), circle, dtype)
+    bins, grid = _on_grid(bins, highest, width, oversampling, dtype)
     aim = TileSettings(
         elements=elements,
         highest=highest,
@@ -55,12 +61,12 @@ def add_segment(
         fading=float(np.abs(bins.relative) @ np.abs(bins.spectrum) / np.abs(bins.spectrum).sum()),
         tolerance=tolerance,
         changes=bins.changes,
-        bins=used,
-        circle=circle,
+        bins=bins.frequency.size,
+        circle=grid.circle,
         lasting=(segment.before + segment.after) * samples * bins.step,
     )
     wave = kernel(-8 * (-width // 8), samples * bins.step / highest, 2 * samples, dtype)  # as wide as its lanes
-    stage = Stage(aim, bins, origin, segment, grid, wave, dtype)
+    stage = Stage(aim, bins, origin, segment, grid, oversampling, wave, dtype)
     front = front.without_faint_shadows(0.1 * tolerance, elements.count)
     for tile in tiles(front, aim) if front.count else ():
         paths, most = front.select(tile.paths), max(1, LARGEST // (len(tile.nodes(elements)) * samples))
@@ -72,21 +78,25 @@ def add_segment(
             _add_tile(out, replace(tile, paths=tile.paths[first : first + most], reference=some), some, stage)
 
 
+def _on_grid(bins: Bins, highest: float, width: int, oversampling: float, dtype: str) -> tuple[Bins, Kernel]:
+    """Bins, and the kernel on the grid that paths are deposited on for them; without those that the grid lacks."""
+    circle = 2 * int(next_fast_len(int(np.ceil(highest * oversampling / bins.step)) + width, real=True))
+    grid = kernel(width, circle * bins.step / (2.0 * highest), circle, dtype)
+    return bins.cut(min(bins.frequency.size, circle // 2 - bins.first)), grid
+
+
 def _add_tile(out: npt.NDArray[Any], tile: Tile, paths: Wavefronts, stage: Stage) -> None:
     """Add the pressure of a tile at the hydrophones to out (sensor, sample)."""
     reference, points = tile.reference, tile.nodes(stage.aim.elements)
     begin, length = _lasting(tile, paths, stage)
-    if tile.alone:
-        stage = _shorter(stage, length)
-        field = _alone(tile, paths, points, begin / (stage.segment.samples * stage.bins.step), stage)
-    else:
-        field = _deposit(tile, paths, points, stage)
+    stage = _shorter(stage, length)
+    since = begin / (stage.segment.samples * stage.bins.step)
+    field = (_alone if tile.alone else _deposit)(tile, paths, points, since, stage)
     if reference.expansion.phase.any() or reference.expansion.delay_variance.any():
         some = field[:, :, stage.bins.first : stage.bins.first + stage.bins.frequency.size]
         some *= changed(reference, points, stage.bins.frequency)
     wave = irfft(field, 2 * stage.segment.samples, axis=2, overwrite_x=True)
-    late = 0 if tile.alone else int(begin[0])
-    _hear(out, wave[:, :, 2 * late : 2 * (late + length)], begin, tile, paths, stage)
+    _hear(out, wave[:, :, : 2 * length], begin, tile, paths, stage)
 
 
 def _lasting(tile: Tile, paths: Wavefronts, stage: Stage) -> tuple[Ints, int]:
@@ -99,7 +109,7 @@ def _lasting(tile: Tile, paths: Wavefronts, stage: Stage) -> tuple[Ints, int]:
     spare = GUARD if short else segment.samples
     begin = np.maximum(((early - segment.before - spread) * rate).astype(int) - spare, 0)
     length = int((segment.before + segment.after + 2.0 * spread + wide) * rate) + 2 * spare + 2
-    return begin, min(length, segment.samples - (0 if tile.alone else int(begin[0])))
+    return begin, min(length, segment.samples)
 
 
 def _hear(
@@ -132,7 +142,9 @@ def _shorter(stage: Stage, length: int) -> Stage:
     if share == 1:
         return stage
     wave = kernel(stage.wave.width, samples * bins.step / stage.aim.highest, 2 * samples // share, stage.dtype)
-    return stage._replace(bins=bins.every(share), segment=replace(stage.segment, samples=samples // share), wave=wave)
+    segment, of_grid = replace(stage.segment, samples=samples // share), (stage.grid.width, stage.oversampling)
+    bins, grid = _on_grid(bins.every(share), stage.aim.highest, *of_grid, stage.dtype)
+    return stage._replace(bins=bins, segment=segment, grid=grid, wave=wave)
 
 
 def _alone(tile: Tile, paths: Wavefronts, points: Floats, begin: Floats, stage: Stage) -> npt.NDArray[Any]:
@@ -147,8 +159,8 @@ def _alone(tile: Tile, paths: Wavefronts, points: Floats, begin: Floats, stage: 
     return field
 
 
-def _deposit(tile: Tile, paths: Wavefronts, points: Floats, stage: Stage) -> npt.NDArray[Any]:
-    """Field (1, node, bin) of a tile at its nodes, steered to its reference."""
+def _deposit(tile: Tile, paths: Wavefronts, points: Floats, begin: Floats, stage: Stage) -> npt.NDArray[Any]:
+    """Field (1, node, bin) of a tile at its nodes, steered to its reference, from the instant `begin` (1,) on, s."""
     from sonarsynth.signals.gridded.deposit_kernels import combine
 
     bins, grid, steering = stage.bins, stage.grid, Steering.at(points, tile.reference)
@@ -157,7 +169,7 @@ def _deposit(tile: Tile, paths: Wavefronts, points: Floats, stage: Stage) -> npt
     mode = np.array(tile.terms)[:, 3]
     response = responses(tile.modes.T[: mode.max() + 1], stage)
     _, pair = face_pairs(tile.terms)
-    table = _packed(paths, tile, bins.changes, (paths.delay - stage.origin) * (grid.circle * bins.step))
+    table = _packed(paths, tile, bins.changes, (paths.delay - stage.origin - begin) * (grid.circle * bins.step))
     hidden, group = paths.hidden(stage.aim.elements.count), max(1, LARGEST // (len(tile.terms) * grid.circle))
     for first in range(0, len(points), group):
         rows = slice(first, first + group)

@@ -73,6 +73,7 @@ class Stage(NamedTuple):
     origin: float  # s
     segment: Segment
     grid: Kernel  # that paths are deposited on
+    oversampling: float  # of that grid, at least
     wave: Kernel  # of time at twice the sampling rate, that hydrophones hear
     dtype: str
 

@@ -1,4 +1,4 @@
-"""What every tile that is tried looks at, compiled: the columns of its paths, and what they range over."""
+"""What every tile that is tried looks at, compiled: amplitudes by degree, and what columns of its paths range over."""
 
 from __future__ import annotations
 
@@ -7,19 +7,6 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.compiling import compiled
-
-
-@compiled
-def directions_at(direction: Any, curvature: Any, points: Any, out: Any) -> None:
-    """Write unit vectors of `array_paths.towards`, of paths with a direction (path, xyz) and a curvature (path,) at
-    points (point, xyz), into out (point * xyz, path)."""
-    for m in range(len(points)):
-        x, y, z = points[m]
-        for p in range(len(curvature)):
-            k = curvature[p]
-            vx, vy, vz = direction[p, 0] - k * x, direction[p, 1] - k * y, direction[p, 2] - k * z
-            n = np.sqrt(vx * vx + vy * vy + vz * vz)
-            out[3 * m, p], out[3 * m + 1, p], out[3 * m + 2, p] = vx / n, vy / n, vz / n
 
 
 @compiled

@@ -111,17 +111,14 @@ def _views(front: Wavefronts, aim: TileSettings, missed: bool) -> _Views:
 def _columns(front: Wavefronts, probes: Floats, gradient: Floats) -> Floats:
     """Columns of `_Views` of fronts; slownesses are -c times the gradient of delay: directions where rays are
     straight."""
-    from sonarsynth.signals.gridded.tile_kernels import directions_at
+    from sonarsynth.equations.kernels.unit_vectors import towards_sources
 
+    u, _ = towards_sources(front.direction, front.curvature, probes)
     terms = front.expansion.delay
-    given = [front.direction.T, front.curvature[None], front.loss[None], terms.T]
-    columns = np.concatenate([*given, np.empty((probes.size, front.count))])
-    slowness = columns[-probes.size :]
-    directions_at(front.direction, front.curvature, probes, slowness)
     if terms.shape[1]:
-        bent = np.einsum("et,ipt->pie", terms, gradient[:, :, : terms.shape[1]])
-        slowness -= front.sound_speed * bent.reshape(slowness.shape)
-    return columns
+        u -= front.sound_speed * np.einsum("et,ipt->pie", terms, gradient[:, :, : terms.shape[1]])
+    columns = [front.direction.T, front.curvature[None], front.loss[None], terms.T, u.reshape(-1, front.count)]
+    return np.concatenate(columns)
 
 
 class _Extent(NamedTuple):
