@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation
@@ -170,8 +172,10 @@ INDICES = (("/truth/beams", "target"), ("/cloud", "target"), ("/paths", "target"
 """Variables that are numbers of targets."""
 
 
+@lru_cache(maxsize=2)
 def which_values(plan: Plan) -> Values:
-    """What the bodies and emissions of a frame are, each along its own axis; `plan` is that of its sequence."""
+    """What the bodies and emissions of a frame are, each along its own axis; `plan` is that of its sequence, all frames
+    of which have these."""
     scene, recipe = plan.scene, plan.recipe
     targets, categories = scene.world.targets, recipe.categories
     sources = scene.world.sources

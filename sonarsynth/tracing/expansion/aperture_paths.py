@@ -74,7 +74,7 @@ class ExpansionSource:
 
     def of(self, block: slice) -> AperturePaths:
         """The wavefronts of some legs."""
-        legs = self.legs.select(block)
+        legs = self.legs if block == slice(0, len(self.legs.row)) else self.legs.select(block)
         count, aperture = len(legs.row), self.place.probe.aperture
         if self.plain:
             return AperturePaths(ArrayExpansion.none(count, aperture), legs, self.place, None, None)
