@@ -34,8 +34,8 @@ def isotropic() -> NoiseField:
     (text,) = re.findall(r"^```python file=environment/noise/isotropic_noise.py\n(.*?)^```", PAGE, re.S | re.M)
     module = sys.modules["isotropic_noise"] = ModuleType("isotropic_noise")
     exec(compile(text, "extending.md", "exec"), vars(module))
-    del sys.modules["isotropic_noise"]
     found: NoiseField = module.IsotropicNoise(level=120.0)
+    del sys.modules["isotropic_noise"]
     return found
 
 
