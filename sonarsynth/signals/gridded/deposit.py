@@ -136,9 +136,9 @@ def _hear(
 
 def _shorter(stage: Stage, length: int) -> Stage:
     """A stage of a stretch that holds no more than `length` samples, where that is a part of it: of fewer bins."""
-    share, bins, samples = 1, stage.bins, stage.segment.samples
-    while samples % (4 * share) == 0 and samples // (2 * share) >= length and bins.frequency.size >= 16 * share:
-        share *= 2
+    bins, samples = stage.bins, stage.segment.samples
+    most = max(min(samples // length, bins.frequency.size // 8), 1)
+    share = max(n for n in range(1, most + 1) if n == 1 or samples % (2 * n) == 0)
     if share == 1:
         return stage
     wave = kernel(stage.wave.width, samples * bins.step / stage.aim.highest, 2 * samples // share, stage.dtype)
