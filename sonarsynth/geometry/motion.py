@@ -223,6 +223,8 @@ class Track:
     def later(self, seconds: float) -> Track:
         """The same so many seconds (s) after, or before."""
         time = self.time + seconds
+        if self.still:
+            return Track(self.pose, self.velocity, self.motion, time, self.offset)
         if self.motion is None:
             moved = Pose(self.pose.position + self.velocity * seconds, self.pose.orientation)
             return Track(moved, self.velocity, None, time, self.offset)
