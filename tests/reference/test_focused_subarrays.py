@@ -17,7 +17,6 @@ from tests.dense import dense_energies
 
 SPEED = 1540.0
 BAND = Band(low=25e3, high=85e3)
-FREQUENCIES = np.linspace(25e3, 85e3, 61)
 ROMANIS = Romanis(dead=(3, 200, 201, 202))
 RECTANGLE = PlanarLattice(columns=20, rows=8, pitch=0.04)
 
