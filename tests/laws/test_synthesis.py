@@ -206,6 +206,18 @@ def test_kernel_deposit_is_the_exact_sum(distance: float, refracted: bool) -> No
     assert got.pressure.dtype == np.float32
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+@pytest.mark.parametrize("refracted", [False, True])
+def test_few_hydrophones_hear_as_exactly_as_many(count: int, refracted: bool) -> None:
+    """Fewer than the terms that wavefronts and amplitudes are expanded in."""
+    array = FACES.select(np.linspace(7, FACES.count - 1, count).astype(int))
+    of = target_at(20.0, 40, 2, refracted=refracted, direct=False)
+    start, samples = window(of, SONAR, FACES)
+    exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    got = GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    assert error(got.pressure, exact) < 1e-4
+
+
 def test_nodes_over_the_aperture_serve_the_whole_array() -> None:
     """Enough paths that nodes pay: 508 hydrophones interpolated from some tens of points, the direct snap apart."""
     of = target_at(20.0, 500, 3)
