@@ -27,7 +27,7 @@ def _one_or_several(value: object) -> str:
 ONE_OR_SEVERAL: Any = Discriminator(_one_or_several)
 """Annotation of a union of one (`Tag("one")`) and a tuple of such (`Tag("several")`)."""
 
-_CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True, defer_build=True)
+_CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True)
 
 T = TypeVar("T")
 
