@@ -20,13 +20,11 @@ class Columns:
         """The rows picked by a mask, by indices, or by a slice, which copies nothing."""
         if isinstance(keep, slice) and keep == slice(None):
             return self
-        rows: Any = keep if isinstance(keep, slice) else np.asarray(keep)
-        rows = rows if isinstance(keep, slice) or rows.dtype != bool else np.flatnonzero(rows)
-        columns, values, copied = dict[str, Any](), vars(self), not isinstance(rows, slice)
+        rows, columns, values = _indices(keep), dict[str, Any](), vars(self)
         for name in self.__dataclass_fields__:  # type: ignore[attr-defined]  # of the dataclass that it is a base of
             value = values[name]
             if isinstance(value, np.ndarray):
-                value = value.take(rows, axis=0) if copied and value.strides[0] else rows_of(value, rows)
+                value = _taken(value, rows)
             elif isinstance(value, Columns):
                 value = value.select(rows)
             columns[name] = value
@@ -42,10 +40,20 @@ def picked(mask: Bools) -> Ints | slice:
 def rows_of(column: np.ndarray, keep: Bools | Ints | Sequence[int] | slice) -> np.ndarray:
     """The rows of a column (row, ...) that a mask, indices or a slice pick; wide ones are copied whole, to be fast. Of
     one value for all nothing is copied."""
+    return _taken(column, _indices(keep))
+
+
+def _indices(keep: Bools | Ints | Sequence[int] | slice) -> Ints | slice:
+    """Indices of the rows that are picked; a slice stays one."""
     if isinstance(keep, slice):
-        return column[keep]
+        return keep
     rows = np.asarray(keep)
-    rows = np.flatnonzero(rows) if rows.dtype == bool else rows
+    return np.flatnonzero(rows) if rows.dtype == bool else rows
+
+
+def _taken(column: np.ndarray, rows: Ints | slice) -> np.ndarray:
+    if isinstance(rows, slice):
+        return column[rows]
     if column.strides[0] == 0 and len(rows) <= len(column):
         return column[: len(rows)]
     return column.take(rows, axis=0)

@@ -54,22 +54,29 @@ def to_images(length: Floats, departure: Floats, mirrored: Bools, offset: Floats
     return out
 
 
+@compiled(forceinline=True)
+def _put_turned(x: float, y: float, z: float, turn: Floats, rotation: Floats, out: Floats) -> None:
+    """Put in out (axis,) the unit vector along x, y, z, turned back by small angles (xyz,) rad, in axes with this
+    rotation (xyz, axis)."""
+    tx, ty, tz = turn[0], turn[1], turn[2]
+    x, y, z = x - (ty * z - tz * y), y - (tz * x - tx * z), z - (tx * y - ty * x)
+    far = math.sqrt(x * x + y * y + z * z)
+    x, y, z = x / far, y / far, z / far
+    for n in range(3):
+        out[n] = rotation[0, n] * x + rotation[1, n] * y + rotation[2, n] * z
+
+
 @compiled
 def moved(length: Floats, away: Floats, apart: Floats, turn: Floats, rotation: Floats) -> Floats:
     """Unit vectors (leg, place, xyz) of length (leg,) times away (leg, place, xyz) plus apart (leg, xyz), turned back
     by small angles (leg, xyz) rad, in axes with this rotation (xyz, axis)."""
     out = np.empty(away.shape)
     for i in range(away.shape[0]):
-        tx, ty, tz = turn[i, 0], turn[i, 1], turn[i, 2]
         for j in range(away.shape[1]):
             x = length[i] * away[i, j, 0] + apart[i, 0]
             y = length[i] * away[i, j, 1] + apart[i, 1]
             z = length[i] * away[i, j, 2] + apart[i, 2]
-            x, y, z = x - (ty * z - tz * y), y - (tz * x - tx * z), z - (tx * y - ty * x)
-            far = math.sqrt(x * x + y * y + z * z)
-            x, y, z = x / far, y / far, z / far
-            for n in range(3):
-                out[i, j, n] = rotation[0, n] * x + rotation[1, n] * y + rotation[2, n] * z
+            _put_turned(x, y, z, turn[i], rotation, out[i, j])
     return out
 
 
@@ -80,15 +87,10 @@ def to_moved_images(
     """As `to_images`, of places that are farther by apart (leg, xyz), turned back and in axes as of `moved`."""
     out = np.empty((len(length), len(offset), 3))
     for i in range(len(length)):
-        tx, ty, tz = turn[i, 0], turn[i, 1], turn[i, 2]
         for j in range(len(offset)):
             up = -offset[j, 2] if mirrored[i] else offset[j, 2]
             x = length[i] * departure[i, 0] + offset[j, 0] + apart[i, 0]
             y = length[i] * departure[i, 1] + offset[j, 1] + apart[i, 1]
             z = length[i] * departure[i, 2] + up + apart[i, 2]
-            x, y, z = x - (ty * z - tz * y), y - (tz * x - tx * z), z - (tx * y - ty * x)
-            far = math.sqrt(x * x + y * y + z * z)
-            x, y, z = x / far, y / far, z / far
-            for n in range(3):
-                out[i, j, n] = rotation[0, n] * x + rotation[1, n] * y + rotation[2, n] * z
+            _put_turned(x, y, z, turn[i], rotation, out[i, j])
     return out
