@@ -15,9 +15,11 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
+import llvmlite.binding as llvm
 import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache
+from numba.core.codegen import JITCodeLibrary
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import cpu_target
 from numba.core.runtime.nrt import rtsys
@@ -96,4 +98,33 @@ class _ByFastMath(dict[Any, Any]):
         return key, frozenset(ConfigStack().top().fastmath.flags)
 
 
+class _Library(JITCodeLibrary):
+    """Code of a kernel, that was read from the cache without the form of it that other kernels are compiled from: numba
+    reads both, and one after the other takes more than half of the time that loading takes."""
+
+    _bitcode: bytes | None = None
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: Any) -> Any:
+        name, _, (machine_code, bitcode) = state
+        library = codegen.create_library(name)
+        library._bitcode = bitcode
+        library.enable_object_caching()
+        library._set_compiled_object(machine_code)
+        library._finalize_final_module()
+        return library
+
+    def get_pointer_to_function(self, name: str) -> Any:
+        """Where a function of this library is, 0 if it has none of that name."""
+        if self._bitcode is not None:
+            return self._codegen._engine.get_function_address(name)
+        return super().get_pointer_to_function(name)  # type: ignore[no-untyped-call]
+
+    def _get_module_for_linking(self) -> Any:
+        if self._bitcode is not None and self._shared_module is None:
+            self._shared_module = llvm.parse_bitcode(self._bitcode)
+        return super()._get_module_for_linking()  # type: ignore[no-untyped-call]
+
+
 cpu_target.target_context.cached_internal_func = _ByFastMath()
+cpu_target.target_context.codegen()._library_class = _Library

@@ -33,13 +33,11 @@ if __name__ == "__main__":
 
 @pytest.fixture
 def product(tmp_path: Path):  # type: ignore[no-untyped-def]
-    (tmp_path / "caller.py").write_text(CALLER)
-
-    def value(factor: float, term: float) -> list[float]:
-        called = tmp_path / "called.py"
-        text = CALLED.format(factor=factor, term=term)
-        if not called.exists() or called.read_text() != text:
-            called.write_text(text)
+    def value(factor: float, term: float, caller: str = CALLER) -> list[float]:
+        for name, text in (("called.py", CALLED.format(factor=factor, term=term)), ("caller.py", caller)):
+            file = tmp_path / name
+            if not file.exists() or file.read_text() != text:
+                file.write_text(text)
         # -B: Python itself does not see a file change within a second
         run = subprocess.run(
             [sys.executable, "-B", "caller.py"], cwd=tmp_path, check=True, capture_output=True, text=True
@@ -54,6 +52,8 @@ def test_what_a_kernel_calls_and_the_constants_it_takes_are_those_of_today(produ
     assert product(2.0, 1.0) == [4.0, 1], "it is cached"
     assert product(2.0, 9.0) == [20.0, 0], "what is called two calls down has changed"
     assert product(3.0, 9.0) == [30.0, 0], "a constant has changed"
+    halved = CALLER.replace("FACTOR *", "0.5 * FACTOR *")
+    assert product(3.0, 9.0, halved) == [15.0, 0], "it is compiled from what is read from the cache"
 
 
 def test_kernels_are_compiled_in_this_one_way() -> None:
