@@ -18,7 +18,7 @@ from typing import Any, TypeVar, overload
 import llvmlite.binding as llvm
 import numpy as np
 from numba import njit
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import cpu_target
@@ -47,8 +47,19 @@ def compiled(function: Any = None, /, **options: Any) -> Any:
     return kernel
 
 
+class _Kept(CompileResultCacheImpl):
+    """What is kept of compiled code: without the modules of numba's own functions that it calls, which only handling
+    Python objects would need, and which take longer to import than the code to load."""
+
+    def reduce(self, result: Any) -> tuple[Any, ...]:
+        *code, modules = super().reduce(result)  # type: ignore[no-untyped-call]
+        return *code, tuple(module for module in modules if not module.globals["__name__"].startswith("numba."))
+
+
 class _Cache(FunctionCache):
     """Compiled code by the types of its arguments, the processor, and the code that it was made of."""
+
+    _impl_class = _Kept
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was compiled, or None. Numba first reads all that it can compile (0.2 s), as compiling does by itself;
