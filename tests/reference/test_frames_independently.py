@@ -21,6 +21,7 @@ from sonarsynth.targets.target import Target
 from sonarsynth.validation.rays.ray_matching import Rays, rays_of
 from sonarsynth.validation.references.frames.frame_pressure import FramePressure
 from sonarsynth.validation.references.frames.line_of_sight import Surface
+from sonarsynth.validation.references.frames.path_sum import Contributions, transfer
 from sonarsynth.validation.references.rays.layered_rays import families, rays
 from sonarsynth.validation.references.rays.layers_crossed import Water
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
@@ -142,3 +143,17 @@ def test_a_line_of_sight_is_cut_by_any_triangle_and_by_no_sphere_around_it() -> 
     found = Surface.of(corners).between(start, end)
     np.testing.assert_array_equal(found, inside.any(axis=1))
     assert 20 < found.sum() < 380
+
+
+def test_at_the_lowest_of_frequencies_faces_hear_as_points() -> None:
+    count, at = 5, np.random.default_rng(1)
+    paths = Contributions(
+        time=at.random(count),
+        size=at.normal(size=count) + 1j * at.normal(size=count),
+        longer=np.zeros(count),
+        length=np.zeros((count, 3)),
+        delay_std=np.zeros(count),
+        face=1e-6 * at.normal(size=(count, 2)),
+    )
+    found = transfer(paths, np.ones((count, 1)), 0.0, 1.0, 0, np.zeros((2, 3)))[0]
+    np.testing.assert_allclose(found, [paths.size.sum(), paths.size @ np.exp(-2j * np.pi * paths.time)], rtol=1e-9)

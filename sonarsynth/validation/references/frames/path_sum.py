@@ -106,9 +106,9 @@ def _sum(delay, size, weight, length, delay_std, face, step, first, loss, invers
             gain, ratio = np.exp(-low), np.exp((low - high) / max(end - 1 - block, 1))
             for k in range(block, end):
                 value = gain
-                if not flat_y:
+                if not flat_y and first + k > 0:
                     value *= y.imag * inverse[k] / face[n, 0]
-                if not flat_z:
+                if not flat_z and first + k > 0:
                     value *= z.imag * inverse[k] / face[n, 1]
                 real, imaginary = phasor.real * value, phasor.imag * value
                 for m in range(nodes):
