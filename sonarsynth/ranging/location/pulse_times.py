@@ -28,10 +28,11 @@ PERIODS = 2.0
 """The same in units of the inverse of the bandwidth, where that is more."""
 HOLLOW = 0.02
 """Power of a bin over the loudest, times the taper of the band, below which faces have a null in the band: there the
-waveform holds much more of what cutting the pulse's tail off adds. Its peak erred by up to 76 ns (5 cm, 30 to 46 deg)
+waveform holds much more of what cutting the pulse's tail off adds. Its peak erred by up to 76 ns (5 cm, 30 to 46 deg),
+88 ns (4.2 cm, 70 deg), and in bands of 2.4 kHz, whose pulses last long, by 3 us
 """
-LONGER = 2.0
-"""and by under 1 ns as measured over a window so many times as long."""
+LONGER = 3.0
+"""and by under 1 ns, 1 ns and 40 ns as measured over a window so many times as long."""
 DEAF = 1e-4
 """Mean square response (of one sensor on its axis) below which a bin counts as not heard at all."""
 DEAFEST = 1e-8
@@ -39,8 +40,12 @@ DEAFEST = 1e-8
 QUIET = 2.0
 """The mean power while a pulse passes over the array must exceed that of the quiet by this factor."""
 FLOOR = 1e-9
-"""Standard error (s) of a lag without any noise: what cutting the pulse's tail off does. Biases of 0.01 to 0.2 ns of
+"""Standard error (s) of a lag without any noise: what cutting the pulse's tail off does, by windows of `PULSE_HALF`; by
+longer ones, of pulses that last longer, as much more. Biases of 0.01 to 0.2 ns of
 curvature at the rim have been seen, which is what independent errors six times as large would leave."""
+FINE = 256
+"""Samples of an envelope at least: at the 18 of a band of 3 kHz peaks err by 5 us, more than aligning can undo; and
+where there are two, which is the higher follows from where samples fall."""
 BESIDE = 4
 """Sensors that count as the neighbours of one: as many as it has on a lattice."""
 
@@ -134,11 +139,12 @@ def excerpt(signals: Signals, centre: float, half: float) -> tuple[npt.NDArray[n
 def envelope_peaks(cut: npt.NDArray[np.float32], rate: float, band: Band) -> tuple[Floats, Floats]:
     """Time after the first sample (s) and relative height of the envelope's peak at each sensor, in band.
 
-    The band is moved to zero frequency and sampled twice as fast as it needs; a parabola finds the top.
+    The band is moved to zero frequency and sampled twice as fast as it needs, `FINE` times at least; a parabola finds
+    the top.
     """
     count = next_fast_len(cut.shape[1], real=True)
     base = rfft(cut, count, axis=1)[:, in_band(_frequencies(count, rate), band)]
-    short = next_fast_len(2 * base.shape[1])
+    short = next_fast_len(max(2 * base.shape[1], FINE))
     wave = ifft(base, short, axis=1)
     power = wave.real**2 + wave.imag**2
     top = np.clip(power.argmax(axis=1), 1, short - 2)
@@ -247,14 +253,14 @@ def measure(
     return Pulse(aligned.frequency, wave.template, time, lag, weight, 2 * noise / dof, wave.power, share, None, deaf)
 
 
-def lag_variance(wave: Wavefront, pulse: Pulse, elements: Elements, rounding: float) -> float:
+def lag_variance(wave: Wavefront, pulse: Pulse, elements: Elements, rounding: float, half: float = PULSE_HALF) -> float:
     """Variance of a lag of weight one: the larger of what the lags show and of the Cramer-Rao bound for the noise seen.
 
     What lags show over `FLOOR`, which allows for that, is taken times `correlated_error_factor`. The noise is not taken
-    below that of `rounding`, (Pa s)^2 in a bin.
+    below that of `rounding`, (Pa s)^2 in a bin. half (s): of the windows that pulses were cut out by.
     """
     count = int(np.sum(pulse.weight > 0))
-    least = FLOOR**2 * float(np.sum(pulse.weight)) / max(count, 1)
+    least = (FLOOR * half / PULSE_HALF) ** 2 * float(np.sum(pulse.weight)) / max(count, 1)
     shown = float(pulse.weight @ wave.residual**2) / max(count - 4, 1)
     if shown > least and np.count_nonzero(elements.gain) > 2:
         error = np.sqrt(pulse.weight) * wave.residual

@@ -12,7 +12,7 @@ from sonarsynth.conventions import Floats, azimuth_elevation
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, envelope_peak
 from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS, SourceEstimates
-from sonarsynth.ranging.location.pulse_times import Pulse, lag_variance
+from sonarsynth.ranging.location.pulse_times import Pulse, half_length, lag_variance
 from sonarsynth.receiver import Elements, Sonar
 
 AGREES = 9.0
@@ -113,7 +113,7 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
     """
     elements, sonar, pose = knowledge.elements, knowledge.sonar, knowledge.pose
     bent = bent or wave
-    timing = lag_variance(wave, pulse, elements, knowledge.rounding) * wave.covariance
+    timing = lag_variance(wave, pulse, elements, knowledge.rounding, half_length(sonar.band)) * wave.covariance
     fall = -knowledge.bottom_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
     slope, by_angle = float(pose.rotation[2] @ wave.direction), wave.tangents @ pose.rotation[2]
     from_depth = fall / slope if slope * fall > 0 else np.nan
