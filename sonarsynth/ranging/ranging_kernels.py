@@ -8,10 +8,6 @@ import numpy as np
 
 from sonarsynth.compiling import compiled
 
-UNLIKE = 1e-3
-"""Share of a pulse that is not explained, from which on sensors are asked for gains of their own: 0.3 dB of them make
-as much."""
-
 
 @compiled
 def _row(pressure: Any, rows: Any, number: int, silent: Any) -> Any:
@@ -181,39 +177,24 @@ def common_wave(
 
 
 @compiled
-def beyond_gains(spectrum: Any, response: Any, template: Any) -> tuple[float, float]:
-    """What the model of `lag_sums` does not explain of a pulse, each sensor with the gain that suits it best; and the
-    power of the pulse, both (Pa s)^2 summed over sensors and bins.
-    """
-    power = explained = 0.0
-    for q in range(len(spectrum)):
-        along = loud = 0.0
-        for k in range(len(template)):
-            m, p = response[q, k] * template[k], spectrum[q, k]
-            along += m.real * p.real + m.imag * p.imag
-            loud += m.real**2 + m.imag**2
-            power += p.real**2 + p.imag**2
-        if along > 0.0:
-            explained += along**2 / loud
-    return power - explained, power
-
-
-@compiled
 def lag_sums(spectrum: Any, response: Any, template: Any, omega: Any) -> Any:
     """Sums over bins for each sensor (sensor,), with the model M = response * template and the rest R = spectrum - M:
 
-    omega Im(M conj R), |omega M|^2 and |R|^2; spectrum, response (sensor, bin); template, omega (bin,).
+    omega Im(M conj R), |omega M|^2, |R|^2 and Im(M conj R)^2/|M|^2, what is out of phase; spectrum, response (sensor,
+    bin); template, omega (bin,).
     """
     sensors, bins = spectrum.shape
-    slope, weight, residual = np.zeros(sensors), np.zeros(sensors), np.zeros(sensors)
+    slope, weight, residual, across = np.zeros(sensors), np.zeros(sensors), np.zeros(sensors), np.zeros(sensors)
     for q in range(sensors):
         for k in range(bins):
             m = response[q, k] * template[k]
             r = spectrum[q, k] - m
-            slope[q] += omega[k] * (m.imag * r.real - m.real * r.imag)
-            weight[q] += omega[k] ** 2 * (m.real**2 + m.imag**2)
+            turn, loud = m.imag * r.real - m.real * r.imag, m.real**2 + m.imag**2
+            slope[q] += omega[k] * turn
+            weight[q] += omega[k] ** 2 * loud
             residual[q] += r.real**2 + r.imag**2
-    return slope, weight, residual
+            across[q] += turn**2 / loud if loud > 0.0 else 0.0
+    return slope, weight, residual, across
 
 
 @compiled

@@ -199,6 +199,39 @@ def test_the_predicted_error_of_a_time_is_what_it_errs_by() -> None:
     assert np.max(np.abs(off)) < 4.0
 
 
+@pytest.mark.parametrize("lasts", [2e-4, 5e-4, 1e-3, 5e-3])
+def test_a_tone_that_lasts_errs_by_what_is_predicted_or_is_none(lasts: float) -> None:
+    """Whether it is longer than the window of a snap or not: in noise by as much, without by no more than what single
+    precision and the end of a window do (`FLOOR`, of lags). One too long to tell its periods apart is no snap."""
+    deviation, sonar = lasts / 2.355, Sonar(array=WIDE, assumed_sound_speed=C, sound_speed_error=0.0)
+    heard, off, errors = elements(WIDE), {0.0: [], 1e-3: []}, []
+    random = np.random.default_rng(5)
+    for noise in 8 * tuple(off):
+        source = random.uniform(6.0, 25.0) * direction(random.uniform(-0.45, 0.45), random.uniform(-0.6, -0.2))
+        distance, way = np.linalg.norm(source), np.linalg.norm(source - heard.position, axis=1)
+        samples = 2 * int((4.0 * deviation + 2e-3) * RATE)
+        start, f = round(distance / C * RATE - 0.5 * samples) / RATE, np.fft.rfftfreq(samples, 1 / RATE)
+        sine = heard.face / C * (source - heard.position) / way[:, None]
+        wave = RATE * deviation * np.exp(-2.0 * (np.pi * deviation * (f - 50e3)) ** 2 - 2j * np.pi * f * -start)
+        face = np.sinc(f * sine[:, 1:2]) * np.sinc(f * sine[:, 2:]) * (distance / way)[:, None]
+        pressure = np.fft.irfft(wave * face * np.exp(-2j * np.pi * f * way[:, None] / C), samples, axis=1)
+        signals = add_noise(Signals(pressure.astype(np.float32), start, RATE, 0.0, 0, 0), noise, random)
+        method = SensorDelays(on_bottom=False)
+        found = method.locate(signals, Receiver(POSE, heard, sonar), Survey(80.0, WATER), 1)
+        if np.isfinite(found.time[0]):
+            predicted = np.array([found.azimuth_error[0], found.elevation_error[0], found.time_error[0]])
+            azimuth, elevation = azimuth_elevation(source)
+            missed = [found.azimuth[0] - azimuth, found.elevation[0] - elevation, found.time[0] - distance / C]
+            off[noise].append(np.array(missed) / predicted)
+            errors.append(predicted if noise == 0.0 else [])
+    if lasts > 2e-3:
+        assert not off[0.0] and not off[1e-3]
+        return
+    assert len(off[0.0]) == 8 and len(off[1e-3]) >= 4
+    assert 0.6 < np.sqrt(np.mean(np.square(off[1e-3]))) < 1.5
+    assert np.max(np.abs(off[0.0])) < 2.0 and np.max([row[:2] for row in errors if len(row)]) < 2e-6
+
+
 @pytest.mark.parametrize(("alike", "most"), [(0.0, 1.1), (0.5, 1.15)])
 def test_the_more_alike_neighbours_err_the_larger_errors_are_predicted(alike: float, most: float) -> None:
     """Delays of a sphere with errors that correlate by `alike` from row to row and from column to column."""

@@ -127,10 +127,11 @@ def test_lags_and_templates_are_the_sums_of_their_formulas():
     np.testing.assert_allclose(power, np.sum(response**2, axis=0), rtol=1e-12)
     model = response * (total / power)
     rest = heard - model
-    slope, weight, unexplained = ranging_kernels.lag_sums(heard, response, total / power, omega)
+    slope, weight, unexplained, across = ranging_kernels.lag_sums(heard, response, total / power, omega)
     np.testing.assert_allclose(slope, np.imag(model * rest.conj()) @ omega, atol=1e-12)
     np.testing.assert_allclose(weight, np.abs(model) ** 2 @ omega**2, rtol=1e-12)
     np.testing.assert_allclose(unexplained, np.sum(np.abs(rest) ** 2, axis=1), rtol=1e-12)
+    np.testing.assert_allclose(across, np.sum(np.imag(rest / (model / np.abs(model))) ** 2, axis=1), rtol=1e-12)
 
 
 def test_the_loudest_near_is_the_loudest_of_all_pairs():

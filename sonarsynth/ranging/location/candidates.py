@@ -16,10 +16,14 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Bools, Floats
 from sonarsynth.geometry import Pose
+from sonarsynth.products import Signals
+from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location.source_position import ACCEPTED, ECHO, RANGE, SonarKnowledge, SourceFix, refused
+from sonarsynth.receiver import Band
 
 SIGMAS = 4.0
 """Standard errors within which a curvature, a direction and a time may be those of an echo."""
@@ -35,6 +39,34 @@ BOUNCES = 2
 """Reflections at surface and bottom after which sound may still meet a body."""
 FAR = 1e7
 """m: taken for the distance of a source whose range is not known."""
+QUIET = 2.0
+"""The mean power while a pulse passes over the array must exceed that of the quiet by this factor."""
+
+
+@dataclass(frozen=True, eq=False)
+class PowerTrack:
+    """How loud the signals are, all live sensors together."""
+
+    track: Floats  # (sample,) Pa2: mean power, summed over sensors, in a window about the sample
+    quiet: float  # Pa2: the same where nothing is heard
+    peak: float  # Pa: the largest |pressure|
+
+
+def loudness(signals: Signals, live: Bools, length: int) -> PowerTrack:
+    """Power in a sliding window of `length` samples, in quiet, and the peak.
+
+    The quiet power is the tenth part from below of short means: a snap and its echoes fill no more of the signals.
+    """
+    power, peak = ranging_kernels.power_and_peak(signals.pressure, live)
+    track = uniform_filter1d(power, min(length, len(power)), mode="constant")
+    tenth = len(power) // 10
+    quiet = np.sort(uniform_filter1d(power, min(16, len(power))))[tenth]  # NumPy's `partition` takes ten times as long
+    return PowerTrack(np.maximum(track, 0.0), float(max(quiet, 0.0)), peak)
+
+
+def quiet_bin(quiet: float, live: int, band: Band, half: float) -> float:
+    """Mean power in a bin, (Pa s)^2, of noise at a sensor, at most: `quiet` (Pa2) of `live` sensors, in the band."""
+    return quiet / max(live, 1) * half / (band.high - band.low)
 
 
 class Candidate(NamedTuple):

@@ -12,8 +12,8 @@ from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, robust_wave, spherical_wave, wavefront_delays
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.location.candidates import Candidate, Candidates
-from sonarsynth.ranging.location.pulse_times import Pulse
+from sonarsynth.ranging.location.candidates import QUIET, Candidate, Candidates, loudness, quiet_bin
+from sonarsynth.ranging.location.pulse_times import AlignedPulse, Pulse
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
     ARRAY,
@@ -44,6 +44,9 @@ SHARED = 0.05
 """Share of a pulse's power at the sensors that its wavefront may leave unexplained, unless it is the noise's own:"""
 AUDIBLE = 4.0
 """no more than this factor over the power of the quiet."""
+PERIODS_OFF = 1 / 6
+"""Standard error of the first fit, root mean square over the sensors, in periods of a tone: with more, a sensor may be
+taken a whole period early or late, and the pulse to come from a grating lobe."""
 MAX_LAG = 0.15
 """A pulse whose lags exceed this share of a period (root mean square, band centre) is not one wavefront."""
 
@@ -97,9 +100,9 @@ def locate(
     live = elements.gain != 0
     half = pulse_times.transit(elements, sonar.assumed_sound_speed) + 2 * pulse_times.half_length(sonar.band)
     width = int(2 * half * signals.sampling_frequency) | 1
-    loud = pulse_times.loudness(signals, live, width)
+    loud = loudness(signals, live, width)
     rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
-    quiet = pulse_times.quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
+    quiet = quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
     velocity = np.zeros(3) if receiver.track is None else receiver.pose.turn_to_body(receiver.track.velocity)
     knowledge = SonarKnowledge(
         elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, bottom_reflects, velocity
@@ -107,7 +110,7 @@ def locate(
     track, candidates = loud.track.copy(), Candidates(knowledge)
     for _ in range(4 * snaps):
         top = _loudest(track, candidates, signals, snaps)
-        if top is None or not track[top] > pulse_times.QUIET * loud.quiet:
+        if top is None or not track[top] > QUIET * loud.quiet:
             break
         centre = signals.start + top / signals.sampling_frequency
         candidates.found.append(Candidate(centre, float(track[top]), candidate(signals, knowledge, centre, half, bend)))
@@ -131,6 +134,8 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
     if isinstance(fitted, int):
         return refused(fitted)
     wave, pulse, elements = fitted
+    longer = max(round(0.5 * pulse.window / pulse_times.half_length(sonar.band)), 1)  # so much more noise is in a bin
+    knowledge = replace(knowledge, rounding=longer * knowledge.rounding, quiet=longer * knowledge.quiet)
     if pulse.share > SHARED and pulse.noise > AUDIBLE * knowledge.quiet:
         return refused(UNRESOLVED)
     row = _placed(wave, pulse, elements, knowledge, bend)
@@ -177,19 +182,24 @@ def fit_pulse(
     Envelope peaks of the sensors give eq. 6 in closed form, then the sphere, robustly; then the sensors are aligned
     and their lags measured coherently, until these settle.
     """
-    c, q, still = sonar.assumed_sound_speed, elements.position, not velocity.any()
-    wave = _first_wave(signals, elements, sonar, centre, half, velocity)
-    if wave is None:
+    first = _first_wave(signals, elements, sonar, centre, half, velocity)
+    if first is None:
         return UNFIT
-    rest, aligned = elements, None
+    c, q, rest, aligned, longer, (wave, off) = sonar.assumed_sound_speed, elements.position, elements, None, 1.0, first
     for _ in range(ROUNDS):
-        if not still:
+        if velocity.any():
             q = rest.position + np.outer(_times(wave, q, c) - wave.time, velocity)
             elements = replace(rest, position=q)
         expected = _times(wave, q, c)
-        if aligned is None or np.abs(expected - aligned.time).max() > ASIDE * pulse_times.half_length(sonar.band):
-            aligned = pulse_times.align(signals, elements, sonar.band, expected)
+        aside = ASIDE * longer * pulse_times.half_length(sonar.band)
+        if aligned is None or np.abs(expected - aligned.time).max() > aside:
+            aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=longer)
         pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
+        if pulse.lasts:
+            whole = _whole(signals, elements, sonar, wave)
+            if whole is None:
+                return BAND
+            aligned, pulse, longer = whole
         better = fit_wave(expected + pulse.lag, q, c, pulse.weight, wave, 1)
         if better is None:
             return UNFIT
@@ -199,28 +209,49 @@ def fit_pulse(
     rms = np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum())
     if not rms < MAX_LAG / sonar.band.centre:
         return UNFIT
+    if pulse.one_tone(SHARED) and not off < PERIODS_OFF / sonar.band.centre:
+        return UNRESOLVED
     if pulse.hollow or pulse_times.half_length(sonar.band) > pulse_times.PULSE_HALF:
-        aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=pulse_times.LONGER)
+        aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=longer * pulse_times.LONGER)
         deaf = pulse.noise_to_signal
-        longer = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time, deaf)
-        pulse = replace(pulse, longer=longer)
+        again = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time, deaf)
+        pulse = replace(pulse, longer=again)
     return wave, pulse, elements
 
 
 def _first_wave(
     signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats
-) -> Wavefront | None:
-    """Wavefront through the envelope peaks of the sensors, as of `fit_pulse`; None where none fits."""
-    c, q = sonar.assumed_sound_speed, elements.position
+) -> tuple[Wavefront, float] | None:
+    """Wavefront through the envelope peaks of the sensors, as of `fit_pulse`, and the standard error (s) of its times,
+    root mean square over the sensors; None where none fits."""
+    c, q, live = sonar.assumed_sound_speed, elements.position, elements.gain != 0
     cut, start = pulse_times.excerpt(signals, centre, half)
     delay, height = pulse_times.envelope_peaks(cut, signals.sampling_frequency, sonar.band)
-    loud = height**2 * (elements.gain != 0)  # who hears more counts more
+    loud = height**2 * live  # who hears more counts more
     times, settled = start + delay, pulse_times.FLOOR
     wave = robust_wave(times, q, c, loud, steps=FIRST_STEPS, rounds=ROBUST_ROUNDS, settled=settled)
-    if wave is None or not velocity.any():
-        return wave
-    passing = _times(wave, q, c)
-    return fit_wave(passing, q + np.outer(passing - wave.time, velocity), c, loud, wave)
+    if wave is None:
+        return None
+    off = 1.4826 * float(np.median(np.abs(wave.residual[live]))) * float(np.sqrt(4.0 / np.count_nonzero(live)))
+    if velocity.any():
+        passing = _times(wave, q, c)
+        wave = fit_wave(passing, q + np.outer(passing - wave.time, velocity), c, loud, wave)
+    return None if wave is None else (wave, off)
+
+
+def _whole(
+    signals: Signals, elements: Elements, sonar: Sonar, wave: Wavefront
+) -> tuple[AlignedPulse, Pulse, float] | None:
+    """A pulse that lasts longer than a snap, in a window so many times as long that holds it; None where none does."""
+    c, longer = sonar.assumed_sound_speed, pulse_times.LONGER
+    while longer * pulse_times.half_length(sonar.band) <= pulse_times.LONGER * pulse_times.LONGEST_HALF:
+        expected = _times(wave, elements.position, c)
+        aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=longer)
+        pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
+        if not pulse.lasts:
+            return aligned, pulse, longer
+        longer *= pulse_times.LONGER
+    return None
 
 
 def fit_wave(

@@ -7,8 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.fft import ifft, irfft, next_fast_len, rfft
-from scipy.ndimage import uniform_filter1d
+from scipy.fft import fftfreq, ifft, irfft, next_fast_len, rfft
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.arrays.correlated_errors import correlated_error_factor
@@ -26,6 +25,9 @@ LONGEST_HALF = 2e-3
 """The same at most (s): bands whose pulses last longer tell no direct pulse from its echoes."""
 PERIODS = 2.0
 """The same in units of the inverse of the bandwidth, where that is more."""
+CUT = 0.1
+"""Of the peak of the envelope: what is louder where the window falls is a pulse that lasts longer, whose time and whose
+lags would be in part those of the window: it is looked at in one twice as long."""
 HOLLOW = 0.02
 """Power of a bin over the loudest, times the taper of the band, below which faces have a null in the band: there the
 waveform holds much more of what cutting the pulse's tail off adds. Its peak erred by up to 76 ns (5 cm, 30 to 46 deg),
@@ -37,8 +39,6 @@ DEAF = 1e-4
 """Mean square response (of one sensor on its axis) below which a bin counts as not heard at all."""
 DEAFEST = 1e-8
 """The same where there is no noise: single precision."""
-QUIET = 2.0
-"""The mean power while a pulse passes over the array must exceed that of the quiet by this factor."""
 FLOOR = 1e-9
 """Standard error (s) of a lag without any noise: what cutting the pulse's tail off does, by windows of `PULSE_HALF`; by
 longer ones, of pulses that last longer, as much more. Biases of 0.01 to 0.2 ns of
@@ -59,50 +59,39 @@ class Pulse:
     time: float  # s at the array centre to which the template refers
     lag: Floats  # (sensor,) s: delay of each sensor after the wavefront
     weight: Floats  # (sensor,) (Pa s/s)^2: sum over bins of |2 pi f M|^2, inverse variance of a lag per noise power
-    noise: float  # (Pa s)^2: mean power in a bin of what the model does not explain
+    noise: float  # (Pa s)^2: mean power in a bin of noise: twice that of what is out of phase with the model
     power: Floats  # (bin,) sum over sensors of their responses squared: so much less noise is in the template
-    share: float  # of the power of the pulse at the sensors: what the model does not explain
+    share: float  # of the power of the pulse at the sensors: not explained by the model, or twice what is out of phase
     longer: Pulse | None = None  # the same over a longer window, where the faces have a null in the band
     deaf: float = DEAF  # as for `waveform`
 
     @property
+    def window(self) -> float:
+        """Length (s) of the window that it was cut out with."""
+        return float(1.0 / (self.frequency[1] - self.frequency[0])) if len(self.frequency) > 1 else 0.0
+
+    @property
+    def lasts(self) -> bool:
+        """Whether the envelope of the waveform is over `CUT` of its peak where the window is not flat any more."""
+        envelope = np.abs(ifft(_taper(len(self.template)) * self.template, 8 * len(self.template)))
+        return bool(envelope[np.abs(fftfreq(len(envelope))) >= 0.375].max() > CUT * envelope.max())
+
+    def one_tone(self, share: float) -> bool:
+        """Whether less than a share of its power tells it from itself a period later, at its mean frequency."""
+        power = np.abs(self.template) ** 2
+        mean = power @ self.frequency / max(power.sum(), 1e-300)
+        return bool(power @ (self.frequency - mean) ** 2 * (2 * np.pi / mean) ** 2 < share * power.sum())
+
+    @property
     def hollow(self) -> bool:
         """Whether the faces have a null in the band."""
-        count = len(self.power)
-        taper = np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2
-        return bool(np.min(self.power / taper) < HOLLOW * self.power.max())
+        return bool(np.min(self.power / _taper(len(self.power))) < HOLLOW * self.power.max())
 
     @property
     def noise_to_signal(self) -> float:
         """Noise of the mean of all sensors over the wave, power in a bin: `DEAF` at most, and `DEAFEST` at least."""
         loud = float(np.mean(np.abs(self.template) ** 2)) * max(int(np.count_nonzero(self.weight)), 1)
         return float(np.clip(self.noise / max(loud, 1e-300), DEAFEST, DEAF))
-
-
-@dataclass(frozen=True, eq=False)
-class PowerTrack:
-    """How loud the signals are, all live sensors together."""
-
-    track: Floats  # (sample,) Pa2: mean power, summed over sensors, in a window about the sample
-    quiet: float  # Pa2: the same where nothing is heard
-    peak: float  # Pa: the largest |pressure|
-
-
-def loudness(signals: Signals, live: npt.NDArray[np.bool_], length: int) -> PowerTrack:
-    """Power in a sliding window of `length` samples, in quiet, and the peak.
-
-    The quiet power is the tenth part from below of short means: a snap and its echoes fill no more of the signals.
-    """
-    power, peak = ranging_kernels.power_and_peak(signals.pressure, live)
-    track = uniform_filter1d(power, min(length, len(power)), mode="constant")
-    tenth = len(power) // 10
-    quiet = np.sort(uniform_filter1d(power, min(16, len(power))))[tenth]  # NumPy's `partition` takes ten times as long
-    return PowerTrack(np.maximum(track, 0.0), float(max(quiet, 0.0)), peak)
-
-
-def quiet_bin(quiet: float, live: int, band: Band, half: float) -> float:
-    """Mean power in a bin, (Pa s)^2, of noise at a sensor, at most: `quiet` (Pa2) of `live` sensors, in the band."""
-    return quiet / max(live, 1) * half / (band.high - band.low)
 
 
 def half_length(band: Band) -> float:
@@ -241,16 +230,15 @@ def measure(
     """
     wave = waveform(aligned, elements, sound_speed, direction, curvature, time, deaf)
     omega = 2 * np.pi * aligned.frequency
-    slope, weight, residuals = ranging_kernels.lag_sums(wave.spectrum, wave.response, wave.template, omega)
+    slope, weight, rest, across = ranging_kernels.lag_sums(wave.spectrum, wave.response, wave.template, omega)
     lag = slope / np.where(weight > 0, weight, np.inf)
     live = elements.gain != 0
-    dof = max(2 * (np.sum(live) - 1) * len(omega) - np.sum(live), 1)
-    noise, explained = float(np.sum(residuals[live])), float(wave.power @ np.abs(wave.template) ** 2)
-    share = noise / (explained + noise) if explained + noise > 0 else 1.0
-    if share > ranging_kernels.UNLIKE:  # gains are no noise; of another wave they take what is in phase, half of it
-        noise, power = ranging_kernels.beyond_gains(wave.spectrum[live], wave.response[live], wave.template)
-        share, dof = min(share, 2.0 * noise / power) if power > 0.0 else share, max(dof - np.sum(live), 1)
-    return Pulse(aligned.frequency, wave.template, time, lag, weight, 2 * noise / dof, wave.power, share, None, deaf)
+    # gains and responses that are not the model's are in phase, and no noise; half of noise, or of another wave, is not
+    left, noise = float(np.sum(rest[live])), 2.0 * float(np.sum(across[live]))
+    power = left + float(wave.power @ np.abs(wave.template) ** 2)
+    share = min(left, noise) / power if power > 0 else 1.0
+    mean = noise / max((np.sum(live) - 1) * len(omega), 1)
+    return Pulse(aligned.frequency, wave.template, time, lag, weight, float(mean), wave.power, share, None, deaf)
 
 
 def lag_variance(wave: Wavefront, pulse: Pulse, elements: Elements, rounding: float, half: float = PULSE_HALF) -> float:
@@ -289,6 +277,11 @@ def template_spectrum(template: Complexes, length: int) -> Complexes:
     wave = np.zeros(length)
     np.add.at(wave, (np.arange(2 * half) - half) % length, irfft(centred, 2 * half))
     return np.asarray(rfft(wave), np.complex128)
+
+
+def _taper(bins: int) -> Floats:
+    """Weights (bin,) of the frequencies of a band: those at its edges do not count."""
+    return np.asarray(np.sin(np.pi * (np.arange(bins) + 0.5) / bins) ** 2)
 
 
 def _frequencies(count: int, rate: float) -> Floats:

@@ -23,7 +23,8 @@ class SensorDelays(LocatingMethod):
     of the bottom. Delays are measured coherently in the band against the wave that all sensors hear, to about a
     thousandth of a sample. Standard errors are those of the lags that remain (and no less than the Cramer-Rao bound
     for the noise), of the assumed sound speed, of the depth of the bottom, and of the bending of rays where these are
-    taken for straight, through the Jacobians; that of the time also of what the converter clips.
+    taken for straight, through the Jacobians; that of the time also of what the converter clips. A pulse that lasts
+    longer than a snap is measured whole; a tone whose envelopes tell no period from the next is refused.
     """
 
     kind: Literal["sensor_delays"] = "sensor_delays"
