@@ -32,7 +32,9 @@ def supports_of(looks: Sequence[SampledScene]) -> PulseDurations:
     rows = []
     for look in looks:
         scene, profile = look.scene, look.profile
-        across = elements(scene.sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
+        array = elements(scene.sonar.array)
+        # of a wave, from the centre to the far corner of the face at the rim
+        across = (array.aperture + np.sqrt(0.5) * array.face) / profile.speed.min()
         lossy = any(law.turns_phase for law in scene.laws)
         turned = lossy or scene.physics.tracing.bounces > 0 or not profile.uniform  # also caustics turn the phase
         before, after = _support(scene, SUPPORT, turned=turned) + across

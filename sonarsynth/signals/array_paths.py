@@ -253,6 +253,13 @@ def reach(front: Wavefronts) -> Floats:
     return np.asarray(front.aperture / front.sound_speed + front.expansion.largest("delay"))
 
 
+def face_reach(front: Wavefronts, elements: Elements) -> Floats:
+    """Bound (path,) on how long (s) before or after the middle of a hydrophone's face a wave meets its edges."""
+    turned = front.aperture * front.curvature  # from the array centre to its rim, rad
+    along = np.minimum(np.abs(front.direction[:, 1:]) + turned[:, None], 1.0)
+    return np.asarray(0.5 * elements.face / front.sound_speed * along.sum(axis=1))
+
+
 def steered_spread(front: Wavefronts, rows: Ints | slice) -> float:
     """Bound (s) on how much sooner or later some paths meet any hydrophone than one front from among them, which meets
     the array centre when they do."""

@@ -12,7 +12,7 @@ from sonarsynth.equations.noise.filters import SUPPORT_TOLERANCE
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
-from sonarsynth.signals.array_paths import ArrayPaths, delay_and_gain, reach, steered_spread
+from sonarsynth.signals.array_paths import ArrayPaths, delay_and_gain, face_reach, reach, steered_spread
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, PulseChanges, at_longest, silencing_blur, support_of
 from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
@@ -77,6 +77,8 @@ def layout(
     fs = sonar.sampling_frequency
     plain, support, silent = _supports(arrivals, front, snaps, sonar, SUPPORT_TOLERANCE)
     longer = support if tolerance >= SUPPORT_TOLERANCE else _supports(arrivals, front, snaps, sonar, tolerance)[1]
+    smeared = face_reach(front, elements)
+    support, longer = support + smeared, longer + smeared
     before, after = support
     early, late = _extent(front, elements, before, after, start, start + (samples - 1) / fs)
     cut = ~silent & ((early < start) | (late > start + (samples - 1) / fs))

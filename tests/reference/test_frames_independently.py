@@ -12,7 +12,7 @@ from sonarsynth.equations.rays import ray_solutions
 from sonarsynth.geometry.motion import Circle, ConstantVelocity, Motion, Still
 from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start, plan
-from sonarsynth.receiver import PlanarLattice, Sonar
+from sonarsynth.receiver import Band, PlanarLattice, Sonar
 from sonarsynth.recipe import Accuracy, Recipe, reading
 from sonarsynth.recipe.scene import Physics, Scene, Trajectory, World
 from sonarsynth.sources.shrimp import SnappingShrimp
@@ -96,6 +96,14 @@ def test_what_turns_is_heard_as_it_stood_when_the_sound_met_it() -> None:
     """A crate on a circle at 20 degrees a second."""
     circle = Circle(centre=(22.0, 3.0, -29.0), radius=4.0, speed=1.4, bearing=0.3)
     assert away(crossing(circle, Still(position=(0.0, 0.0, -30.0), heading=0.5 * np.pi), edge=0.35), [29])[0] < ALLOWED
+
+
+def test_faces_that_a_wave_takes_long_to_cross_hear_the_whole_pulse() -> None:
+    """Faces of 1 m, hit from the side: a pulse is longer by what a wave takes to cross one, here by 0.5 ms."""
+    made = crossing(Still(position=(22.0, 1.0, -29.0)), Still(position=(0.0, 0.0, -30.0), heading=0.5 * np.pi))
+    sonar = replace(made.scene.sonar, array=PlanarLattice(columns=4, rows=3, pitch=1.0), band=Band(low=2e3, high=6e3))
+    recipe = replace(made.recipe, scene=replace(made.scene, sonar=sonar))
+    assert max(away(plan(recipe, ("signals",), Choices(subarrays=1, occlusion="sensors")), [0, 11])) < ALLOWED
 
 
 @pytest.mark.parametrize("slope", [-6.0, -0.016, 0.016, 5.0])

@@ -44,7 +44,7 @@ SLANT = 0.3
 
 
 STOPPED = 2e-5
-"""What the filter lets through may be so little, and be left out."""
+"""What the filter leaves of the snap may be so little of the largest, and be left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +236,8 @@ class FramePressure:
         step = rate / length
         frequency = np.arange(length // 2 + 1) * step
         passed = filter_response(chosen, frequency)
-        low, high = np.flatnonzero(np.abs(passed) > STOPPED)[[0, -1]]
+        left = np.abs(passed * spectrum(snap, step, len(frequency)))
+        low, high = np.flatnonzero(left > STOPPED * left.max())[[0, -1]]
         node, weight = stretches(every.longer)
         total = transfer(every, weight, start + first / rate, step, int(low), self._loss(frequency[low : high + 1]))
         out = np.zeros(len(frequency), complex)
