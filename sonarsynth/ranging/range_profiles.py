@@ -47,6 +47,38 @@ class Moments:
 
 
 @dataclass(frozen=True, eq=False)
+class EchoFilter:
+    """What makes a profile of a beam."""
+
+    received: ReceivedWindow
+    share: Floats  # (bin,) of the amplitude of an echo
+    matched: Complexes  # (bin,) the pulse's own waveform taken out
+    length: int  # of the transform to delays
+    count: int  # of delays that are in the window
+
+    @property
+    def step(self) -> float:
+        """Step (s) of delays."""
+        return 1.0 / (self.length * self.received.beams.snapshots.spacing)
+
+    def spectra(self, u: Floats) -> Complexes:
+        """Spectra (beam, bin) of the profiles of beams (beam, xyz)."""
+        window, elements = self.received.beams.snapshots, self.received.elements
+        sine = u * (elements.face / self.received.sonar.assumed_sound_speed)
+        f = window.frequency
+        face = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], f[0], window.spacing, len(f))
+        return np.asarray(ranging_kernels.matched_to(self.received.beams.spectra(u), face, self.share, self.matched))
+
+    def powers(self, u: Floats) -> npt.NDArray[np.float32]:
+        """Profiles (beam, delay) of beams (beam, xyz)."""
+        power = np.empty((len(u), self.count), np.float32)
+        for first in range(0, len(u), BEAMS_AT_ONCE):
+            block = slice(first, first + BEAMS_AT_ONCE)
+            ranging_kernels.powers(ifft(self.spectra(u[block]), self.length, axis=1), power[block])
+        return power
+
+
+@dataclass(frozen=True, eq=False)
 class Profiles:
     """Power against delay of some beams: the echo with the pulse's waveform taken out."""
 
@@ -59,6 +91,7 @@ class Profiles:
     width: float  # rad: half of the half-power width of a beam
     resolution: float  # s: 1/(2 pi beta), beta the root mean square bandwidth
     moments: Moments
+    filter: EchoFilter
 
     @property
     def about(self) -> int:
@@ -129,13 +162,7 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
     step = 1 / (length * spacing)
     row, column = beams
     u = direction(received.image.azimuth[column], received.image.elevation[row])
-    power = np.empty((len(u), min(int(window.duration / step) + 1, length)), np.float32)
-    for first in range(0, len(u), BEAMS_AT_ONCE):
-        block = slice(first, first + BEAMS_AT_ONCE)
-        sine = u[block] * (elements.face / c)
-        face = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], f[0], spacing, len(f))
-        echo = ifft(ranging_kernels.matched_to(received.beams.spectra(u[block]), face, share, matched), length, axis=1)
-        ranging_kernels.powers(echo, power[block])
+    echoes = EchoFilter(received, share, matched, length, min(int(window.duration / step) + 1, length))
     spread = np.sum(taper**2)
     centre = f @ taper**2 / spread
     beta = np.sqrt(max((f - centre) ** 2 @ taper**2 / spread, spacing**2))
@@ -143,12 +170,13 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
         row=row,
         column=column,
         direction=u,
-        power=power,
+        power=echoes.powers(u),
         first=window.start - float(received.estimates.time[0]),
         step=step,
         width=half_width(elements, centre / c),
         resolution=1 / (2 * np.pi * beta),
         moments=_moments(f, share, np.abs(matched) ** 2, spacing),
+        filter=echoes,
     )
 
 

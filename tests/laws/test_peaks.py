@@ -186,6 +186,17 @@ def test_a_grating_lobe_is_no_echo_and_an_echo_there_is():
     assert np.sort(both.azimuth) == pytest.approx([-0.2, 0.245], abs=1e-3)
 
 
+@pytest.mark.parametrize("azimuth", [0.5, -0.6, 0.75])
+def test_a_grating_lobe_of_an_echo_from_beyond_the_view_is_no_echo(azimuth):
+    """The view ends at 25 degrees: a loud echo from further off the axis makes no point, whether alone or beside a
+    fainter one that is in view, which keeps its own."""
+    loud, wide = spherical(22.0, azimuth, 0.02), sonar(span=50.0)
+    alone = points((loud,), instrument=wide, picking=Peaks(side_lobes=30.0, dynamic_range=22.0))
+    assert len(alone) == 0
+    both = points((loud, spherical(21.0, -0.2, 0.05)), instrument=wide, strengths=(1.0, 0.3))
+    assert both.azimuth == pytest.approx([-0.2], abs=1e-3)
+
+
 def test_no_echo_is_picked_at_the_edge_of_the_view():
     """Its peak may be outside: a target half a beam beyond the last beam makes no point."""
     narrow = sonar(span=10.0)

@@ -140,7 +140,8 @@ def over_lobes(
     direction: Any, delay: Any, power: Any, position: Any, weight: Any, frequency: Any, taper: Any, near: Any,
     least: Any, table: Any, rate: float, error: float,
 ) -> Any:  # fmt: skip
-    """Whether `least` (peak,) is more than what louder peaks bring: that of `lobe_power`, in a tenth of the time.
+    """Whether `least` (peak,) is more than what louder peaks bring: that of `lobe_power`, in a tenth of the time; true
+    where it is infinite.
 
     table (2, delay): real and imaginary part of sum_f T(f) exp(i 2 pi f t)/sum_f T at delays in steps of 1/rate, the
     middle at 0, linear in between to within `error`. That bounds what each louder peak may bring: what is left in doubt
@@ -154,7 +155,7 @@ def over_lobes(
     middle = 0.5 * (table.shape[1] - 1)
     for i in range(peaks):
         low = high = 0.0
-        for j in range(i):
+        for j in range(i if least[i] < np.inf else 0):
             apart = direction[i] - direction[j]
             far = np.sqrt(np.sum(apart**2))
             late = delay[i] - delay[j]

@@ -16,6 +16,7 @@ from sonarsynth.equations.arrays.apertures import live_gain
 from sonarsynth.equations.arrays.noise_peaks import peak_level
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
+from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond
 from sonarsynth.ranging.picking.peak_kernels import beside, farthest, local_maxima, over_lobes, power_centres
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
 from sonarsynth.ranging.range_profiles import (
@@ -226,24 +227,40 @@ def _tops(
 
 
 def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats, noise: Floats) -> Bools:
-    """Whether peaks (peak,) are more than what the lobes of the array bring of louder ones."""
+    """Whether peaks (peak,) are more than what the lobes of the array bring of louder ones, in the grid and beyond."""
+    least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
+    u, delay = profiles.direction[b], profiles.step * t.astype(float)
+    own = _over(window, profiles.width, u, delay, height, least)
+    beyond, late, power = louder_beyond(window, profiles, b[own], t[own], height[own])
+    if len(power):
+        u, delay = np.concatenate([u[own], beyond]), np.concatenate([delay[own], profiles.step * late])
+        none = np.full(len(power), np.inf)
+        height, least = np.concatenate([height[own], power]), np.concatenate([least[own], none])
+        own[own] = _over(window, profiles.width, u, delay, height, least)[: np.count_nonzero(own)]
+    return own
+
+
+def _over(
+    window: ReceivedWindow, width: float, direction: Floats, delay: Floats, height: Floats, least: Floats
+) -> Bools:
+    """Whether `least` (peak,) is more than what lobes bring of louder peaks from directions (peak, xyz), at delays
+    (peak,) in s, of heights (peak,)."""
     loud = np.argsort(-height, kind="stable")
     band, live = window.sonar.band, np.flatnonzero(window.elements.gain)
     taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
     c = window.sonar.assumed_sound_speed
     position, rate = window.elements.position[live], LOBE_STEPS * band.high
     steps = int(np.ceil((4.0 * farthest(position) / c + 2.0 / (band.high - band.low)) * rate)) + 2
-    least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
-    own = np.empty(len(b), bool)
+    own = np.empty(len(height), bool)
     own[loud] = over_lobes(
-        profiles.direction[b[loud]] / c,
-        profiles.step * t[loud],
+        direction[loud] / c,
+        delay[loud],
         height[loud],
         position,
         live_gain(window.elements.gain)[live],
         np.linspace(band.low, band.high, LOBE_BINS),
         taper,
-        2.0 * profiles.width / c,
+        2.0 * width / c,
         least[loud] / LOBES,
         _lobe_table(band.low, band.high, rate, steps),
         rate,

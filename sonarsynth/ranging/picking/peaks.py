@@ -25,7 +25,8 @@ class Peaks(Method):
     Beams about those within `threshold` of the loudest are looked at, the pulse's own waveform taken out. A maximum is
     an echo where it is within `dynamic_range` of the largest, stands out of the noise of its beam so far that noise
     alone gives `false_alarms` a frame, and is not what the array hears beside its beam: within `side_lobes` of the
-    largest at the same delay, and over what side lobes and grating lobes bring of louder echoes at theirs.
+    largest at the same delay, and over what side lobes and grating lobes bring of louder echoes at theirs. Whence, of
+    those beyond the beam grid, is looked for along the grating lobes of each peak, where the array is a lattice.
 
     Measured by `tools/bench cloud`. Errors are those of noise, and of echoes that overlap: by how far the centre of the
     power about a peak is from it.

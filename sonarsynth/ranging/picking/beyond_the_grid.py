@@ -1,0 +1,63 @@
+"""Echoes from beyond the beam grid, which a lattice hears in the grid by its grating lobes."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from sonarsynth.conventions import Floats, Ints, azimuth_elevation
+from sonarsynth.ranging.picking.peak_kernels import farthest
+from sonarsynth.ranging.range_profiles import BEAMS_AT_ONCE, Profiles
+from sonarsynth.ranging.received_window import ReceivedWindow
+
+LINE = 2e3
+"""Hz: width over which spectra are summed to find the line that a lobe makes of an echo."""
+
+
+def louder_beyond(
+    window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats
+) -> tuple[Floats, Ints, Floats]:
+    """Directions (echo, xyz), steps of delay and heights of echoes beyond the grid that are louder than peaks in it (b:
+    beam, t: delay, height), where these may be grating lobes of them.
+
+    A lobe brings of an echo a line: that of the frequency at which all sensors of the lattice are in step. Where it is
+    is seen in the spectrum of the peak's own beam, and with it whence the echo comes: directions whose components along
+    the lattice are whole multiples of c/(f pitch) off.
+    """
+    elements, c, f = window.elements, window.sonar.assumed_sound_speed, window.beams.snapshots.frequency
+    none = np.zeros((0, 3)), np.zeros(0, int), np.zeros(0)
+    if not (elements.on_lattice and len(b)):
+        return none
+    peak, line = np.arange(len(b)), _lines(profiles, f, b, t)
+    most = int(2.0 * elements.pitch * f[-1] / c)
+    orders = np.stack(np.meshgrid(*2 * [np.arange(-most, most + 1)]), axis=-1).reshape(-1, 2)
+    along = profiles.direction[b, None, 1:] + orders * (c / (elements.pitch * line))[:, None, None]
+    square = np.sum(along**2, axis=2)
+    peak, order = np.nonzero((square < 1.0) & orders.any(axis=1))
+    u = np.column_stack([np.sqrt(1.0 - square[peak, order]), along[peak, order]])
+    azimuth, elevation = azimuth_elevation(u)
+    image = window.image
+    inside = (azimuth >= image.azimuth[0]) & (azimuth <= image.azimuth[-1])
+    inside &= (elevation >= image.elevation[0]) & (elevation <= image.elevation[-1])
+    peak, u = peak[~inside], u[~inside]
+    if not len(peak):
+        return none
+    far = np.linalg.norm(u - profiles.direction[b[peak]], axis=1) * (farthest(elements.position) / c / profiles.step)
+    late, loudest = np.empty(len(u), int), np.empty(len(u))
+    for first in range(0, len(u), BEAMS_AT_ONCE):
+        some = slice(first, first + BEAMS_AT_ONCE)
+        power = profiles.filter.powers(u[some])
+        near = np.abs(np.arange(power.shape[1]) - t[peak[some], None]) <= far[some, None]
+        late[some] = np.where(near, power, -1.0).argmax(axis=1)
+        loudest[some] = np.take_along_axis(power, late[some, None], axis=1)[:, 0]
+    louder = loudest > height[peak]
+    return u[louder], late[louder], loudest[louder]
+
+
+def _lines(profiles: Profiles, f: Floats, b: Ints, t: Ints) -> Floats:
+    """Frequencies (peak,) at which the spectra of peaks are largest, about their delays."""
+    turn = np.exp(2j * np.pi * profiles.step * t[:, None] * (f - f[0]))
+    spectrum = profiles.filter.spectra(profiles.direction[b]) * turn
+    width = max(int(LINE / (f[1] - f[0])), 1) if len(f) > 1 else 1
+    smooth = [uniform_filter1d(part, width, axis=1, mode="constant") for part in (spectrum.real, spectrum.imag)]
+    return np.asarray(f[(smooth[0] ** 2 + smooth[1] ** 2).argmax(axis=1)])
