@@ -22,6 +22,7 @@ from sonarsynth.validation.rays.ray_matching import Rays, rays_of
 from sonarsynth.validation.references.frames.frame_pressure import FramePressure
 from sonarsynth.validation.references.frames.line_of_sight import Surface
 from sonarsynth.validation.references.frames.path_sum import Contributions, transfer
+from sonarsynth.validation.references.frames.sound_paths import hidden
 from sonarsynth.validation.references.rays.layered_rays import families, rays
 from sonarsynth.validation.references.rays.layers_crossed import Water
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
@@ -130,6 +131,18 @@ def test_rays_by_images_are_those_of_many_digits_where_the_speed_is_linear(slope
         np.testing.assert_allclose(np.arcsin(found.departure[row, 2]), mine.start_angle, atol=1e-11)
         np.testing.assert_allclose(np.arcsin(found.arrival[row, 2]), mine.end_angle, atol=1e-11)
     assert seen > 20
+
+
+def test_a_ray_that_does_not_arrive_is_hidden() -> None:
+    """In water that bends sound up no ray goes far but by the surface."""
+    water = Water(np.array([0.0, 5.0]), np.array([1521.0, 1551.0]), 5.0)
+    end = np.column_stack([np.linspace(5.0, 200.0, 40), np.zeros(40), np.full(40, -2.5)])
+    start = np.broadcast_to([0.0, 0.0, -4.25], end.shape)
+    ray = rays(water, start, end, families(1)[0])
+    found = hidden([], water, start, end, ray, np.zeros(40))
+    np.testing.assert_array_equal(found, ~np.isfinite(ray.time))
+    assert 0 < found.sum() < 40
+    assert hidden([], water, start, end, ray.select(np.flatnonzero(found)[[0] * 40]), np.zeros(40)).all()
 
 
 def _family(some: Rays, bounces: int, bottom: int) -> np.ndarray:

@@ -68,8 +68,14 @@ def arrival_times(
 
 
 def hidden(solids: list[Solid], water: Water, start: Floats, end: Floats, ray: Rays, time: Floats) -> Bools:
-    """Whether bodies stand in rays from start to end (ray, xyz), at times (ray,); `start` may be moved off a facet."""
-    out = np.zeros(len(start), bool)
+    """Whether bodies stand in rays from start to end (ray, xyz), at times (ray,), or there is no ray; `start` may be
+    moved off a facet."""
+    out = ~np.isfinite(ray.time)
+    if out.any():
+        there = np.flatnonzero(~out)
+        if len(there):
+            out[there] = hidden(solids, water, start[there], end[there], ray.select(there), time[there])
+        return out
     points = _unfolded(water, start, end, ray)
     for k in range(points.shape[1] - 1):
         a, b = points[:, k], points[:, k + 1]
