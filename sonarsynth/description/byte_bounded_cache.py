@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import fields, is_dataclass
 from functools import update_wrapper
 from threading import Lock
-from typing import Any, Final, ParamSpec, TypeVar
+from typing import Any, Final, Generic, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -44,20 +44,20 @@ def size_of(*values: object) -> int:
     return total
 
 
-class ByteBoundedCache:
+class ByteBoundedCache(Generic[P, R]):
     """A function that keeps its results: at most `most`, and the last `LEAST` or no more than `MOST_BYTES` together.
 
     Sizes are taken anew whenever a result is added, for meshes grow with what is asked of them. Safe in threads; two
     that ask for the same at once may both make it.
     """
 
-    def __init__(self, function: Callable[..., Any], limit: int) -> None:
+    def __init__(self, function: Callable[P, R], limit: int) -> None:
         self._function, self._most = function, limit
-        self._results: OrderedDict[Hashable, tuple[Any, Any]] = OrderedDict()
+        self._results: OrderedDict[Hashable, tuple[Any, R]] = OrderedDict()
         self._lock = Lock()
         update_wrapper(self, function)
 
-    def __call__(self, *args: Any, **named: Any) -> Any:
+    def __call__(self, *args: P.args, **named: P.kwargs) -> R:
         """The result for these arguments."""
         key = (args, tuple(sorted(named.items())))
         with self._lock:
@@ -88,10 +88,10 @@ class ByteBoundedCache:
             self._results.clear()
 
 
-def byte_bounded_cache(limit: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def byte_bounded_cache(limit: int) -> Callable[[Callable[P, R]], ByteBoundedCache[P, R]]:
     """Decorator: keep results by arguments, at most `limit`, bounded in bytes (`ByteBoundedCache`)."""
 
-    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+    def decorate(function: Callable[P, R]) -> ByteBoundedCache[P, R]:
         return ByteBoundedCache(function, limit)
 
     return decorate

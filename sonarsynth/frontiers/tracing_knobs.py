@@ -31,6 +31,7 @@ from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Straight
 from sonarsynth.receiver.subarrays import Subarray, subarrays
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.tracing.facet_paths import way_to_array
 from sonarsynth.validation.run_time import timed
 
 DYNAMIC_RANGES = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
@@ -59,7 +60,7 @@ class TracedBySensor:
     def of(plan: Plan, frame: Frame, sensor: Ints) -> TracedBySensor:
         """Trace with the subarrays, the faintest paths and the propagation of a plan (that of the sequence)."""
         count, elements = plan.choices.subarrays, plan.elements
-        traced, seconds = timed(lambda: arrivals_of(plan, frame))
+        traced, seconds = timed(lambda: _traced_anew(plan, frame))
         if count == 1:
             every = Subarray(np.arange(elements.count), np.zeros(3), elements)
             return TracedBySensor(plan, frame, ((every, traced),), 1, seconds)
@@ -215,6 +216,12 @@ def _point(exact: ExactFrame, traced: TracedBySensor, knob: str, setting: str, *
         },
         note=f"{exact.partly}{several}",
     )
+
+
+def _traced_anew(plan: Plan, frame: Frame) -> Arrivals:
+    """The arrivals of a frame, as of one that shares nothing with the frame before."""
+    way_to_array.cache_clear()
+    return arrivals_of(plan, frame)
 
 
 def _cut(plan: Plan) -> str:

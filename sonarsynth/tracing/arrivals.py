@@ -18,7 +18,7 @@ from sonarsynth.tracing.doppler import Meeting, MotionTerms, apply_doppler, rece
 from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.expansion.amplitude_polynomials import fitted
 from sonarsynth.tracing.expansion.aperture_paths import aperture_paths
-from sonarsynth.tracing.facet_paths import FacetPaths, facet_paths
+from sonarsynth.tracing.facet_paths import FacetPaths, facet_paths, facet_paths_at_rest
 from sonarsynth.tracing.meetings import hearing_times, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
 from sonarsynth.tracing.path_absorption import path_loss
@@ -52,7 +52,7 @@ def trace_each(
     context, moving = replace(context, snaps=snaps), receiver.track
     still = all(body.track.still for body in context.bodies) and not any(snap.velocity.any() for snap in snaps)
     if moving is None or (moving.still and still) or not snaps:
-        array = facet_paths(context, propagation, snaps=snaps)
+        array = facet_paths_at_rest(context, propagation, snaps)
         found = [[*(_direct(array, index) for index in of), *_echoes(array, of)] for of in own]
     else:
         found = [[] for _ in own]

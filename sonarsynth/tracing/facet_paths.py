@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Hashable
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonarsynth.columns import picked
 from sonarsynth.conventions import NO_TARGET, Bools, Ints
+from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.kernels.placing import in_front
 from sonarsynth.geometry.mesh import in_blocks
@@ -32,6 +33,9 @@ from sonarsynth.tracing.receive_paths import (
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
 
+KEPT = 60_000
+"""Facets of a frame whose paths are kept for the next, at most: 40 MB."""
+
 
 @dataclass(frozen=True, eq=False)
 class FacetPaths:
@@ -49,13 +53,8 @@ class FacetPaths:
     @property
     def fronts(self) -> AperturePaths:
         """(leg,) over the aperture: kept for all legs, made anew for some."""
-        return self._whole if self.legs is self.wavefronts.legs else self._made()
-
-    @cached_property
-    def _whole(self) -> AperturePaths:
-        return self._made()
-
-    def _made(self) -> AperturePaths:
+        if self.legs is self.wavefronts.legs:
+            return self.wavefronts.whole
         return self.wavefronts.of(slice(self.first, self.first + len(self.legs.row)))
 
     def part(self, rows: slice) -> FacetPaths:
@@ -98,6 +97,41 @@ class FacetPaths:
         occluded = legs.occluded.copy()
         occluded[legs.open > 0] = pending.occluded[np.searchsorted(pending.row, row[found])]
         return legs.seen(occluded, np.zeros_like(legs.open)), in_sight
+
+
+@dataclass(frozen=True)
+class _SameWay:
+    """What the way from facets to the array depends on: equal where all of that is."""
+
+    what: tuple[Hashable, ...]
+    context: FrameContext = field(compare=False)
+
+    @staticmethod
+    def of(context: FrameContext) -> _SameWay:
+        """Of a frame."""
+        water, receiver = context.medium, context.receiver
+        arrays = [water.profile.depth, water.profile.speed, receiver.pose.position, receiver.pose.orientation]
+        for surface in context.scattering:
+            arrays += [surface.pose.position, surface.pose.orientation]
+            arrays += [surface.position, surface.normal] if surface.mesh is None else []
+        described = water.environment, receiver.sonar, context.tolerances
+        meshes = tuple(surface.mesh for surface in context.scattering)
+        return _SameWay((*described, receiver.elements, meshes, *(array.tobytes() for array in arrays)), context)
+
+
+@byte_bounded_cache(1)
+def way_to_array(same: _SameWay, propagation: Propagation) -> FacetPaths:
+    """The paths of all facets: those of the last frame, where everything is as it was."""
+    return facet_paths(same.context, propagation)
+
+
+def facet_paths_at_rest(context: FrameContext, propagation: Propagation, snaps: tuple[Emission, ...]) -> FacetPaths:
+    """As `facet_paths`, where nothing moves while sound is under way: frames that differ in their snaps alone, or in
+    nothing, share it. Not of straight, unreflected rays, which take less time than to know which snaps light what."""
+    facets = sum(map(len, context.scattering))
+    if facets > KEPT or (propagation.layered and not propagation.bounces and context.medium.profile.uniform):
+        return facet_paths(context, propagation, snaps=snaps)
+    return replace(way_to_array(_SameWay.of(context), propagation), context=context)
 
 
 def facet_paths(

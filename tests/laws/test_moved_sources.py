@@ -15,7 +15,7 @@ from sonarsynth.planning import plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.sources.snap_models import Ricker
 from sonarsynth.sources.sound_source import SoundSource
-from sonarsynth.tracing import arrivals as tracing
+from sonarsynth.tracing import facet_paths
 from tests.laws.test_stored_paths import still
 from tests.scenes import remus
 
@@ -27,9 +27,9 @@ def with_world(recipe: Recipe, **changes: Any) -> Recipe:
     return replace(recipe, scene=replace(recipe.scene, world=replace(recipe.scene.world, **changes)))
 
 
-def in_bent_water() -> Recipe:
+def in_bent_water(signal: float = 1e-5) -> Recipe:
     """The body at rest, its echoes by surface and bottom too, in water that bends rays."""
-    recipe = still(bounces=1)
+    recipe = still(bounces=1, signal=signal)
     water = replace(recipe.scene.world.environment, sound_speed=Linear(surface_speed=1540.0, gradient=-1.0))
     return with_world(recipe, environment=water)
 
@@ -38,6 +38,7 @@ def in_bent_water() -> Recipe:
 def test_of_bodies_at_rest_paths_and_sound_are_those_of_the_recipe_with_the_source_there(recipe: Recipe) -> None:
     made = plan(recipe, {"signals", "paths"})
     for source, tree in zip((NEAR, FAR, OTHER), ss.with_sources(made, 0, (NEAR, FAR, OTHER)), strict=True):
+        facet_paths.way_to_array.cache_clear()
         fresh = ss.render(plan(with_world(recipe, sources=(source,)), made.products, made.choices), 0)
         for name in ("delay", "azimuth", "amplitude", "phase", "facet", "family"):
             count = int(fresh["paths"]["count"])
@@ -59,15 +60,24 @@ def test_of_a_body_that_moves_they_agree_within_the_accuracy() -> None:
 
 
 def test_the_way_to_the_array_is_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls, trace_facets = list[int](), tracing.facet_paths
+    calls, trace_facets = list[int](), facet_paths.facet_paths
 
     def counted(*args: Any, **named: Any) -> Any:
         calls.append(1)
         return trace_facets(*args, **named)
 
-    made = plan(still(), ["paths"])
-    monkeypatch.setattr(tracing, "facet_paths", counted)
-    assert len(ss.with_sources(made, 0, (NEAR, FAR, OTHER))) == 3 and len(calls) == 1
+    straight, bent = plan(still(signal=1e-3), ["paths"]), plan(in_bent_water(signal=1e-3), ["paths"])
+    facet_paths.way_to_array.cache_clear()
+    monkeypatch.setattr(facet_paths, "facet_paths", counted)
+    assert len(ss.with_sources(straight, 0, (NEAR, FAR, OTHER))) == 3 and len(calls) == 1
+    for source in (NEAR, FAR, OTHER):  # where rays bend, of one call after the other too
+        assert ss.with_sources(bent, 0, [source]) and len(calls) == 2
+    axes = (ss.Axis(name="east", path="scene.world.sources.0.position.0", values=(13.0, 14.0, 15.0)),)
+    places = plan(replace(in_bent_water(signal=1e-3), grid=axes), ["paths"])
+    calls.clear()
+    facet_paths.way_to_array.cache_clear()
+    paths = [ss.render(places, index)["paths"].dataset for index in range(3)]
+    assert len(calls) == 1 and not paths[0].equals(paths[1])
 
 
 def test_of_a_store_with_the_sources_of_its_recipe_the_frame_is_that_of_the_store(tmp_path: Path) -> None:

@@ -16,11 +16,13 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing, Refracted, Straight
 from sonarsynth.receiver import Elements, PositionTable, Romanis, elements
-from sonarsynth.scattering import Isotropic, MirrorLobe
+from sonarsynth.scattering import Isotropic, MirrorLobe, Scatterers
+from sonarsynth.scattering.scatterers import PointScatterer
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace, trace_each
 from sonarsynth.tracing.expansion.probe_sensors import probes
+from sonarsynth.tracing.facet_paths import way_to_array
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))
 UNIFORM = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1540.0]))
@@ -116,16 +118,55 @@ def test_arrivals_are_sorted_by_snap_target_and_facet() -> None:
         assert set(found.snap) == {0, 1}
 
 
-@pytest.mark.parametrize("profile", [UNIFORM, LAYERED])
-def test_legs_of_the_array_side_serve_a_moved_shrimp(profile: Profile) -> None:
+def alone(context: FrameContext, bounces: int = 0) -> Arrivals:
+    """Traced by a process that has traced nothing before."""
+    way_to_array.cache_clear()
+    return trace(context, AutoTracing(bounces=bounces))
+
+
+def equal(found: Arrivals, other: Arrivals) -> bool:
+    """Whether two frames have the same paths, bit for bit."""
+    return all(np.array_equal(value, other.columns[name], equal_nan=True) for name, value in found.columns.items())
+
+
+@pytest.mark.parametrize(("profile", "bounces"), [(UNIFORM, 0), (UNIFORM, 1), (LAYERED, 0)])
+def test_legs_of_the_array_side_serve_a_moved_shrimp(profile: Profile, bounces: int) -> None:
     bodies = (body((20.0, 1.0, -11.0)), body((15.0, 0.5, -11.5), name="other"))
     water, laws = Medium(ENVIRONMENT, profile, 0.02), (MirrorLobe(),) * 2
     choices = [(), *((snap(p),) for p in ((3.0, 6.0, -30.0), (10.0, -9.0, -29.0), (25.0, 3.0, -30.0)))]
     context = FrameContext(0.0, bodies, (), water, Receiver(SONAR, ROMANIS), laws)
-    for snaps, again in zip(choices, trace_each(context, AutoTracing(), choices), strict=True):
-        anew = run(bodies, snaps, profile)
-        for name, value in anew.columns.items():
-            np.testing.assert_array_equal(again.columns[name], value, err_msg=name)
+    anew = [alone(replace(context, snaps=snaps), bounces) for snaps in choices]
+    together = trace_each(context, AutoTracing(bounces=bounces), choices)
+    later = [trace(replace(context, snaps=snaps), AutoTracing(bounces=bounces)) for snaps in choices]
+    assert all(map(equal, anew, together)) and all(map(equal, anew, later))
+
+
+def test_legs_of_a_frame_before_serve_another_only_where_all_that_they_depend_on_is_the_same() -> None:
+    still, snaps = body((20.0, 1.0, -11.0)), (snap((3.0, 6.0, -30.0)),)
+    one = FrameContext(
+        0.0, (still,), snaps, Medium(ENVIRONMENT, LAYERED, 0.02), Receiver(SONAR, ROMANIS), (MirrorLobe(),)
+    )
+    warmer = Profile(LAYERED.depth, LAYERED.speed + [0.0, 0.5, 0.5, 0.0])
+    stones = Scatterers("volume", PointScatterer(0.1), np.array([[18.0, 0.0, -12.0]]), np.zeros((1, 3)), np.ones(1))
+    lower = replace(SONAR, position=SONAR.position - [0.0, 0.0, 0.1])
+    others = [
+        replace(one, bodies=(body((20.0, 1.001, -11.0)),)),
+        replace(one, bodies=(body((20.0, 1.0, -11.0), heading=0.41),)),
+        replace(one, bodies=(body((20.0, 1.0, -11.0), mesh=hull(2)),)),
+        replace(one, bodies=(still, body((18.0, 1.0, -11.0))), laws=one.laws * 2),
+        replace(one, receiver=replace(one.receiver, pose=lower)),
+        replace(one, receiver=replace(one.receiver, elements=elements(Romanis(pitch=0.06)))),
+        replace(one, medium=replace(one.medium, profile=warmer)),
+        replace(one, medium=replace(one.medium, environment=replace(ENVIRONMENT, depth=31.0))),
+        replace(one, tolerances=replace(one.tolerances, every=2)),
+        replace(one, scatterers=(stones,)),
+        replace(one, laws=(Isotropic(),)),
+        replace(one, medium=replace(one.medium, absorption=0.05)),
+    ]
+    anew, own = [alone(other, 1) for other in others], alone(one, 1)
+    for other, expected in zip(others, anew, strict=True):
+        assert equal(trace(other, AutoTracing(bounces=1)), expected) and not equal(expected, own)
+        assert equal(trace(one, AutoTracing(bounces=1)), own)
 
 
 @pytest.mark.parametrize("time", [-50.0, 1e4])

@@ -8,6 +8,7 @@ polynomials over the body; held-out facets measure the error, and where it is to
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,6 +72,11 @@ class ExpansionSource:
         tuple[Ints, ApertureSamples | _FacetInterpolant | None], ...
     ]  # legs of each; None: made from images
     plain: bool  # uniform water, no reflections: all are spheres
+
+    @cached_property
+    def whole(self) -> AperturePaths:
+        """The wavefronts of all legs."""
+        return self.of(slice(0, len(self.legs.row)))
 
     def of(self, block: slice) -> AperturePaths:
         """The wavefronts of some legs."""
