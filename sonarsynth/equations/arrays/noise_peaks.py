@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from math import exp, pi, sqrt
+from math import exp, log, pi, sqrt
 
 from sonarsynth.conventions import Floats
 
 LOWEST = 3.0
 """Of the mean power: peaks under this are not told from each other, so that no threshold is lower."""
-HIGHEST = 1e3
 PRECISION = 1e-13
 """Of a level."""
 
@@ -34,10 +33,8 @@ def expected_peaks(level: float, size: Floats) -> float:
 
 def peak_level(false_alarms: float, size: Floats) -> float:
     """Level, over the mean power of noise, that so many peaks exceed on average (`expected_peaks`)."""
-    low, high = LOWEST, HIGHEST
-    if expected_peaks(low, size) <= false_alarms:
-        return low
-    while high - low > PRECISION * high:  # fewer peaks exceed a higher level
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if expected_peaks(middle, size) > false_alarms else (low, middle)
-    return high
+    level, step = LOWEST, log(expected_peaks(LOWEST, size) / false_alarms)
+    while step > PRECISION * level:  # peaks are exp(-level) times what grows with it: no step goes too far
+        level += step
+        step = log(expected_peaks(level, size) / false_alarms)
+    return level

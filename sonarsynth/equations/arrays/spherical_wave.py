@@ -71,15 +71,16 @@ def plane_wave(
     if not total > 0:
         return nothing
     q0, t0 = w @ q / total, w @ t / total
-    root = np.sqrt(w)[:, None]
-    u_, s, axes = np.linalg.svd(root * (q - q0), full_matrices=False)
-    rank = int(np.sum(s > RANK_TOLERANCE * s[0])) if s[0] > 0 else 0
+    about = (w[:, None] * (q - q0)).T
+    squares, axes = np.linalg.eigh(about @ (q - q0))
+    spread = squares > RANK_TOLERANCE**2 * squares[2]
+    rank = int(np.sum(spread)) if squares[2] > 0 else 0
     if rank < 2:
         return nothing
-    component = -sound_speed * (u_[:, :rank].T @ (root[:, 0] * (t - t0))) / s[:rank]
-    u = component @ axes[:rank]
+    component = -sound_speed * (axes[:, spread].T @ (about @ (t - t0))) / squares[spread]
+    u = axes[:, spread] @ component
     if rank == 2:
-        normal, normal_square = axes[2], 1 - u @ u
+        normal, normal_square = axes[:, 0], 1 - u @ u
         if normal_square < 0:
             return nothing
         u = u + np.sqrt(normal_square) * normal * (1.0 if normal[0] >= 0 else -1.0)

@@ -36,8 +36,9 @@ def fewer_bins(snapshots: Snapshots, travel_time: float) -> Snapshots:
     if step < 2:
         return snapshots
     chosen, weight = weighted_bins(bins, step)
-    spectra = snapshots.spectra[:, chosen] * np.sqrt(weight).astype(np.float32)
-    return replace(snapshots, frequency=snapshots.frequency[chosen], spacing=step * snapshots.spacing, spectra=spectra)
+    every = slice(int(chosen[0]), None, step)
+    spectra = snapshots.spectra[:, every] * np.sqrt(weight).astype(np.float32)
+    return replace(snapshots, frequency=snapshots.frequency[every], spacing=step * snapshots.spacing, spectra=spectra)
 
 
 @lru_cache(maxsize=64)

@@ -31,9 +31,8 @@ def lattice_beam_spectra(
     from sonarsynth.equations.kernels.phasors import padded_bins
     from sonarsynth.imaging.delay_and_sum.lattice_kernel import lattice_beams
 
-    places, heights, columns, middle = _halves(elements)
+    places, heights, columns, middle, later = _halves(elements, focus, sound_speed)
     padded = padded_bins(spectra, elements.count + 1, LANES)
-    later = np.append(focus_delay(elements.position, AHEAD, focus, sound_speed), 0.0)[places]
     order = np.argsort(directions[:, 2], kind="stable")
     levels, first = np.unique(directions[order, 2], return_index=True)
     half = 0.5 * elements.pitch / sound_speed
@@ -62,9 +61,10 @@ def lattice_beam_spectra(
 
 
 @lru_cache(maxsize=16)
-def _halves(elements: Elements) -> tuple[Ints, Ints, int, float]:
+def _halves(elements: Elements, focus: float | None, sound_speed: float) -> tuple[Ints, Ints, int, float, Floats]:
     """Sensors (half, half column, half row, 4) of the halves of a lattice to port and to starboard, rows in use (half
-    column,), columns of a half, and how far (m) its middle is from that of the array."""
+    column,), columns of a half, how far (m) its middle is from that of the array, and delays (s) of focusing of the
+    sensors."""
     columns, nobody = -(-elements.columns // 2), elements.count
     port, live = elements.column < columns, elements.gain > 0
     column = np.where(port, elements.column, elements.column - (elements.columns - columns))
@@ -73,4 +73,5 @@ def _halves(elements: Elements) -> tuple[Ints, Ints, int, float]:
          for which in (port, ~port)]
     )  # fmt: skip
     used = rows_in_use(np.min(places, axis=(0, 3)) < nobody)
-    return places, used, columns, 0.5 * elements.pitch * (elements.columns - columns)
+    later = np.append(focus_delay(elements.position, AHEAD, focus, sound_speed), 0.0)[places]
+    return places, used, columns, 0.5 * elements.pitch * (elements.columns - columns), later

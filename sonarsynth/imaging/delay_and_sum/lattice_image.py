@@ -28,8 +28,8 @@ def check_lattice(elements: Elements) -> None:
 class SteeredZone:
     """How a zone is focused and steered: what `lattice_kernel.lattice_energies` takes."""
 
-    rows: Ints  # of the image: those above that are in the zone
-    columns: Ints  # likewise those to port
+    rows: slice  # of the image: those above that are in the zone
+    columns: slice  # likewise those to port
     odd: tuple[bool, bool]  # whether a subarray has an odd number of rows, and of columns
     places: Ints  # (set, subarray, half column, half row, 4) sensors
     heights: Ints  # (subarray, half column) rows in use
@@ -41,8 +41,8 @@ class SteeredZone:
 
 def steered(zone: Zone, elements: Elements, beams: BeamGrid, glass: Lens) -> SteeredZone:
     """The delays and the steps of a zone on a lattice."""
-    rows = beams.elevations // 2 + np.arange(zone.low, zone.high)
-    columns = beams.azimuths // 2 + np.arange(zone.near, zone.far)
+    rows = slice(beams.elevations // 2 + zone.low, beams.elevations // 2 + zone.high)
+    columns = slice(beams.azimuths // 2 + zone.near, beams.azimuths // 2 + zone.far)
     half = 0.5 * elements.pitch
     y, z = (half_coordinates(count, elements.pitch) for count in (glass.subarray_columns, glass.subarray_rows))
     odd = glass.subarray_rows % 2 == 1, glass.subarray_columns % 2 == 1
@@ -127,10 +127,7 @@ def lattice_image(
     for zone in zones:
         sensors, steps = (zone.places, live, zone.delay, zone.heights, *zone.odd), (zone.rise, zone.across, zone.middle)
         energy = np.asarray(lattice_energies(pairs, bins, *sensors, *steps, *first_and_spacing(frequencies)))
-        below, starboard = beams.elevations - 1 - zone.rows, beams.azimuths - 1 - zone.columns
         # From the far corner on: beams on an axis are their own mirror images, and are taken from the zone itself.
-        image[np.ix_(below, starboard)] = energy[3]
-        image[np.ix_(below, zone.columns)] = energy[2]
-        image[np.ix_(zone.rows, starboard)] = energy[1]
-        image[np.ix_(zone.rows, zone.columns)] = energy[0]
+        for mirror, seen in ((3, image[::-1, ::-1]), (2, image[::-1]), (1, image[:, ::-1]), (0, image)):
+            seen[zone.rows, zone.columns] = energy[mirror]
     return image

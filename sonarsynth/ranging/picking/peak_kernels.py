@@ -36,14 +36,17 @@ def local_maxima(power: Any, index: Any, row: Any, column: Any, floor: Any, edge
     """Beams and delays (peak,) of values over `floor` (beam,) that no neighbour exceeds.
 
     power (beam, delay); index (elevation, azimuth) the beam there, -1 for none; row, column (beam,) of each beam. None
-    within `end` delays of an end, which is more than `about`, and none in a beam at the edge of an axis of which edge
-    (2,) says that peaks are resolved: theirs may be outside.
+    within `end` delays of an end, which is more than `about`, none in a beam that lacks a neighbour, where a slope
+    would pass for a peak, and none at the edge of an axis of which edge (2,) says that peaks are resolved: theirs may
+    be outside.
     """
     rows, columns = index.shape
     peaks, count = np.empty((2, power.size), np.int64), 0
     for b in range(len(power)):
         i, j = row[b], column[b]
         if (edge[0] and (i == 0 or i == rows - 1)) or (edge[1] and (j == 0 or j == columns - 1)):
+            continue
+        if index[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2].min() < 0:
             continue
         for first in range(end, power.shape[1] - end, AT_ONCE):
             last, over = min(first + AT_ONCE, power.shape[1] - end), 0

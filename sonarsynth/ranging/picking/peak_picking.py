@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import maximum_filter, maximum_filter1d, minimum_filter, uniform_filter
+from scipy.ndimage import maximum_filter, maximum_filter1d, uniform_filter
 from scipy.special import diric
 
 from sonarsynth.conventions import Bools, Floats, Ints
@@ -107,8 +107,6 @@ def _maxima(
     power, beams = profiles.power, (profiles.row, profiles.column)
     floor = np.maximum(0.5 * least, power.max() * 10 ** (-dynamic_range / 10)).astype(np.float32)
     end = max(int(np.ceil(pulse_times.PULSE_HALF / profiles.step)), profiles.about) + 1
-    inner = minimum_filter(index >= 0, 3, mode="constant", cval=True)
-    floor[~inner[beams]] = np.inf  # at the rim a slope would pass for a peak
     b, t = local_maxima(power, index, *beams, floor, axes.resolved, profiles.about, end)
     anywhere = maximum_filter1d(power.max(axis=0), 2 * profiles.about + 1)
     good = (power[b, t] * 10 ** (side_lobes / 10) >= anywhere[t]) & ~_cut(power, b, t, end)
@@ -145,7 +143,7 @@ class Axes:
         image, moments = window.image, profiles.moments
         middle = float(np.mean(image.elevation[profiles.row])), float(np.mean(image.azimuth[profiles.column]))
         across = _tangents(*middle)
-        aperture = np.sqrt(np.einsum("ax,xy,ay->a", across, aperture_moments(window.elements), across))  # m, rms
+        aperture = np.sqrt(np.sum(across @ aperture_moments(window.elements) * across, axis=1))  # m, rms
         k = 2 * np.pi / window.sonar.assumed_sound_speed
         return Axes(
             step=np.array([*_steps(image), profiles.step]),
