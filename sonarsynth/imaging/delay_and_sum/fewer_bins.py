@@ -29,7 +29,8 @@ def fewer_bins(snapshots: Snapshots, travel_time: float) -> Snapshots:
     """Every k-th bin of a window, weighted so that energies of beams are those of all bins; all, where sound lasts as
     long as the window.
 
-    travel_time (s): of sound over half of the array, by which beams spread out what comes from elsewhere.
+    travel_time (s): of sound from the widest beam over half of the array, by which that spreads out what comes from
+    elsewhere.
     """
     bins, lasting = len(snapshots.frequency), snapshots.lasting + travel_time
     step = min(int(1.0 / (snapshots.spacing * lasting)), bins // FEWEST)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import sin
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Le
@@ -109,7 +110,9 @@ class FocusedDelayAndSum(Steering):
         """As `Steering.energies`. Raises ValueError for an array that is not a lattice, or when no element is live."""
         check_lattice(elements)
         weight, grid, speed = weights(elements, self.shading), sonar.beams, sonar.assumed_sound_speed
-        snapshots = fewer_bins(snapshots, elements.aperture / speed) if self.bins == "few" else snapshots
+        if self.bins == "few":
+            widest = sin(0.5 * max(grid.azimuth_span, grid.elevation_span))
+            snapshots = fewer_bins(snapshots, widest * elements.aperture / speed)
         spectra, frequency = snapshots.spectra, snapshots.frequency
         cut = steered_zones(elements, self.shading, grid, self.focus, speed, sonar.band, self._cut(elements, sonar))
         return snapshots.unit * lattice_image(spectra, elements, weight, frequency, grid, cut)
