@@ -33,8 +33,8 @@ from sonarsynth.tracing.receive_paths import (
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
 
-KEPT = 60_000
-"""Facets of a frame whose paths are kept for the next, at most: 40 MB."""
+KEPT = 30_000
+"""Facets of a frame whose paths are kept for the next, at most: 110 MB where each has three."""
 
 
 @dataclass(frozen=True, eq=False)

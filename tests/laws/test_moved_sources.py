@@ -13,10 +13,11 @@ import sonarsynth as ss
 from sonarsynth.environment.sea import Linear
 from sonarsynth.planning import plan
 from sonarsynth.recipe import Recipe
+from sonarsynth.scattering import Isotropic
 from sonarsynth.sources.snap_models import Ricker
 from sonarsynth.sources.sound_source import SoundSource
 from sonarsynth.tracing import facet_paths
-from tests.laws.test_stored_paths import still
+from tests.laws.test_stored_paths import SPEED, paths_of, still
 from tests.scenes import remus
 
 NEAR, FAR = ss.SnappingShrimp(position=(15.0, -4.0)), ss.SnappingShrimp(position=(26.0, 6.0), source_level=180.0)
@@ -57,6 +58,29 @@ def test_of_a_body_that_moves_they_agree_within_the_accuracy() -> None:
         late = np.arange(there.shape[1]) / recipe.scene.sonar.sampling_frequency
         echo = late > late[np.abs(there).max(axis=0).argmax()] + 1e-3  # after the direct pulse
         assert np.abs(moved - there)[:, echo].max() < recipe.accuracy.signal * np.abs(there[:, echo]).max()
+
+
+@pytest.mark.parametrize("move", [0.1, 1.0, 12.0])
+def test_paths_of_one_place_of_the_source_are_carried_to_another_by_the_length_of_their_ways_to_it(move: float) -> None:
+    """Of facets that send the same all round: what a source elsewhere changes is that, and which facets it lights."""
+    recipe = still(signal=1e-3)
+    recipe = replace(recipe, scene=replace(recipe.scene, physics=replace(recipe.scene.physics, scattering=Isotropic())))
+    made, there = plan(recipe, ["paths"]), (15.0 - 0.6 * move, -4.0 - 0.8 * move)
+    trees = ss.with_sources(made, 0, [NEAR, ss.SnappingShrimp(position=there)])
+    frame = made.frame(0)
+    mesh, pose = frame.moment.bodies[0].mesh, frame.moment.bodies[0].pose
+    middle, normal = pose.to_world(mesh.centroid), pose.turn_to_world(mesh.normal)
+    sources = [tree["truth/emissions"]["position"].to_numpy()[0] for tree in trees]
+    before, after = (paths_of(tree) for tree in trees)
+    before, after = (of.isel(path=np.flatnonzero(of.target.to_numpy() == 0)) for of in (before, after))
+    both, n, m = np.intersect1d(before.facet, after.facet, return_indices=True)
+    out, moved = (np.linalg.norm(middle[both] - source, axis=1) for source in sources)
+    assert len(both) > 100
+    assert np.allclose(after.delay[m], before.delay[n] + (moved - out) / SPEED, rtol=0.0, atol=1e-12)
+    assert np.allclose(after.amplitude[m] * moved, before.amplitude[n] * out, rtol=1e-6)
+    new = after.facet.to_numpy()
+    assert np.all(np.sum((sources[1] - middle[new]) * normal[new], axis=1) > 0.0)  # others are dark there
+    assert set(new.tolist()) != set(before.facet.to_numpy().tolist())
 
 
 def test_the_way_to_the_array_is_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
