@@ -13,7 +13,7 @@ from sonarsynth.conventions import Bools, Ints
 class Columns:
     """A table: a dataclass whose arrays have a row for each of something, as have the tables in it; the rest is of all.
 
-    A column of one value for all rows (`numpy.broadcast_to`) stays that.
+    A column of one value for all rows (`alike`) stays that.
     """
 
     def select(self, keep: Bools | Ints | Sequence[int] | slice) -> Self:
@@ -28,7 +28,26 @@ class Columns:
             elif isinstance(value, Columns):
                 value = value.select(rows)
             columns[name] = value
-        return type(self)(**columns)
+        table = object.__new__(type(self))  # with all that there was: nothing for `__init__` to look at
+        vars(table).update(columns)
+        return table
+
+    def but(self, **columns: Any) -> Self:
+        """The same table with some columns in the place of its own: `dataclasses.replace`, in a quarter of the time.
+        Raises TypeError for a column that it does not have."""
+        names = self.__dataclass_fields__  # type: ignore[attr-defined]
+        if not columns.keys() <= names.keys():
+            raise TypeError(f"{type(self).__name__} has no column {', '.join(sorted(columns.keys() - names.keys()))}")
+        table, values = object.__new__(type(self)), vars(self)
+        vars(table).update({name: values[name] for name in names}, **columns)
+        return table
+
+
+def alike(value: Any, count: int) -> np.ndarray:
+    """A column of one value, a number or a row of them, for so many rows, to be read only: `numpy.broadcast_to`, in a
+    quarter of the time."""
+    one = np.asarray(value, order="C")
+    return np.ndarray((count, *one.shape), one.dtype, one.tobytes(), 0, (0, *one.strides))
 
 
 def picked(mask: Bools) -> Ints | slice:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sonarsynth.columns import alike
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh
@@ -207,7 +208,7 @@ def clear_of_own_body(
     """Body (ray,) that rays from the middles of facets (owner and facet of each) in directions (ray, xyz), world, of
     length one, come from and surely do not meet again; -1 where that is not certain. Nor do others of a cone about each
     of them, of some slope (ray,)."""
-    slope = np.broadcast_to(slope, len(owner))
+    slope = alike(slope, len(owner)) if np.ndim(slope) == 0 else np.asarray(slope)
     own = np.full(len(owner), NO_TARGET)
     for number, body in enumerate(bodies):
         rows = slice(None) if len(bodies) == 1 and (owner == 0).all() else np.flatnonzero(owner == number)

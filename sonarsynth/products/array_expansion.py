@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -78,7 +78,7 @@ class ArrayExpansion(Columns):
 
     def without(self, *names: str) -> ArrayExpansion:
         """The same, but of some quantities all sensors have what the middle has."""
-        return replace(self, **{name: getattr(self, name)[:, :0] for name in names})
+        return self.but(**{name: getattr(self, name)[:, :0] for name in names})
 
     def over(self, name: str, points: Floats) -> Floats:
         """A quantity at places (point, xyz) m: (path, point)."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonarsynth.columns import alike
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.environment.boundary_numbers import bounces
 from sonarsynth.environment.sea import Environment, Profile
@@ -45,8 +46,8 @@ def at_boundaries(
 ) -> Reflections:
     """Of so many reflections (path,) at grazing angles (path,) in rad."""
     if not (surface.any() or bottom.any()):
-        none = np.broadcast_to(0.0, surface.shape)
-        return Reflections(np.broadcast_to(1.0, surface.shape), none, none)
+        none = alike(0.0, len(surface))
+        return Reflections(alike(1.0, len(surface)), none, none)
     over = bounces(environment.surface, surface_grazing, surface, float(profile.at(0.0)), centre)
     under = bounces(environment.bottom, bottom_grazing, bottom, float(profile.at(environment.depth)), centre)
     return Reflections(

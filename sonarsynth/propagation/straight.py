@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from sonarsynth.columns import alike
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.description import description
 from sonarsynth.description.method import FrameSize
@@ -65,12 +66,12 @@ class Straight(PathModel):
         columns = []
         for image in images(z1, z2, environment_depth, self.bounces):
             length, departure, spreading = straight_rays(level, image.climb)
-            mean, height, none = 1.0 / speed, np.abs(image.climb), np.broadcast_to(0, len(length))
+            mean, height, none = 1.0 / speed, np.abs(image.climb), alike(0, len(length))
             if not profile.uniform:
                 heights = (image.above, image.between, image.below)
                 crossed = sum(h * s for h, s in zip(heights, slowness, strict=True))
                 mean = np.divide(crossed, height, out=slowness[1].copy(), where=height > 0)
-            missing = grazing = np.broadcast_to(np.nan, len(length))
+            missing = grazing = alike(np.nan, len(length))
             if image.surface or image.bottom:
                 grazing = np.arcsin(np.divide(height, length, out=missing.copy(), where=length > 0))
             columns.append(
@@ -81,8 +82,8 @@ class Straight(PathModel):
                     "departure": departure,
                     "arrival": departure if image.turns > 0 else departure * [1.0, 1.0, -1.0],
                     "spreading": spreading,
-                    "surface": np.broadcast_to(image.surface, len(length)),
-                    "bottom": np.broadcast_to(image.bottom, len(length)),
+                    "surface": alike(image.surface, len(length)),
+                    "bottom": alike(image.bottom, len(length)),
                     "turning": none,
                     "caustics": none,
                     "surface_grazing": grazing if image.surface else missing,

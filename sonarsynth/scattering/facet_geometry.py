@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonarsynth.columns import Columns
+from sonarsynth.columns import Columns, alike
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.curvature import curvature_radius
@@ -62,8 +62,8 @@ class PulseResponse(Columns):
     @staticmethod
     def plain(count: int) -> PulseResponse:
         """Nothing at all: the pulse is repeated."""
-        zero, corners = np.broadcast_to(0.0, count), np.broadcast_to(0.0, (count, 3))
-        return PulseResponse(np.broadcast_to(False, count), corners, zero, zero, zero, zero, zero)
+        zero, corners = alike(0.0, count), alike(np.zeros(3), count)
+        return PulseResponse(alike(False, count), corners, zero, zero, zero, zero, zero)
 
     @staticmethod
     def join(responses: list[PulseResponse]) -> PulseResponse:

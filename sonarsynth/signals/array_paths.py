@@ -4,7 +4,7 @@ inf)."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -85,7 +85,7 @@ class Wavefronts(Columns):
         occluded = self.occluded.copy()
         occluded[rows[faint]] = 0
         none = rows[faint[missed[faint] > 0.5]]
-        return replace(self, occluded=occluded).select(np.delete(np.arange(self.count), none))
+        return self.but(occluded=occluded).select(np.delete(np.arange(self.count), none))
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +203,7 @@ def towards(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:
     from sonarsynth.equations.kernels.unit_vectors import towards_sources
 
     u, n = towards_sources(front.direction, front.curvature, points)
-    return np.ascontiguousarray(np.moveaxis(u, 2, 0)), np.ascontiguousarray(n.T)
+    return np.ascontiguousarray(u.transpose(2, 0, 1)), np.ascontiguousarray(n.T)
 
 
 BENT = 4
@@ -218,29 +218,33 @@ def tilt(front: Wavefronts, gradient: Floats) -> Floats:
     return np.asarray(-front.sound_speed * slope.swapaxes(0, 1))
 
 
-def arrival_directions(front: Wavefronts, points: Floats) -> Floats:
+def arrival_directions(front: Wavefronts, points: Floats, u: Floats | None = None) -> Floats:
     """Slownesses of the wavefronts at points (point, xyz), times the speed of sound at the centre, (path, point, xyz):
-    what element faces hear, and unit vectors of `towards` where rays are straight."""
-    u, _ = towards(front, points)
+    what element faces hear, and the unit vectors u of `towards`, if these are at hand, where rays are straight."""
+    u = towards(front, points)[0] if u is None else u
     if not front.expansion.delay.shape[1]:
         return u
-    return np.asarray(u + np.moveaxis(tilt(front, front.expansion.gradient(points, "delay")), 2, 0))
+    return np.asarray(u + tilt(front, front.expansion.gradient(points, "delay")).transpose(2, 0, 1))
 
 
 def delay_and_gain(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:
     """Delay (s) after the array centre, and gain over it at the band centre, (path, point) each."""
     _, n = towards(front, points)
-    square = np.einsum("pi,pi->p", points, points)
-    # (|R d - q| - R)/c without the difference of nearly equal numbers
-    path = (front.curvature[:, None] * square - 2.0 * front.direction @ points.T) / (n + 1.0)
-    delay, gain = path / front.sound_speed, 1.0 / n
-    if front.expansion.delay.shape[1]:
-        delay = delay + front.expansion.over("delay", points)
+    delay, gain = delays(front, n, points), 1.0 / n
     if front.expansion.amplitude.shape[1]:
         gain = gain * (1.0 + front.expansion.over("amplitude", points))
     if front.attenuation:
         gain = gain * lost(front.attenuation * front.sound_speed * delay)
     return delay, gain
+
+
+def delays(front: Wavefronts, n: Floats, points: Floats) -> Floats:
+    """Delay (s) after the array centre (path, point), from |R d - q|/R (path, point) of `towards`."""
+    square = np.einsum("pi,pi->p", points, points)
+    # (|R d - q| - R)/c without the difference of nearly equal numbers
+    path = (front.curvature[:, None] * square - 2.0 * front.direction @ points.T) / (n + 1.0)
+    delay = path / front.sound_speed
+    return np.asarray(delay + front.expansion.over("delay", points) if front.expansion.delay.shape[1] else delay)
 
 
 def lost(level: Floats) -> Floats:

@@ -86,7 +86,7 @@ def with_changes(front: ArrayPaths) -> ArrayPaths:
     rows, count = np.concatenate(copies), [some.size for some in copies]
     blur = np.repeat([0.0, 1.0, -1.0, 0.0], count)
     ahead = np.repeat([0.0, 0.0, 0.0, 1.0], count)
-    every = replace(front, occluded=front.occluded[:, :0], expansion=front.expansion.without(*QUANTITIES)).select(rows)
+    every = front.but(occluded=front.occluded[:, :0], expansion=front.expansion.without(*QUANTITIES)).select(rows)
     return replace(
         every,
         amplitude=every.amplitude * np.where(ahead > 0.0, np.minimum(turn[rows], 1.0), 1.0),

@@ -70,7 +70,7 @@ def trace_each(
             begun |= set(group.snaps)
     speed = receiver.speed(context.medium)
     every = [join(blocks or [no_arrivals(array.legs)], speed, receiver.centre) for blocks in found]
-    return [replace(of, snap=of.snap - first) for of, first in zip(every, last, strict=False)]
+    return [of.but(snap=of.snap - first) for of, first in zip(every, last, strict=False)]
 
 
 def _hearing(array: FacetPaths, snap: Emission, sonar: Track) -> FacetPaths:
@@ -112,10 +112,10 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     if snap.directivity is not None:  # seen from the source, hydrophones are in other directions than the centre
         gain = gain * (snap.directivity(over.departure(rows)) / snap.directivity(legs.departure)[:, None])
     amplitude, error = fitted(array, gain, legs.spreading)
-    legs = replace(legs, spreading=legs.spreading * loud, phase=legs.phase + turned)
+    legs = legs.but(spreading=legs.spreading * loud, phase=legs.phase + turned)
     legs = legs if meeting is None else received(legs, met, meeting, medium.profile)
     direct = assemble(
-        legs, replace(over.expansion, amplitude=amplitude), none_out, index, snap.time, path_loss(array, snap, legs),
+        legs, over.expansion.but(amplitude=amplitude), none_out, index, snap.time, path_loss(array, snap, legs),
         kind=Kind.DIRECT, target=none, facet=none, scattering=one, pulses=PulseResponse.plain(count),
         amplitude_error=error,
     )  # fmt: skip

@@ -20,11 +20,11 @@ the array takes up there: parts of the array see it from their own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from sonarsynth.columns import Columns
+from sonarsynth.columns import Columns, alike
 from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.kernels import moving_ends
@@ -71,7 +71,7 @@ class MotionTerms(Columns):
     def direct(count: int, snap: Emission) -> MotionTerms:
         """Paths from a snap itself, which is where it is when it sounds."""
         none = MotionTerms.none(count)
-        return replace(none, met=none.met + snap.time, velocity=none.velocity + snap.velocity)
+        return none.but(met=none.met + snap.time, velocity=none.velocity + snap.velocity)
 
     def departure(self, length: Floats, away: Floats, body: Pose | None = None) -> Floats:
         """Directions (path, ..., xyz) to the array or probes of it, of rays of some length (path,) m that left in
@@ -97,7 +97,7 @@ def velocities(scattering: tuple[Scatterers, ...], owner: Ints, point: Floats) -
     """Velocity (point, xyz) m/s of surface elements (owner of each), world, and the spin of their owner rad/s."""
     tracks = [surface.track for surface in scattering]
     own = [np.array(column).reshape(-1, 3) for column in zip(*((t.velocity, t.spin) for t in tracks), strict=True)]
-    motion, spins = (np.broadcast_to(of, point.shape) if len(of) == 1 else of[owner] for of in own)
+    motion, spins = (alike(of[0], len(point)) if len(of) == 1 else of[owner] for of in own)
     if spins.any():
         middle = np.array([track.pose.position for track in tracks])[owner]
         motion = motion + np.cross(spins, point - middle)
@@ -112,7 +112,7 @@ def meets(
     there, m/s."""
     late, arrival, length = moving_ends.meet(out.length, out.arrival, time + out.travel_time - met, speed, velocity)
     spreading, travel_time = out.spreading * (out.length / length), (met - time) + late
-    return replace(out, arrival=arrival, length=length, travel_time=travel_time, spreading=spreading), late
+    return out.but(arrival=arrival, length=length, travel_time=travel_time, spreading=spreading), late
 
 
 def mirrored(velocity: Floats, bounces: Ints) -> Floats:
@@ -147,8 +147,8 @@ def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, profile: Pro
     if meeting.sonar.spin.any():
         direction = direction - np.cross(pose.turn_to_body(meeting.sonar.spin), direction) * late[:, None]
         direction /= np.sqrt(dot(direction, direction))[:, None]
-    return replace(
-        legs, point=legs.point + moved, departure=of.departure(legs.length, legs.departure), arrival=arrival,
+    return legs.but(
+        point=legs.point + moved, departure=of.departure(legs.length, legs.departure), arrival=arrival,
         direction=direction, radius=radius, length=legs.length + (radius - legs.radius),
         spreading=legs.spreading * (legs.radius / radius), travel_time=meeting.arrival_time - begun + late,
     )  # fmt: skip
@@ -164,10 +164,10 @@ def apply_doppler(
     rate_out, rate_in = dot(of.velocity, out.arrival) / c, -dot(of.velocity, legs.departure) / c
     of_array = dot(legs.arrival, array.velocity) / c_array
     doppler = (1.0 - out.approach) * (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
-    arrivals = replace(arrivals, doppler=doppler)
+    arrivals = arrivals.but(doppler=doppler)
     if not elements.aperture or not (array.velocity.any() or array.spin.any()):
         return arrivals
-    return replace(arrivals, expansion=_over_aperture(arrivals, legs, array, c_array, 1.0 / (1.0 - of_array), elements))
+    return arrivals.but(expansion=_over_aperture(arrivals, legs, array, c_array, 1.0 / (1.0 - of_array), elements))
 
 
 def _over_aperture(
@@ -189,4 +189,4 @@ def _over_aperture(
     terms, missed = probe.expand(late)
     if over.delay.shape[1]:
         terms += over.delay * longer[:, None]
-    return replace(over, delay=terms, error=over.error + missed, aperture=elements.aperture)
+    return over.but(delay=terms, error=over.error + missed, aperture=elements.aperture)

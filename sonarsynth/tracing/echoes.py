@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.columns import picked, rows_of
+from sonarsynth.columns import alike, picked, rows_of
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.equations.kernels.unit_vectors import to_moved_images
 from sonarsynth.geometry.mesh import in_blocks
@@ -67,7 +67,7 @@ class _EchoBlock:
         groups = [g.select(np.flatnonzero(keep)) for g, keep in zip(self.groups, np.split(loud, ends), strict=True)]
         (row,) = _columns(groups, "row")
         number = np.split(np.arange(len(row)), np.cumsum([len(g.row) for g in groups])[:-1])
-        groups = [replace(g, row=rows) for g, rows in zip(groups, number, strict=True)]
+        groups = [g.but(row=rows) for g, rows in zip(groups, number, strict=True)]
         out, leg, factor = self.out.select(row), self.leg[row], self.factor[row]
         carried, kept = None if self.carried is None else self.carried.select(row), np.flatnonzero(loud)
         few, gain, terms, pulses = rows_of(self.few, kept), self.gain[kept], self.terms[kept], self.pulses.select(kept)
@@ -144,14 +144,14 @@ def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...
         amplitude, sign = _columns(block.groups, "amplitude", "sign")
         scattered, loss = sign * amplitude, path_loss(array, snap, legs, out)
         echo = assemble(
-            legs, replace(over, amplitude=variation), out, index, snap.time, loss, kind=kinds, target=target,
+            legs, over.but(amplitude=variation), out, index, snap.time, loss, kind=kinds, target=target,
             facet=facet, scattering=scattered, pulses=block.pulses, amplitude_error=error,
         )  # fmt: skip
         if meeting is not None and block.carried is not None:
             echo = apply_doppler(echo, legs, out, block.carried, meeting, profile, receiver.elements)
         if spot.any() and array.bending.profile.uniform:
             echo = shift_to_scattering_points(echo, legs, spot, receiver.pose)
-        arrivals.append(replace(echo, delay=echo.delay + block.pulses.late))
+        arrivals.append(echo.but(delay=echo.delay + block.pulses.late))
     return ordered(arrivals, group)
 
 
@@ -229,7 +229,7 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     """Ways from a snap to the lit side of facets that no body hides; of facets in one place, the first body's."""
     medium, bodies, facets = array.context.medium, array.context.bodies, array.facets
     row = np.flatnonzero(may_face_receiver(facets, snap.position, array.propagation.bounces, medium))
-    start = np.broadcast_to(snap.position, (len(row), 3))
+    start = alike(snap.position, len(row))
     paths = array.propagation.connect(medium.profile, medium.depth, start, rows_of(facets.point, row))
     paths = paths.select(picked(usable(paths) & facets.lit(row[paths.pair], paths.arrival)))
     bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
@@ -251,7 +251,7 @@ def _hides(
 ) -> Bools:  # fmt: skip
     """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz); own as of
     `hidden`."""
-    end = np.broadcast_to(snap.position, start.shape)  # backwards: bodies are where a ray begins
+    end = alike(snap.position, len(start))  # backwards: bodies are where a ray begins
     stand_in = partial(hidden, bounces=out.bounces, turning=out.turning, own=own)
     return stand_in(bodies, array.bending, start, end, -out.arrival, out.length)
 
@@ -274,4 +274,4 @@ def _turned(block: _EchoBlock, strongest: float) -> ArrayExpansion:
     terms, missed = probe.expand(np.where(leaps[:, None], 0.0, shift))
     share = np.abs(block.strength) / max(strongest, 1e-300)
     error = over.error + share * missed / (2.0 * np.pi * array.context.receiver.band[1])
-    return replace(over, phase=over.phase + terms if over.phase.shape[1] else terms, error=error)
+    return over.but(phase=over.phase + terms if over.phase.shape[1] else terms, error=error)

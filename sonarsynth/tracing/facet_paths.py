@@ -184,7 +184,7 @@ def facet_paths(
 
 def bending(medium: Medium, propagation: Propagation, receiver: Receiver) -> Medium:
     """What bends the rays of a model: the water, or for straight rays the speed at the array everywhere."""
-    if propagation.bends:
+    if propagation.bends or medium.profile.uniform:
         return medium
     nodes = medium.profile.depth
     return replace(medium, profile=Profile(nodes, np.full(len(nodes), receiver.speed(medium))))

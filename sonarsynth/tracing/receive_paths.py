@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from sonarsynth.casting.ray_casting import OFFSET, clear_of_own_body
-from sonarsynth.columns import Columns, picked, rows_of
+from sonarsynth.columns import Columns, alike, picked, rows_of
 from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth
 from sonarsynth.equations.kernels.placing import placed
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, TOLERANCE
@@ -56,11 +56,11 @@ class ReceivePaths(Columns):
 
     def numbered(self, row: Ints) -> ReceivePaths:
         """The legs with other numbers (leg,) for the points that they start from."""
-        return replace(self, row=row)
+        return self.but(row=row)
 
     def seen(self, occluded: Bytes, open: Ints) -> ReceivePaths:
         """The legs, hidden from some hydrophones, which are not known yet for some."""
-        return replace(self, occluded=occluded, open=open)
+        return self.but(occluded=occluded, open=open)
 
     @property
     def bounces(self) -> Ints:
@@ -166,7 +166,7 @@ def rays_to_centre(
 ) -> ReceivePaths:  # fmt: skip
     """Rays from points (point, xyz) in the world to the array centre, sorted by point: all, or those that are chosen
     (path,) of the usable ones."""
-    end = np.broadcast_to(receiver.pose.position, point.shape)
+    end = alike(receiver.pose.position, len(point))
     paths = propagation.connect(medium.profile, medium.depth, point, end)
     paths = paths.select(picked(usable(paths) & chosen(paths)))
     start = rows_of(point, paths.pair)
@@ -189,7 +189,7 @@ def rays_to_centre(
         phase=bounced.phase,
         delay_std=bounced.delay_std,
         occluded=np.zeros((len(start), 0), np.uint8),
-        open=np.broadcast_to(0, len(start)),
+        open=alike(0, len(start)),
     )
 
 

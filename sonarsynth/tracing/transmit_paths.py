@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from sonarsynth.columns import Columns, picked
+from sonarsynth.columns import Columns, alike, picked
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind, Paths
 from sonarsynth.products.array_expansion import stacked
@@ -42,7 +42,7 @@ class TransmitPaths(Columns):
     def of(paths: Paths, bounced: Reflections, facet: Ints, snap: Emission, speed: float) -> TransmitPaths:
         """Of paths to facets (path,) from a snap where sound has this speed (m/s)."""
         loud, turned = directed(snap, paths.departure)
-        approach = paths.departure @ snap.velocity / speed if snap.velocity.any() else np.broadcast_to(0.0, len(facet))
+        approach = paths.departure @ snap.velocity / speed if snap.velocity.any() else alike(0.0, len(facet))
         return TransmitPaths(
             facet, paths.arrival, paths.travel_time, paths.length, paths.spreading * loud, paths.surface, paths.bottom,
             paths.turning, paths.caustics, bounced.modulus, bounced.phase + turned if np.any(turned) else bounced.phase,
@@ -70,7 +70,7 @@ class TransmitPaths(Columns):
         value = np.add.reduceat(self.spreading * self.boundary * np.exp(1j * self.phase), np.flatnonzero(first))
         order = np.lexsort((self.bounces, number))
         merged = self.select(order[np.flatnonzero(np.diff(number[order], prepend=-1))])  # by the fewest bounces
-        return replace(merged, boundary=np.abs(value) / merged.spreading, phase=np.angle(value + 0.0))
+        return merged.but(boundary=np.abs(value) / merged.spreading, phase=np.angle(value + 0.0))
 
     @property
     def bounces(self) -> Ints:
@@ -125,7 +125,7 @@ def assemble(
         boundary=boundary,
         absorption=loss,
         length=length,
-        kind=np.broadcast_to(np.asarray(kind, np.int8), length.shape),
+        kind=alike(np.int8(kind), len(length)) if np.ndim(kind) == 0 else np.asarray(kind, np.int8),
         snap=np.full(len(length), index),
         target=target,
         facet=facet,
@@ -181,7 +181,7 @@ def join(blocks: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:
     )
     audible = order[np.concatenate([block.amplitude for block in blocks])[order] != 0.0]
     every = len(audible) == len(order) and bool((np.diff(audible) == 1).all())
-    return replace(_stacked(blocks, None if every else audible), sound_speed=sound_speed, centre=centre)
+    return _stacked(blocks, None if every else audible).but(sound_speed=sound_speed, centre=centre)
 
 
 def ordered(blocks: list[Arrivals], group: list[Ints]) -> Arrivals:

@@ -1,12 +1,12 @@
 """Rows of tables in columns: what is picked is what NumPy picks of each column, however it is asked for."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from sonarsynth.columns import Columns, picked
+from sonarsynth.columns import Columns, alike, picked
 from sonarsynth.conventions import Floats
 
 
@@ -35,7 +35,7 @@ MASK = np.arange(9) % 4 == 1
 )
 def test_rows_are_those_that_numpy_picks(keep: Any) -> None:
     value, place = np.arange(9.0), np.arange(27.0).reshape(9, 3)
-    same = np.broadcast_to([1.0, 2.0, 3.0], (9, 3))
+    same = alike([1.0, 2.0, 3.0], 9)
     rows = Outer(value, same, Inner(place), "all").select(keep)
     for found, column in ((rows.value, value), (rows.same, same.copy()), (rows.inner.place, place)):
         np.testing.assert_array_equal(found, column[keep])
@@ -46,3 +46,20 @@ def test_one_value_for_all_is_not_copied_and_neither_are_all_rows() -> None:
     table = Outer(np.arange(9.0), np.broadcast_to(2.0, (9, 3)), Inner(np.zeros((9, 3))), "all")
     assert table.select(MASK).same.strides == (0, 0)
     assert table.select(picked(np.ones(9, bool))) is table
+
+
+@pytest.mark.parametrize("value", [2.0, 3, True, np.int8(-1), [1.0, 2.0, 3.0], np.arange(6.0)[::2]])
+@pytest.mark.parametrize("count", [0, 1, 9])
+def test_a_column_of_one_value_is_that_which_numpy_broadcasts(value: Any, count: int) -> None:
+    column, expected = alike(value, count), np.broadcast_to(value, (count, *np.shape(value)))
+    np.testing.assert_array_equal(column, expected)
+    assert column.dtype == expected.dtype and column.strides[0] == 0 and not column.flags.writeable
+
+
+def test_a_table_with_other_columns_is_what_dataclasses_replace() -> None:
+    table, place = Outer(np.arange(9.0), alike(2.0, 9), Inner(np.zeros((9, 3))), "all"), np.ones((9, 3))
+    changed = {"value": np.ones(9), "inner": table.inner.but(place=place)}
+    found, expected = table.but(**changed), replace(table, **changed)  # type: ignore[arg-type]
+    assert type(found) is Outer and vars(found) == vars(expected) and found.inner.place is place
+    with pytest.raises(TypeError, match="no column values"):
+        table.but(values=np.ones(9))

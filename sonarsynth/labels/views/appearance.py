@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonarsynth.casting.ray_casting import OFFSET, clear_of_body, occluded
+from sonarsynth.columns import alike
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import in_blocks
@@ -54,7 +55,7 @@ def _apparent(body: PlacedTarget, sonar_pose: Pose, connect: Connect | None) -> 
         return true
     apparent = np.full_like(true, np.nan)
     for block in in_blocks(len(world)):
-        paths = connect(world[block], np.broadcast_to(sonar_pose.position, world[block].shape))
+        paths = connect(world[block], alike(sonar_pose.position, len(world[block])))
         pairs, first = np.unique(paths.pair, return_index=True)  # the earliest: paths are sorted by time
         towards = -sonar_pose.turn_to_body(paths.arrival[first])
         apparent[block][pairs] = towards * np.linalg.norm(true[block][pairs], axis=1)[:, None]
@@ -84,7 +85,7 @@ def _leaving(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], rows: Ints, t
     facet, start = facet[:count], start[:count]
     own = np.where(clear_of_body(mesh, facet, towards[:count], np.zeros(count)), 0, NO_TARGET)
     others = tuple(other for other in bodies if other is not body)
-    return facet, ~occluded((body, *others), start, np.broadcast_to(to, start.shape), own)
+    return facet, ~occluded((body, *others), start, alike(to, len(start)), own)
 
 
 def _offset(body: PlacedTarget) -> float:
@@ -115,11 +116,11 @@ def lit_fraction(
         else:
             position = body.pose.to_world(body.mesh.centroid[rows])
             normal = body.pose.turn_to_world(body.mesh.normal[rows])
-            paths = connect(np.broadcast_to(snap.position, position.shape), position)
+            paths = connect(alike(snap.position, len(position)), position)
             towards = -paths.arrival
             lighting = np.flatnonzero(usable(paths) & (np.einsum("ij,ij->i", towards, normal[paths.pair]) > 0.0))
             pair = paths.pair[lighting]
-            start, end = (position + _offset(body) * normal)[pair], np.broadcast_to(snap.position, (len(pair), 3))
+            start, end = (position + _offset(body) * normal)[pair], alike(snap.position, len(pair))
             clear = ~hidden(bodies, medium, start, end, towards[lighting], paths.length[lighting])
             faced = rows[pair]
         lit[faced[clear]] = True

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -120,7 +119,7 @@ def _changing(front: ArrayPaths, highest: Floats, tolerance: float) -> ArrayPath
     spread = np.linalg.norm(front.expansion.largest("delay_variance") * loud) * float(blur_exponent(highest)[0])
     least = SHAPES * tolerance * loud.max()
     quiet = [name for name, size in (("phase", turn), ("delay_variance", spread)) if size <= least]
-    return replace(front, expansion=front.expansion.without(*quiet))
+    return front.but(expansion=front.expansion.without(*quiet))
 
 
 def _bins_of_corners(front: ArrayPaths, frequency: Floats, sonar: Sonar) -> int:
@@ -155,7 +154,7 @@ def _with_modes(
     if few:
         middle = 0.5 * float(front.loss.min() + front.loss.max())
         lost = np.exp(-middle * decay)
-        front, spectrum, series = replace(front, loss=front.loss - middle), spectrum * lost, series * lost
+        front, spectrum, series = front.but(loss=front.loss - middle), spectrum * lost, series * lost
     else:
         decay = np.zeros(frequency.size)
     every = with_changes(front) if front.count > 1 else front
@@ -163,7 +162,7 @@ def _with_modes(
     weight = weight[: front.count]
     if front.corner_delays.any() or front.coherent_fraction.any():
         spectrum = modes[0]  # what paths mostly send: the spectrum of the errors
-    return replace(front, modes=weight, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
+    return front.but(modes=weight, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
 
 
 def _shared(
@@ -183,12 +182,12 @@ def _shared(
         soft = np.exp(-least * blur_exponent(frequency))
         spectrum, series = spectrum * soft, series * soft
     alike = spread * blur_exponent(frequency)[-1] <= SHAPES * tolerance
-    front = replace(front, variance=np.zeros(front.count) if alike else front.variance - least)
+    front = front.but(variance=np.zeros(front.count) if alike else front.variance - least)
     phase = float(front.phase[0])
     if (np.abs(front.phase - phase) <= SHAPES * tolerance).all():
         turn = np.exp(1j * phase)
         spectrum, series = spectrum * turn, series * turn
-        front = replace(front, phase=np.zeros(front.count))
+        front = front.but(phase=np.zeros(front.count))
     if front.corner_delays.any() or front.coherent_fraction.any():
         front, facet = _shared_facet(front, frequency)
         spectrum, series = spectrum * facet, series * facet
@@ -200,10 +199,10 @@ def _shared_facet(front: ArrayPaths, frequency: Floats) -> tuple[ArrayPaths, Com
     first, facet = front.select(np.arange(1)), np.ones(frequency.size, complex)
     if (front.corner_delays == first.corner_delays).all():
         facet = facet * facet_mean(frequency, first.corner_delays)[0]
-        front = replace(front, corner_delays=np.zeros((front.count, 3)))
+        front = front.but(corner_delays=np.zeros((front.count, 3)))
     if not (np.ptp(front.coherent_fraction) or np.ptp(front.height_delay_std)):
         facet = facet * rough_factor(frequency, first.coherent_fraction, first.height_delay_std)[0]
-        front = replace(front, coherent_fraction=np.zeros(front.count))
+        front = front.but(coherent_fraction=np.zeros(front.count))
     return front, facet
 
 

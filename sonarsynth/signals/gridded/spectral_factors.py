@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.noise import filters
-from sonarsynth.signals.array_paths import NEPER, Wavefronts, arrival_directions, delay_and_gain, lost, towards
+from sonarsynth.signals.array_paths import NEPER, Wavefronts, arrival_directions, delays, lost, towards
 from sonarsynth.signals.gridded.bins import Bins
 from sonarsynth.signals.gridded.low_rank import face_pairs, sinc_polynomials
 from sonarsynth.signals.gridded.nodes import DEGREES, Axis, chebyshev, interpolation, nodes_for, polynomials_for
@@ -56,9 +56,9 @@ class Steering(NamedTuple):
     @staticmethod
     def at(points: Floats, reference: Wavefronts) -> Steering:
         """That of references."""
-        delay, direction = delay_and_gain(reference, points)[0], arrival_directions(reference, points)
-        slowness = np.ascontiguousarray(direction[:, :, 1:].reshape(-1, 2))
-        return Steering(points, delay.ravel(), 1.0 / towards(reference, points)[1].ravel(), slowness)
+        u, n = towards(reference, points)
+        slowness = np.ascontiguousarray(arrival_directions(reference, points, u)[:, :, 1:].reshape(-1, 2))
+        return Steering(points, delays(reference, n, points).ravel(), 1.0 / n.ravel(), slowness)
 
     def rows(self, rows: slice) -> Steering:
         """At some of the nodes."""

@@ -6,7 +6,6 @@ over that from the array, times the aperture. The wavefront is that of the point
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,7 +31,7 @@ def shift_to_scattering_points(arrivals: Arrivals, legs: ReceivePaths, spot: Flo
     direction, radius = arrivals.direction.copy(), arrivals.radius.copy()
     radius[rows] = np.sqrt(dot(apparent, apparent))
     direction[rows] = apparent / radius[rows, None]
-    return replace(arrivals, direction=direction, radius=radius)
+    return arrivals.but(direction=direction, radius=radius)
 
 
 def delay_to_scattering_points(over: ArrayExpansion, array: FacetPaths, leg: Ints, spot: Floats) -> ArrayExpansion:
@@ -45,4 +44,4 @@ def delay_to_scattering_points(over: ArrayExpansion, array: FacetPaths, leg: Int
     late = -dot(spot[rows, None], away) / speed[:, None]
     delay = over.delay.copy()
     delay[rows] += probes(array.context.receiver.elements).expand(late)[0]
-    return replace(over, delay=delay)
+    return over.but(delay=delay)

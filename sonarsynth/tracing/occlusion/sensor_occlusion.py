@@ -11,7 +11,7 @@ import numpy as np
 
 from sonarsynth.casting.cones import CLOSED, UNKNOWN, classify_cones
 from sonarsynth.casting.shadows import hide
-from sonarsynth.columns import picked
+from sonarsynth.columns import alike, picked
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -62,7 +62,7 @@ class Occlusion:
         starts (leg,): of the legs.
         """
         if self.elements is None or self.elements.count == 1 or not self.bodies:
-            end = np.broadcast_to(self.receiver.pose.position, starts.point.shape)
+            end = alike(self.receiver.pose.position, len(starts.point))
             own = starts.clear_of_own(self.bodies, legs.departure)
             ray = starts.point, end, legs.departure, legs.length
             hides = hidden(self.bodies, self.bending, *ray, bounces=legs.bounces, turning=legs.turning, own=own)
