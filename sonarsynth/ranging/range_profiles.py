@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.fft import ifft, next_fast_len
+from scipy.fft import ifft, irfft, next_fast_len, rfft
 
 from sonarsynth.conventions import Floats, Ints, direction
 from sonarsynth.equations.arrays.apertures import live_gain
@@ -137,7 +137,19 @@ def direct_spectrum(
     c, front = sonar.assumed_sound_speed, PlaneWaveFit.of(estimates)
     aligned = pulse_times.align(signals, elements, sonar.band, front.delays(elements, c), whole=True)
     wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
-    return pulse_times.template_spectrum(wave.template, length)
+    return template_spectrum(wave.template, length)
+
+
+def template_spectrum(template: Complexes, length: int) -> Complexes:
+    """A template (bin,) in Pa s of all frequencies up to half the sampling frequency, at those of an FFT of `length`.
+
+    It is short, so its spectrum is smooth: its waveform is transformed anew, exactly. Time 0 stays where it was.
+    """
+    half = len(template) - 1
+    centred = template * (-1.0) ** np.arange(half + 1)  # time 0 at the middle sample
+    wave = np.zeros(length)
+    np.add.at(wave, (np.arange(2 * half) - half) % length, irfft(centred, 2 * half))
+    return np.asarray(rfft(wave), np.complex128)
 
 
 def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profiles:

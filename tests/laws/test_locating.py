@@ -349,3 +349,17 @@ def test_the_time_of_a_pulse_is_right_where_the_faces_have_a_null_in_the_band(of
     assert found.time[0] == pytest.approx(14.0 / C + envelope_late(), abs=3e-9)
     noisy = locate(hear_direct(array, source, noise=3e-7, random=np.random.default_rng(3)), array, source)
     assert abs(noisy.time[0] - found.time[0]) < 3.0 * noisy.time_error[0] < 1e-6
+
+
+@pytest.mark.parametrize(("count", "face"), [(12, 0.04953), (8, 0.042)])
+def test_without_noise_the_time_of_a_pulse_errs_by_what_is_predicted_at_any_angle(count, face):
+    """Also near the plane of the array, where nulls of the faces run through the band; and what is heard before a pulse
+    is no pulse that lasts until then."""
+    lattice = PlanarLattice(columns=count, rows=count, pitch=0.06, face=face)
+    array, off = elements(lattice), []
+    for degrees in (-75.0, -70.0, -60.0, -45.0, -30.0, -20.0, 0.0, 20.0, 40.0, 65.0, 72.5):
+        source = 12.0 * direction(np.deg2rad(degrees), -0.02)
+        sonar = Sonar(array=lattice, assumed_sound_speed=C, sound_speed_error=0.0)
+        found = locate(hear_direct(array, source), array, source, sonar=sonar, method=SensorDelays(on_bottom=False))
+        off.append((found.time[0] - 12.0 / C - envelope_late()) / found.time_error[0])
+    assert np.max(np.abs(off)) < 4.0 and np.sqrt(np.mean(np.square(off))) < 1.5

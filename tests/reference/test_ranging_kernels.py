@@ -10,7 +10,8 @@ from sonarsynth.equations.arrays.apertures import element_directivity, focus_del
 from sonarsynth.equations.arrays.beams import beam_spectra
 from sonarsynth.imaging.delay_and_sum.lattice_beams import lattice_beam_spectra
 from sonarsynth.ranging import ranging_kernels
-from sonarsynth.ranging.location.pulse_times import in_band, template_spectrum
+from sonarsynth.ranging.location.pulse_times import in_band
+from sonarsynth.ranging.range_profiles import template_spectrum
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, Romanis, elements
 from tests.axial import axial_energies
 

@@ -242,12 +242,15 @@ def _first_wave(
 def _whole(
     signals: Signals, elements: Elements, sonar: Sonar, wave: Wavefront
 ) -> tuple[AlignedPulse, Pulse, float] | None:
-    """A pulse that lasts longer than a snap, in a window so many times as long that holds it; None where none does."""
+    """A pulse that lasts longer than a snap, in a window so many times as long that holds it; None where none does, or
+    what that holds is another pulse."""
     c, longer = sonar.assumed_sound_speed, pulse_times.LONGER
     while longer * pulse_times.half_length(sonar.band) <= pulse_times.LONGER * pulse_times.LONGEST_HALF:
         expected = _times(wave, elements.position, c)
         aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=longer)
         pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
+        if pulse.aside > pulse_times.half_length(sonar.band):
+            return None
         if not pulse.lasts:
             return aligned, pulse, longer
         longer *= pulse_times.LONGER

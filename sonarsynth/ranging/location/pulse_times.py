@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.fft import fftfreq, ifft, irfft, next_fast_len, rfft
+from scipy.fft import fftfreq, ifft, next_fast_len, rfft
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.arrays.correlated_errors import correlated_error_factor
@@ -73,8 +73,18 @@ class Pulse:
     @property
     def lasts(self) -> bool:
         """Whether the envelope of the waveform is over `CUT` of its peak where the window is not flat any more."""
-        envelope = np.abs(ifft(_taper(len(self.template)) * self.template, 8 * len(self.template)))
+        envelope = self._envelope
         return bool(envelope[np.abs(fftfreq(len(envelope))) >= 0.375].max() > CUT * envelope.max())
+
+    @property
+    def aside(self) -> float:
+        """How far (s) the peak of the envelope is from the time to which the template refers."""
+        envelope = self._envelope
+        return float(abs(fftfreq(len(envelope))[envelope.argmax()]) * self.window)
+
+    @property
+    def _envelope(self) -> Floats:
+        return np.asarray(np.abs(ifft(_taper(len(self.template)) * self.template, 8 * len(self.template))))
 
     def one_tone(self, share: float) -> bool:
         """Whether less than a share of its power tells it from itself a period later, at its mean frequency."""
@@ -265,18 +275,6 @@ def neighbours(elements: Elements) -> tuple[Ints, Ints]:
     count = min(BESIDE, len(live) - 1)
     _, near = cKDTree(elements.position[live]).query(elements.position[live], range(2, count + 2))
     return live, live[near]
-
-
-def template_spectrum(template: Complexes, length: int) -> Complexes:
-    """A template (bin,) in Pa s of all frequencies up to half the sampling frequency, at those of an FFT of `length`.
-
-    It is short, so its spectrum is smooth: its waveform is transformed anew, exactly. Time 0 stays where it was.
-    """
-    half = len(template) - 1
-    centred = template * (-1.0) ** np.arange(half + 1)  # time 0 at the middle sample
-    wave = np.zeros(length)
-    np.add.at(wave, (np.arange(2 * half) - half) % length, irfft(centred, 2 * half))
-    return np.asarray(rfft(wave), np.complex128)
 
 
 def _taper(bins: int) -> Floats:

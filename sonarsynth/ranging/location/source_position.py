@@ -36,7 +36,8 @@ over a fluid sediment the phase turns by up to 8 rad per rad of grazing angle (B
 PHASE_SLOPE = 8.0
 """rad/rad: that phase. Over angles of standard deviation s from the array it bends the wavefront by slope^2 s^2/2 rad,
 which moves the time: by 0.1 to 3 times that below the critical angle (sand to rock, 7 to 14 m), by less above."""
-
+LEFT = 0.015
+"""Of what a longer window changes of a time, what it leaves: 0.004 to 0.018 were seen."""
 ACCEPTED, SILENT, ARRAY, BAND, UNFIT, UNRESOLVED, OUTSIDE, ECHO, RANGE = range(len(REASONS))
 
 
@@ -138,9 +139,8 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
     reason = RANGE if not np.sqrt(fix.covariance[2, 2]) <= FARTHEST * fix.curvature else ACCEPTED
     if not _in_water(wave, full, slope, by_angle, fall, knowledge):
         reason = OUTSIDE
-    time, time_error = _arrival(pulse.longer or pulse, float(full[3, 3]), sonar, knowledge.rounding)
-    if not np.isfinite(time):
-        reason = BAND
+    time, time_error = _arrival(pulse, float(full[3, 3]), sonar, knowledge.rounding)
+    reason = reason if np.isfinite(time) else BAND
     position, covariance = _position(wave, fix)
     known_place = reason == ACCEPTED
     return SourceFix(
@@ -255,7 +255,11 @@ def _arrival(pulse: Pulse, fitted: float, sonar: Sonar, rounding: float) -> tupl
     noise = max(pulse.noise, rounding) / np.maximum(pulse.power, 1e-300)
     low, high = sonar.band.low, sonar.band.high
     time, error = envelope_peak(pulse.frequency, pulse.template * undamped, low, high, noise)
-    return pulse.time + time, float(np.hypot(error, np.sqrt(fitted)))
+    time, error = pulse.time + time, float(np.hypot(error, np.sqrt(fitted)))
+    if pulse.longer is None:
+        return time, error
+    short, (time, error) = time, _arrival(pulse.longer, fitted, sonar, rounding)
+    return time, float(np.hypot(error, LEFT * np.nan_to_num(time - short)))
 
 
 def refused(reason: int) -> SourceFix:
