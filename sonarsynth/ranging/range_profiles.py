@@ -61,21 +61,22 @@ class EchoFilter:
         """Step (s) of delays."""
         return 1.0 / (self.length * self.received.beams.snapshots.spacing)
 
-    def spectra(self, u: Floats) -> Complexes:
-        """Spectra (beam, bin) of the profiles of beams (beam, xyz)."""
+    def _spectra(self, u: Floats) -> npt.NDArray[np.complex64]:
         window, elements = self.received.beams.snapshots, self.received.elements
         sine = u * (elements.face / self.received.sonar.assumed_sound_speed)
         f = window.frequency
         face = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], f[0], window.spacing, len(f))
         return np.asarray(ranging_kernels.matched_to(self.received.beams.spectra(u), face, self.share, self.matched))
 
-    def powers(self, u: Floats) -> npt.NDArray[np.float32]:
-        """Profiles (beam, delay) of beams (beam, xyz)."""
+    def profiles(self, u: Floats) -> tuple[npt.NDArray[np.complex64], npt.NDArray[np.float32]]:
+        """Spectra (beam, bin) of the profiles of beams (beam, xyz), and these: powers (beam, delay)."""
+        spectra = np.empty((len(u), len(self.matched)), np.complex64)
         power = np.empty((len(u), self.count), np.float32)
         for first in range(0, len(u), BEAMS_AT_ONCE):
             block = slice(first, first + BEAMS_AT_ONCE)
-            ranging_kernels.powers(ifft(self.spectra(u[block]), self.length, axis=1), power[block])
-        return power
+            spectra[block] = self._spectra(u[block])
+            ranging_kernels.powers(ifft(spectra[block], self.length, axis=1), power[block])
+        return spectra, power
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +86,7 @@ class Profiles:
     row: Ints  # (beam,) elevation index
     column: Ints  # (beam,) azimuth index
     direction: Floats  # (beam, xyz)
+    spectra: npt.NDArray[np.complex64]  # (beam, bin) of which they are made
     power: npt.NDArray[np.float32]  # (beam, delay) relative
     first: float  # s after the direct arrival
     step: float  # s
@@ -175,6 +177,7 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
     row, column = beams
     u = direction(received.image.azimuth[column], received.image.elevation[row])
     echoes = EchoFilter(received, share, matched, length, min(int(window.duration / step) + 1, length))
+    spectra, power = echoes.profiles(u)
     spread = np.sum(taper**2)
     centre = f @ taper**2 / spread
     beta = np.sqrt(max((f - centre) ** 2 @ taper**2 / spread, spacing**2))
@@ -182,7 +185,8 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
         row=row,
         column=column,
         direction=u,
-        power=echoes.powers(u),
+        spectra=spectra,
+        power=power,
         first=window.start - float(received.estimates.time[0]),
         step=step,
         width=half_width(elements, centre / c),

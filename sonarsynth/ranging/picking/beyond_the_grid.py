@@ -46,7 +46,7 @@ def louder_beyond(
     late, loudest = np.empty(len(u), int), np.empty(len(u))
     for first in range(0, len(u), BEAMS_AT_ONCE):
         some = slice(first, first + BEAMS_AT_ONCE)
-        power = profiles.filter.powers(u[some])
+        power = profiles.filter.profiles(u[some])[1]
         near = np.abs(np.arange(power.shape[1]) - t[peak[some], None]) <= far[some, None]
         late[some] = np.where(near, power, -1.0).argmax(axis=1)
         loudest[some] = np.take_along_axis(power, late[some, None], axis=1)[:, 0]
@@ -57,7 +57,7 @@ def louder_beyond(
 def _lines(profiles: Profiles, f: Floats, b: Ints, t: Ints) -> Floats:
     """Frequencies (peak,) at which the spectra of peaks are largest, about their delays."""
     turn = np.exp(2j * np.pi * profiles.step * t[:, None] * (f - f[0]))
-    spectrum = profiles.filter.spectra(profiles.direction[b]) * turn
+    spectrum = profiles.spectra[b] * turn
     width = max(int(LINE / (f[1] - f[0])), 1) if len(f) > 1 else 1
     smooth = [uniform_filter1d(part, width, axis=1, mode="constant") for part in (spectrum.real, spectrum.imag)]
     return np.asarray(f[(smooth[0] ** 2 + smooth[1] ** 2).argmax(axis=1)])
