@@ -27,7 +27,7 @@ PERIODS = 2.0
 """The same in units of the inverse of the bandwidth, where that is more."""
 CUT = 0.1
 """Of the peak of the envelope: what is louder where the window falls is a pulse that lasts longer, whose time and whose
-lags would be in part those of the window: it is looked at in one twice as long."""
+lags would be in part those of the window: it is looked at in one `LONGER` times as long."""
 HOLLOW = 0.02
 """Power of a bin over the loudest, times the taper of the band, below which faces have a null in the band: there the
 waveform holds much more of what cutting the pulse's tail off adds. Its peak erred by up to 76 ns (5 cm, 30 to 46 deg),
@@ -41,8 +41,8 @@ DEAFEST = 1e-8
 """The same where there is no noise: single precision."""
 FLOOR = 1e-9
 """Standard error (s) of a lag without any noise: what cutting the pulse's tail off does, by windows of `PULSE_HALF`; by
-longer ones, of pulses that last longer, as much more. Biases of 0.01 to 0.2 ns of
-curvature at the rim have been seen, which is what independent errors six times as large would leave."""
+longer ones, of pulses that last longer, as much more. Biases of 0.01 to 0.2 ns of curvature at the rim have been seen,
+which is what independent errors six times as large would leave."""
 FINE = 256
 """Samples of an envelope at least: at the 18 of a band of 3 kHz peaks err by 5 us, more than aligning can undo; and
 where there are two, which is the higher follows from where samples fall."""
