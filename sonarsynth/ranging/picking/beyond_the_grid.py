@@ -43,13 +43,12 @@ def louder_beyond(
     if not len(peak):
         return none
     far = np.linalg.norm(u - profiles.direction[b[peak]], axis=1) * (farthest(elements.position) / c / profiles.step)
+    first, last = np.maximum(np.ceil(t[peak] - far), 0.0).astype(int), (t[peak] + far).astype(int) + 1
     late, loudest = np.empty(len(u), int), np.empty(len(u))
-    for first in range(0, len(u), BEAMS_AT_ONCE):
-        some = slice(first, first + BEAMS_AT_ONCE)
-        power = profiles.filter.profiles(u[some])[1]
-        near = np.abs(np.arange(power.shape[1]) - t[peak[some], None]) <= far[some, None]
-        late[some] = np.where(near, power, -1.0).argmax(axis=1)
-        loudest[some] = np.take_along_axis(power, late[some, None], axis=1)[:, 0]
+    for block in range(0, len(u), BEAMS_AT_ONCE):
+        for n, power in enumerate(profiles.filter.profiles(u[block : block + BEAMS_AT_ONCE])[1], block):
+            late[n] = first[n] + power[first[n] : last[n]].argmax()
+            loudest[n] = power[late[n]]
     louder = loudest > height[peak]
     return u[louder], late[louder], loudest[louder]
 
