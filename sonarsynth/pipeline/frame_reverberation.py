@@ -18,7 +18,7 @@ from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import reverberation_pressure
 from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
 
-MOST_PATHS = 500
+MOST_PATHS = 1000
 """Scatterers that labels of points take of a frame: of more, one in so many stands for all, as loud as they are."""
 
 

@@ -240,7 +240,7 @@ def test_the_more_alike_neighbours_err_the_larger_errors_are_predicted(alike: fl
     root = np.linalg.cholesky(alike**apart) if alike else np.eye(12)
     true = Wavefront(direction(0.2, -0.3), 0.1, 0.0, np.zeros((2, 3)), np.zeros((4, 4)), np.zeros(4), np.zeros(144))
     delay = wavefront_delays(q, true.direction, true.curvature, C)
-    pulse = Pulse(np.zeros(1), np.zeros(1), 0.0, np.zeros(144), np.ones(144), 0.0, np.ones(1), 0.0)
+    pulse = Pulse(np.zeros(1), np.zeros(1), 0.0, np.zeros(144), np.ones(144), 0.0, 0.0, np.ones(1), 0.0)
     fits, predicted = [], []
     random = np.random.default_rng(12)
     for _ in range(300):

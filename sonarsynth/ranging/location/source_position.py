@@ -248,11 +248,12 @@ def _arrival(pulse: Pulse, fitted: float, sonar: Sonar, rounding: float) -> tupl
     """When (s) the pulse's envelope peaks at the array centre, and the standard error of that time (s).
 
     The error is that of the envelope of the mean pulse in noise, and that of the wavefront's time, of variance `fitted`
-    (s2): what sensors that hear late or stand elsewhere shift does not show in the mean pulse.
+    (s2): what sensors that hear late or stand elsewhere shift does not show in the mean pulse. As noise counts all that
+    the model does not explain: what is in phase with it at each sensor changes the shape of the mean pulse.
     """
     # `waveform` holds it down
     undamped = np.minimum(1 + pulse.deaf * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)
-    noise = max(pulse.noise, rounding) / np.maximum(pulse.power, 1e-300)
+    noise = max(pulse.noise, pulse.rest, rounding) / np.maximum(pulse.power, 1e-300)
     low, high = sonar.band.low, sonar.band.high
     time, error = envelope_peak(pulse.frequency, pulse.template * undamped, low, high, noise)
     time, error = pulse.time + time, float(np.hypot(error, np.sqrt(fitted)))
