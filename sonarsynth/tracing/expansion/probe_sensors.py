@@ -39,8 +39,8 @@ class Probes:
 
     def expand(self, values: Floats) -> tuple[Floats, Floats]:
         """Terms (path, term) of `ArrayExpansion`, 0 at the centre, by least squares through values (path, probe), and
-        the largest of what they miss these by (path,); up to the second degree from values at the first
-        `QUADRATIC_PROBES` alone.
+        the largest of what they miss these by (path,); of the second degree from values at the first `QUADRATIC_PROBES`
+        alone.
 
         Values that are NaN (no ray there) are left out, and inf is missed. A measurement at some places, those held out
         as well, not a bound: kinks of a profile within the aperture were seen to err twice as much between the probes.
@@ -49,7 +49,7 @@ class Probes:
         solve = self.solve if every else self.solve_few
         some = self.varying[self.varying < len(solve)]
         tables = np.ascontiguousarray(solve[some].T), np.ascontiguousarray(self.basis[: values.shape[1], some].T)
-        terms, missed = probe_fits.fits(values, *tables, some, len(solve))
+        terms, missed = probe_fits.fits(values, *tables, some, self.basis.shape[1])
         for i in np.flatnonzero(np.isinf(missed)) if every else ():
             finite = np.flatnonzero(np.isfinite(values[i, : self.fitted]))
             terms[i, 1:] = np.linalg.lstsq(self.basis[finite, 1:], values[i, finite], rcond=1e-10)[0]
