@@ -247,9 +247,8 @@ def _in_water(
 def _arrival(pulse: Pulse, fitted: float, sonar: Sonar, rounding: float) -> tuple[float, float]:
     """When (s) the pulse's envelope peaks at the array centre, and the standard error of that time (s).
 
-    The error is that of the envelope of the mean pulse in noise, and that of the wavefront's time, of variance `fitted`
-    (s2): what sensors that hear late or stand elsewhere shift does not show in the mean pulse. As noise counts all that
-    the model does not explain: what is in phase with it at each sensor changes the shape of the mean pulse.
+    The error is that of the envelope of the mean pulse in all that the model does not explain (what is in phase with it
+    changes its shape), and that of the wavefront's time, of variance `fitted` (s2), which that pulse does not show.
     """
     # `waveform` holds it down
     undamped = np.minimum(1 + pulse.deaf * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)
