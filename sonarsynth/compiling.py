@@ -48,8 +48,8 @@ def compiled(function: Any = None, /, **options: Any) -> Any:
 
 
 class _Kept(CompileResultCacheImpl):
-    """What is kept of compiled code: without the modules of numba's own functions that it calls, which only handling
-    Python objects would need, and which take longer to import than the code to load."""
+    """What is kept of compiled code: without the modules of numba's own functions that it calls. Only handling Python
+    objects would need them, which no kernel does, and they take longer to import than the code to load."""
 
     def reduce(self, result: Any) -> tuple[Any, ...]:
         *code, modules = super().reduce(result)  # type: ignore[no-untyped-call]
@@ -110,8 +110,8 @@ class _ByFastMath(dict[Any, Any]):
 
 
 class _Library(JITCodeLibrary):
-    """Code of a kernel, that was read from the cache without the form of it that other kernels are compiled from: numba
-    reads both, and one after the other takes more than half of the time that loading takes."""
+    """A kernel read from the cache as machine code. Its bitcode, which other kernels are compiled from, is parsed when
+    one is: that takes more than half of the time of loading, and numba does it for each."""
 
     _bitcode: bytes | None = None
 

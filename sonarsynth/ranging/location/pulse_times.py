@@ -66,7 +66,7 @@ class Pulse:
     rest: float  # (Pa s)^2: the same of all that the model does not explain
     power: Floats  # (bin,) sum over sensors of their responses squared: so much less noise is in the template
     share: float  # of the power of the pulse at the sensors: not explained by the model, or twice what is out of phase
-    longer: Pulse | None = None  # the same over a longer window, where the faces have a null in the band
+    longer: Pulse | None = None  # over a longer window, where faces have a null in the band or pulses last long
     deaf: float = DEAF  # as for `waveform`
 
     @property

@@ -232,8 +232,8 @@ def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: F
     beyond, late, power = louder_beyond(window, profiles, b[own], t[own], height[own])
     if len(power):
         u, delay = np.concatenate([u[own], beyond]), np.concatenate([delay[own], profiles.step * late])
-        none = np.full(len(power), np.inf)
-        height, least = np.concatenate([height[own], power]), np.concatenate([least[own], none])
+        unasked = np.full(len(power), np.inf)
+        height, least = np.concatenate([height[own], power]), np.concatenate([least[own], unasked])
         own[own] = _over(window, profiles.width, u, delay, height, least)[: np.count_nonzero(own)]
     return own
 
