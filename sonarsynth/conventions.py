@@ -30,6 +30,7 @@ from pydantic_core import core_schema
 Floats = npt.NDArray[np.float64]
 """Float64 array; shapes are given in docstrings and comments as (axis, axis)."""
 
+Complexes = npt.NDArray[np.complex128]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 Bytes = npt.NDArray[np.uint8]

@@ -18,9 +18,9 @@ import numpy as np
 from annotated_types import Ge, Le, MinLen
 from pydantic import ValidationInfo, field_validator
 
-from sonarsynth.conventions import Decibels, Floats, MetresPerSecond, NonNegativeMetres, Number, Radians
+from sonarsynth.conventions import Complexes, Decibels, Floats, MetresPerSecond, NonNegativeMetres, Number, Radians
 from sonarsynth.description import BY_KIND, description
-from sonarsynth.equations.water.boundary_reflection import SEDIMENTS, Complexes, pressure_release, rayleigh
+from sonarsynth.equations.water.boundary_reflection import SEDIMENTS, pressure_release, rayleigh
 
 SedimentName = Literal[
     "rock",

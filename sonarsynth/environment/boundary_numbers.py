@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
 from sonarsynth.equations.water import boundary_reflection, formula_ranges
-from sonarsynth.equations.water.boundary_reflection import Complexes
 
 
 @dataclass(frozen=True, eq=False)

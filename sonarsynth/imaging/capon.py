@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Le
 
-from sonarsynth.conventions import Floats, Number, PositiveMetres
+from sonarsynth.conventions import Complexes, Floats, Number, PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.description.method import FrameSize
 from sonarsynth.equations.arrays.apertures import focus_delay, live_gain
-from sonarsynth.imaging.lattice_blocks import Complexes, subarrays
+from sonarsynth.imaging.lattice_blocks import subarrays
 from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import Snapshots
 from sonarsynth.receiver import Elements, Sonar

@@ -12,12 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Complexes, Floats, Ints
 from sonarsynth.receiver import BeamGrid, Elements
-
-Complexes = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
+from sonarsynth.conventions import NO_TARGET, Bools, Complexes, Floats, Ints
 from sonarsynth.equations.arrays.apertures import live_gain
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose
@@ -187,7 +187,7 @@ def _clock(arrivals: Arrivals, clock: float, gate: float) -> float:
     return near if abs(near - clock) < gate else clock
 
 
-def _spectra(arrivals: Arrivals, rows: Ints, wide: Bools, elements: Elements, band: Band) -> kernels.Complexes:
+def _spectra(arrivals: Arrivals, rows: Ints, wide: Bools, elements: Elements, band: Band) -> Complexes:
     """Spectra (path, bin) that elements hear of some paths (path,), over that of the snap at 1 m, without delay; wide
     (path of all,): whose facets are heard for some time."""
     amplitude = arrivals.amplitude[rows]

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Complexes, Floats, Ints
 
-Complexes = npt.NDArray[np.complex128]
 RIM_STEP = 0.35
 """rad at the rim of the aperture between two tables of the pattern: the nearest one errs by 0.1 rad rms at most."""
 

@@ -13,14 +13,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import ifft, irfft, next_fast_len, rfft
 
-from sonarsynth.conventions import Floats, Ints, direction
+from sonarsynth.conventions import Complexes, Floats, Ints, direction
 from sonarsynth.equations.arrays.apertures import live_gain
 from sonarsynth.equations.arrays.gates import fast_length
 from sonarsynth.products import EnergyImage, Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.plane_waves import PlaneWaveFit
-from sonarsynth.ranging.location.pulse_times import Complexes
 from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.receiver import Elements, Sonar
 

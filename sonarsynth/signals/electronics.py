@@ -12,11 +12,11 @@ from scipy.fft import irfft
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.noise import NoiseField
 from sonarsynth.equations.noise.ambient_noise import power_density
-from sonarsynth.equations.noise.filters import duration, response
+from sonarsynth.equations.noise.filters import duration
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Converter, Electronics, Elements, Filter, Sonar
-from sonarsynth.signals.filtered_pulse import fir
+from sonarsynth.signals.filtered_pulse import filter_response, fir
 from sonarsynth.signals.segments import fast_length
 
 QUIETEST = 1e-7
@@ -34,7 +34,7 @@ def _noise_size(
     """First bin of `rfft` that is drawn; the standard deviation of the real and of the imaginary part of each; and what
     that is of noise of 1 Pa2/Hz."""
     f = _frequencies(1, length // 2, sampling_frequency, length)
-    passed = response(f, fir(antialias)) ** 2
+    passed = filter_response(antialias, sampling_frequency, length)[1 : length // 2] ** 2
     power = noise.density(f) * passed
     bins = np.flatnonzero(power > QUIETEST * power.max())
     # half of the power of a bin in each part; irfft divides by the length

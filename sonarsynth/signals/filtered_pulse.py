@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.fft import ifft, irfft, rfft
 
-from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
+from sonarsynth.conventions import REFERENCE_PRESSURE, Complexes, Floats
 from sonarsynth.equations.arrays.spherical_wave import envelope_peak
 from sonarsynth.equations.bubble import pulses
 from sonarsynth.equations.bubble.pulses import Pulse
-from sonarsynth.equations.bubble.snap_pressure import Bubble, ComplexArray
+from sonarsynth.equations.bubble.snap_pressure import Bubble
 from sonarsynth.equations.noise import filters
 from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
@@ -106,7 +106,7 @@ def _plain_support(waveform: Waveform, chosen: Filter, tolerance: float) -> tupl
     return pulses.support(_pulse(waveform, pulses.reach(fir(chosen))), fir(chosen), tolerance)
 
 
-def _tapered(waveform: Waveform, chosen: Filter, window: float) -> tuple[Floats, ComplexArray]:
+def _tapered(waveform: Waveform, chosen: Filter, window: float) -> tuple[Floats, Complexes]:
     """Frequencies (bin,) from 0 to twice the stop edge in steps of 1/window, and the spectrum of the filtered snap,
     faded out from the stop edge on: cut there it would ring."""
     stop = stop_frequency(chosen)
@@ -173,7 +173,8 @@ def silencing_blur(waveform: Waveform, chosen: Filter, tolerance: float = filter
 
 
 @lru_cache(maxsize=64)
-def _response(chosen: Filter, sampling_frequency: float, samples: int) -> Floats:
+def filter_response(chosen: Filter, sampling_frequency: float, samples: int) -> Floats:
+    """Response (bin,) of the filter at the `rfft` bins of so many samples."""
     value = filters.response(_bins(sampling_frequency, samples), fir(chosen))
     value.setflags(write=False)
     return value
@@ -196,17 +197,15 @@ def _pulse(waveform: Waveform, highest: float) -> Pulse:
     return pulse if waveform.width == 1.0 else pulses.scaled(pulse, 1.0, waveform.width)
 
 
-def _snap_spectrum(waveform: Waveform, longer: float, frequency: Floats) -> ComplexArray:
-    """Spectrum of the snap, unfiltered, at `longer` times evenly spaced frequencies (bin,)."""
+def _snap_spectrum(waveform: Waveform, longer: float, frequency: Floats) -> Complexes:
+    """Spectrum of the snap, unfiltered, at `longer` times frequencies (bin,)."""
     return pulses.spectrum(longer * frequency, _pulse(waveform, 1.2 * float(frequency[-1])))
 
 
 @lru_cache(maxsize=64)
-def _spectrum(
-    waveform: Waveform, chosen: Filter, sampling_frequency: float, samples: int, doppler: float
-) -> ComplexArray:
+def _spectrum(waveform: Waveform, chosen: Filter, sampling_frequency: float, samples: int, doppler: float) -> Complexes:
     f, longer = _bins(sampling_frequency, samples), 1.0 + doppler
-    value = _snap_spectrum(waveform, longer, f) * _response(chosen, sampling_frequency, samples) * longer
+    value = _snap_spectrum(waveform, longer, f) * filter_response(chosen, sampling_frequency, samples) * longer
     value[2 * f >= sampling_frequency] = 0.0
     value.setflags(write=False)
     return value
@@ -214,7 +213,7 @@ def _spectrum(
 
 def pulse_spectrum(
     waveform: Waveform, chosen: Filter, sampling_frequency: float, samples: int, doppler: float = 0.0
-) -> tuple[Floats, ComplexArray]:
+) -> tuple[Floats, Complexes]:
     """Frequencies (bin,) in Hz and spectrum (bin,) in Pa s of the filtered snap at 1 m, at the `rfft` bins of a sample
     grid.
 
@@ -228,10 +227,12 @@ def pulse_spectrum(
 @lru_cache(maxsize=16)
 def stretched_spectra(
     waveform: Waveform, chosen: Filter, sampling_frequency: float, samples: int, widest: float, count: int
-) -> ComplexArray:
+) -> Complexes:
     """Chebyshev coefficients (degree < count, bin) of `pulse_spectrum` in doppler/widest, from -1 to 1."""
-    at = widest * chebyshev(count)
-    value = analysis(count) @ [pulse_spectrum(waveform, chosen, sampling_frequency, samples, float(d))[1] for d in at]
+    f, longer = _bins(sampling_frequency, samples), 1.0 + widest * chebyshev(count)
+    value = pulses.stretched_spectra(f, _pulse(waveform, 1.2 * float(f[-1])), longer) * longer[:, None]
+    value = analysis(count) @ (value * filter_response(chosen, sampling_frequency, samples))
+    value[:, 2 * f >= sampling_frequency] = 0.0
     value.setflags(write=False)
     return np.asarray(value)
 

@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
-from sonarsynth.equations.bubble.snap_pressure import ComplexArray
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.equations.scattering.facet_pulses import mean_powers, rough_factor
 from sonarsynth.signals.array_paths import ArrayPaths
 from sonarsynth.signals.gridded.nodes import Axis, analysis, chebyshev, interpolation, polynomials, rounded_up
@@ -40,7 +39,7 @@ class Modes(NamedTuple):
     """Pulses of paths, as a sum: weight @ spectrum. The spectra are orthogonal and of one norm."""
 
     weight: Floats  # (path, mode)
-    spectrum: ComplexArray  # (mode, bin)
+    spectrum: Complexes  # (mode, bin)
 
 
 class Reduction(NamedTuple):
@@ -55,7 +54,7 @@ def blur_exponent(frequency: Floats) -> Floats:
     return np.asarray(0.5 * (2.0 * np.pi * frequency) ** 2)
 
 
-def reduction(weight: Floats, spectrum: ComplexArray, loudness: Floats, tolerance: float) -> Reduction:
+def reduction(weight: Floats, spectrum: Complexes, loudness: Floats, tolerance: float) -> Reduction:
     """The fewest modes of weight (path, given) @ spectrum (given, bin) times loudness (path,), to `tolerance` of the
     loudest path and of their root mean square."""
     sampled = spectrum[:, :: max(1, spectrum.shape[1] // 128)]
@@ -89,9 +88,9 @@ def main_modes(weight: Floats, loudness: Floats) -> tuple[Floats, tuple[float, .
 def shape_modes(
     front: ArrayPaths,
     frequency: Floats,
-    spectrum: ComplexArray,
+    spectrum: Complexes,
     decay: Floats,
-    series: ComplexArray,
+    series: Complexes,
     widest: float,
     tolerance: float,
 ) -> Modes:
@@ -102,7 +101,7 @@ def shape_modes(
     """
     loudness = np.abs(front.amplitude) / np.abs(front.amplitude).max()
     weight: Floats = np.ones((front.count, 1))
-    factor: Floats | ComplexArray = np.ones((1, frequency.size))
+    factor: Floats | Complexes = np.ones((1, frequency.size))
     if front.variance.any() or front.coherent_fraction.any():
         weight, factor = _softened(front, frequency, tolerance)
     if front.loss.any() and decay.any():
@@ -144,9 +143,7 @@ def _absorbed(loss: Floats, decay: Floats, tolerance: float) -> tuple[Floats, Fl
     return polynomials(loss / most, count), analysis(count) @ lost
 
 
-def _powers(
-    corners: Floats, frequency: Floats, spectrum: ComplexArray, tolerance: float
-) -> tuple[Floats, ComplexArray]:
+def _powers(corners: Floats, frequency: Floats, spectrum: Complexes, tolerance: float) -> tuple[Floats, Complexes]:
     """The mean of a wave over facets with corners (path, 3): powers of the delay (path, given), and of the frequency
     (given, bin)."""
     scale = float(np.abs(corners).max())

@@ -15,8 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints
-from sonarsynth.equations.bubble.snap_pressure import ComplexArray
+from sonarsynth.conventions import Complexes, Floats, Ints
 from sonarsynth.products.array_expansion import QUANTITIES
 from sonarsynth.signals.array_paths import ArrayPaths, Wavefronts
 
@@ -46,7 +45,7 @@ def turn_and_spread(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:
     return front.expansion.over("phase", points), front.expansion.over("delay_variance", points)
 
 
-def changed(front: Wavefronts, points: Floats, frequency: Floats) -> ComplexArray:
+def changed(front: Wavefronts, points: Floats, frequency: Floats) -> Complexes:
     """Factor (path, point, bin) on the pulses of paths at points (point, xyz), over those at the centre."""
     turn, spread = turn_and_spread(front, points)
     soft = 0.5 * np.multiply.outer(spread, (2.0 * np.pi * frequency) ** 2) if spread.any() else 0.0
@@ -101,7 +100,7 @@ def _loudest(loud: Floats) -> Ints:
     return np.asarray(order[loud[order] > 0.0])
 
 
-def changes(front: Wavefronts, frequency: Floats, spectrum: ComplexArray) -> PulseVariation:
+def changes(front: Wavefronts, frequency: Floats, spectrum: Complexes) -> PulseVariation:
     """What the pulses of paths change by, from the spectra (mode, bin) of modes that hold it (`with_changes`)."""
     turns, spreads = bool(front.expansion.phase.any()), bool(front.expansion.delay_variance.any())
     if not (turns or spreads):

@@ -11,10 +11,9 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.description import description
 from sonarsynth.environment.noise import FlatNoise, NoiseField
-from sonarsynth.environment.noise.noise_field import Complexes
 from sonarsynth.equations.noise.filters import response
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import Signals

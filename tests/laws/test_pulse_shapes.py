@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import hilbert
 
-from sonarsynth.conventions import Floats
-from sonarsynth.equations.bubble.snap_pressure import Bubble, ComplexArray
+from sonarsynth.conventions import Complexes, Floats
+from sonarsynth.equations.bubble.snap_pressure import Bubble
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import LowPass, PositionTable, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
@@ -233,7 +233,7 @@ def test_shared_shapes_cost_no_modes() -> None:
 # ---- the modes -------------------------------------------------------------------------------------------------------
 
 
-def pulses(phase: Floats, delay_std: Floats, doppler: Floats, f: Floats, samples: int) -> ComplexArray:
+def pulses(phase: Floats, delay_std: Floats, doppler: Floats, f: Floats, samples: int) -> Complexes:
     """The spectra (path, bin) that the definition gives."""
     rate, chosen = SHARP.sampling_frequency, SHARP.antialias
     S = [pulse_spectrum(waveform(MODEL), chosen, rate, samples, float(s))[1][: f.size] for s in doppler]

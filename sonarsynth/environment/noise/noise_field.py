@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.description.method import FrameSize, Method
 from sonarsynth.environment.noise.directions import NoiseDirections
-
-Complexes = npt.NDArray[np.complex128]
 
 ROUNDING = 1e-10
 """Of the mean power of a hydrophone, added to the diagonal of a cross spectral density before it is factored: closely

@@ -8,20 +8,15 @@ of a recording. Its spectrum, and its waveform behind a filter, are sums over th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
-from sonarsynth.equations.bubble.snap_pressure import ComplexArray
+from sonarsynth.conventions import REFERENCE_PRESSURE, Complexes, Floats
+from sonarsynth.equations.kernels.fourier_sums import fourier_sums, parts
 from sonarsynth.equations.noise.filters import SUPPORT_TOLERANCE, Fir, duration, impulse_response
-
-MOST = 1 << 21
-"""Products of times and nodes that are held at once: bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,53 +37,16 @@ class Levels(NamedTuple):
     peak_to_peak: float
 
 
-def spectrum(frequency: npt.ArrayLike, pulse: Pulse) -> ComplexArray:
+def spectrum(frequency: npt.ArrayLike, pulse: Pulse) -> Complexes:
     """Spectrum (Pa s) of the pulse at 1 m, int p(t) exp(-i 2 pi f t) dt, at frequencies (Hz) up to the highest that it
-    was made for.
-
-    Equal steps of frequency cost the exponentials of their square root only: exp(-i 2 pi (a + b) t) is a product.
-    """
+    was made for; of any shape."""
     f = np.asarray(frequency, float)
-    flat = f.ravel()
-    step = (flat[-1] - flat[0]) / (flat.size - 1) if flat.size > 1 else 0.0
-    off = np.abs(flat - (flat[:1] + step * np.arange(flat.size)))
-    even = bool((off <= 1e-13 * np.abs(flat).max(initial=0.0)).all())
-    columns = int(np.ceil(np.sqrt(flat.size))) if even and flat.size else 1
-    coarse, fine = flat[::columns], step * np.arange(columns)
-    out = np.zeros((coarse.size, columns), complex)
-    for near in _parts(pulse.time, coarse.size + columns):
-        wave = np.exp(-2j * np.pi * np.outer(coarse, pulse.time[near])) * pulse.strength[near]
-        out += wave @ np.exp(-2j * np.pi * np.outer(pulse.time[near], fine))
-    return np.asarray(out.ravel()[: flat.size].reshape(f.shape))
+    return np.asarray(fourier_sums(f.ravel(), pulse.time, pulse.strength).reshape(f.shape))
 
 
-def stretched_spectra(frequency: Floats, pulse: Pulse, longer: Floats) -> ComplexArray:
-    """Spectra (stretch, bin) of the pulse at `longer` (stretch,) times frequencies (bin,) from 0 Hz in equal steps.
-
-    As `spectrum` to rounding, by powers of one exponential a node: for many stretches, a quarter of the time.
-    """
-    columns = int(np.ceil(np.sqrt(frequency.size)))
-    step = float(frequency[-1]) / max(frequency.size - 1, 1)
-    out = np.zeros((longer.size, columns, columns), complex)
-    for near in _parts(pulse.time, 2 * columns * longer.size):
-        once = np.exp(-2j * np.pi * step * np.multiply.outer(longer, pulse.time[near]))
-        fine = _powers(once, columns)  # (power, stretch, node)
-        coarse = _powers(fine[-1] * once, columns) * pulse.strength[near]
-        out += np.moveaxis(coarse, 0, 1) @ np.moveaxis(fine, 0, 2)
-    return out.reshape(longer.size, -1)[:, : frequency.size]
-
-
-def _powers(values: ComplexArray, count: int) -> ComplexArray:
-    """Powers (power < count, ...) of values."""
-    out = np.ones((count, *values.shape), complex)
-    for before, power in pairwise(out):
-        np.multiply(before, values, out=power)
-    return out
-
-
-def _parts(values: Floats, columns: int) -> Iterator[slice]:
-    length = max(MOST // max(columns, 1), 16)
-    return (slice(i, i + length) for i in range(0, values.size, length))
+def stretched_spectra(frequency: Floats, pulse: Pulse, longer: Floats) -> Complexes:
+    """Spectra (stretch, bin) of the pulse at `longer` (stretch,) times frequencies (bin,) in Hz."""
+    return fourier_sums(frequency, pulse.time, pulse.strength, longer)
 
 
 def filtered(time: npt.ArrayLike, pulse: Pulse, fir: Fir) -> Floats:
@@ -98,7 +56,7 @@ def filtered(time: npt.ArrayLike, pulse: Pulse, fir: Fir) -> Floats:
     """
     t = np.asarray(time, float)
     flat, out = t.ravel(), np.zeros(t.size)
-    for block in _parts(flat, pulse.time.size):
+    for block in parts(flat, pulse.time.size):
         now = flat[block]
         near = (pulse.time >= now.min() - 0.5 * duration(fir)) & (pulse.time <= now.max() + 0.5 * duration(fir))
         out[block] = impulse_response(now[:, None] - pulse.time[near], fir) @ pulse.strength[near]
@@ -117,7 +75,7 @@ def _waveform(pulse: Pulse, fir: Fir, steps: int) -> tuple[Floats, Floats]:
     lag = np.linspace(-half, half, int(np.ceil(2.0 * half / step)) * 512 // steps + 1)  # a table of h, linear: 2e-5
     h = impulse_response(lag, fir)
     p = np.zeros(time.size)
-    for block in _parts(time, pulse.time.size):
+    for block in parts(time, pulse.time.size):
         near = slice(*np.searchsorted(pulse.time, [time[block][0] - half, time[block][-1] + half]))
         p[block] = np.interp(time[block, None] - pulse.time[near], lag, h, left=0.0, right=0.0) @ pulse.strength[near]
     return time, p

@@ -17,9 +17,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import erfc
 
-from sonarsynth.conventions import Floats
-
-ComplexArray = npt.NDArray[np.complex128]
+from sonarsynth.conventions import Complexes, Floats
+from sonarsynth.equations.kernels.fourier_sums import fourier_sums
 
 
 class Bubble(NamedTuple):
@@ -106,14 +105,10 @@ def quadrature(bubble: Bubble, highest: float) -> tuple[Floats, Floats]:
     return (middle[:, None] + half[:, None] * node).ravel(), (half[:, None] * weight).ravel()
 
 
-def spectrum(frequency: npt.ArrayLike, bubble: Bubble) -> ComplexArray:
+def spectrum(frequency: npt.ArrayLike, bubble: Bubble) -> Complexes:
     """Spectrum (Pa s) of the pressure at 1 m, int p(t) exp(-i 2 pi f t) dt, at frequencies (Hz); to 1e-12 of its
     peak."""
     f = np.asarray(frequency, float)
     x, w = quadrature(bubble, float(np.abs(f).max(initial=0.0)))
     p = w * pressure(-x, bubble)
-    flat = f.ravel()
-    out = np.empty(flat.size, complex)
-    for i in range(0, flat.size, 256):  # bounds the memory
-        out[i : i + 256] = np.exp(2j * np.pi * np.outer(flat[i : i + 256], x)) @ p
-    return out.reshape(f.shape)
+    return np.asarray(fourier_sums(f.ravel(), -x, p).reshape(f.shape))

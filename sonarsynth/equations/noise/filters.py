@@ -18,6 +18,7 @@ from scipy.special import i0, i0e
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble import snap_pressure
 from sonarsynth.equations.bubble.snap_pressure import Bubble
+from sonarsynth.equations.kernels.fourier_sums import fourier_sums
 
 SUPPORT_TOLERANCE = 1e-7
 """What a filtered snap may be, relative to its peak, outside of its support."""
@@ -25,8 +26,6 @@ SUPPORT_TOLERANCE = 1e-7
 
 FINER = 64
 """Steps of a table of an impulse response a step of a filtered snap; it is linear between, to 1e-5 of it."""
-TOGETHER = 1 << 22
-"""Products of a frequency and a time that are made at once: a window of a second has as many as fill any memory."""
 
 
 class Fir(NamedTuple):
@@ -79,10 +78,7 @@ def _transform(f: Floats, fir: Fir) -> Floats:
     node, weight = np.polynomial.legendre.leggauss(24)
     t = ((np.arange(panels)[:, None] + 0.5 + 0.5 * node) * (half / panels)).ravel()
     h = _unscaled(t, fir) * np.tile(weight * half / panels, panels)
-    many = max(TOGETHER // t.size, 1)
-    return np.concatenate(
-        [np.empty(0), *(np.cos(2.0 * np.pi * np.outer(f[n : n + many], t)) @ h for n in range(0, f.size, many))]
-    )
+    return np.asarray(fourier_sums(f, t, h)[0].real)
 
 
 def response(frequency: npt.ArrayLike, fir: Fir) -> Floats:

@@ -12,14 +12,11 @@ import math
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 from scipy.fft import fft2, ifft2, next_fast_len
 
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Bools, Floats
+from sonarsynth.conventions import Bools, Complexes, Floats
 from sonarsynth.equations.noise.filters import kaiser_bessel, kaiser_bessel_beta, kaiser_bessel_transform
-
-Complexes = npt.NDArray[np.complex128]
 
 WIDTH, OVERSAMPLING, TABLE = 6, 2.0, 2048
 """Of the kernel of the sum: grid points that a wave goes to, how much finer the grid is than the lags need, and values

@@ -20,9 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import airye
 
-from sonarsynth.conventions import Floats, Ints
-
-Complexes = npt.NDArray[np.complex128]
+from sonarsynth.conventions import Complexes, Floats, Ints
 
 LIT: Final = -6.0
 """xi up to which the field goes by its series, with an error of 1e-6."""

@@ -8,11 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.equations.scattering.convex_bodies import DARK, LIT, STEP, curvature_along, field_table
 from sonarsynth.equations.scattering.kirchhoff_kernels import ROOM, half_means, spacing
-
-Complexes = npt.NDArray[np.complex128]
 
 FLATTEST = 1e-12  # 1/m: a curvature of less is as good as none
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats
-from sonarsynth.equations.scattering.kirchhoff_integral import Complexes, divided_exponential
+from sonarsynth.conventions import Bools, Complexes, Floats
+from sonarsynth.equations.scattering.kirchhoff_integral import divided_exponential
 
 
 def facet_response(

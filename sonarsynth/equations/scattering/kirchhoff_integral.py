@@ -18,10 +18,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import j1, spherical_jn
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.equations.scattering.lobes import dot
-
-Complexes = npt.NDArray[np.complex128]
 
 SPREAD = 2.0  # rad: phases closer together than this go by the series
 TERMS = 23  # of the series: the rest is under 1e-17

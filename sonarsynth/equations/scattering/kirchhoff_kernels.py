@@ -9,9 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Floats
-
-Complexes = npt.NDArray[np.complex128]
+from sonarsynth.conventions import Complexes, Floats
 
 SPREAD = 2.0  # rad: phases closer together than this go by the series
 WIDER = 6.0  # rad: the same for MANY wavenumbers, which share its terms; errors stay under 1e-15 of the area

@@ -13,9 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import jv, spherical_jn, spherical_yn, yv
 
-from sonarsynth.conventions import Floats
-
-Complexes = npt.NDArray[np.complex128]
+from sonarsynth.conventions import Complexes, Floats
 
 TINY = 1e-90  # ka of a wave of no frequency: its scattering is the limit, without a case of its own
 

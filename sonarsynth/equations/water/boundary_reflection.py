@@ -12,10 +12,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.equations.water import formula_ranges
-
-Complexes = npt.NDArray[np.complex128]
 
 SEDIMENTS: Final = MappingProxyType(
     {

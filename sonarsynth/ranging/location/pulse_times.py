@@ -9,15 +9,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import fftfreq, ifft, next_fast_len, rfft
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Complexes, Floats, Ints
 from sonarsynth.equations.arrays.correlated_errors import correlated_error_factor
 from sonarsynth.equations.arrays.gates import short_spectra
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, wavefront_delays
 from sonarsynth.products import Signals
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.receiver import Band, Elements
-
-Complexes = npt.NDArray[np.complex128]
 
 PULSE_HALF = 160e-6
 """Half length (s) of what is kept round a pulse after alignment: the snap in band and the ringing of its filter."""

@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.description import FieldError
-from sonarsynth.equations.bubble.snap_pressure import ComplexArray
 from sonarsynth.equations.scattering.facet_pulses import facet_mean, rough_factor
 from sonarsynth.receiver import Sonar, stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths
@@ -38,10 +37,10 @@ class Bins(NamedTuple):
 
     first: int  # number of the first bin
     frequency: Floats  # (bin,) Hz
-    spectrum: ComplexArray  # (bin,) of the filtered snap at 1 m, in the shape that all paths share
+    spectrum: Complexes  # (bin,) of the filtered snap at 1 m, in the shape that all paths share
     relative: Floats  # (bin,) absorption over that at the band centre, less one
     step: float  # Hz
-    modes: ComplexArray  # (mode, bin) spectra that the modes of the paths weigh; none where all share their shape
+    modes: Complexes  # (mode, bin) spectra that the modes of the paths weigh; none where all share their shape
     changes: PulseVariation  # of pulses over the aperture, in these modes
 
     def cut(self, count: int) -> Bins:
@@ -58,7 +57,7 @@ class Bins(NamedTuple):
         return Bins(first, frequency, spectrum, relative, share * self.step, modes, self.changes)
 
 
-def audible(spectrum: ComplexArray, tolerance: float) -> slice:
+def audible(spectrum: Complexes, tolerance: float) -> slice:
     """The bins of a spectrum without its ends, which hold no more than 0.03 `tolerance` of its modulus each."""
     mass = np.cumsum(np.abs(spectrum))
     ends = np.searchsorted(mass, np.array([0.03 * tolerance, 1.0 - 0.03 * tolerance]) * mass[-1])
@@ -142,12 +141,12 @@ def _bins_of_corners(front: ArrayPaths, frequency: Floats, sonar: Sonar) -> int:
 def _with_modes(
     front: ArrayPaths,
     frequency: Floats,
-    spectrum: ComplexArray,
+    spectrum: Complexes,
     relative: Floats,
-    series: ComplexArray,
+    series: Complexes,
     widest: float,
     tolerance: float,
-) -> tuple[ArrayPaths, ComplexArray, ComplexArray]:
+) -> tuple[ArrayPaths, Complexes, Complexes]:
     """Paths with modes, the spectrum, and those of the modes. Absorption is among them, unless it differs much."""
     decay = np.log(10.0) / 20.0 * relative
     few = float(np.ptp(front.loss) * np.abs(decay).max()) <= MOST_DECAY
@@ -166,8 +165,8 @@ def _with_modes(
 
 
 def _shared(
-    front: ArrayPaths, frequency: Floats, spectrum: ComplexArray, series: ComplexArray, widest: float, tolerance: float
-) -> tuple[ArrayPaths, ComplexArray, ComplexArray]:
+    front: ArrayPaths, frequency: Floats, spectrum: Complexes, series: Complexes, widest: float, tolerance: float
+) -> tuple[ArrayPaths, Complexes, Complexes]:
     """Paths without the shape that all share, and the spectrum with it; and the series in Doppler, empty where all
     share that."""
     if len(series):
@@ -194,7 +193,7 @@ def _shared(
     return front, spectrum, series
 
 
-def _shared_facet(front: ArrayPaths, frequency: Floats) -> tuple[ArrayPaths, ComplexArray]:
+def _shared_facet(front: ArrayPaths, frequency: Floats) -> tuple[ArrayPaths, Complexes]:
     """Paths without what all facets do alike to the pulse, and that (bin,)."""
     first, facet = front.select(np.arange(1)), np.ones(frequency.size, complex)
     if (front.corner_delays == first.corner_delays).all():
@@ -206,7 +205,7 @@ def _shared_facet(front: ArrayPaths, frequency: Floats) -> tuple[ArrayPaths, Com
     return front, facet
 
 
-def _loud(front: ArrayPaths, frequency: Floats, spectrum: ComplexArray, tolerance: float) -> ArrayPaths:
+def _loud(front: ArrayPaths, frequency: Floats, spectrum: Complexes, tolerance: float) -> ArrayPaths:
     """The paths without those that their blur leaves, all together, less than 0.01 `tolerance` of the loudest."""
     sampled = slice(None, None, max(1, frequency.size // 128))
     mass, exponent = np.abs(spectrum[sampled]), blur_exponent(frequency[sampled])

@@ -12,9 +12,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import irfft
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.equations.arrays.apertures import element_directivity
-from sonarsynth.equations.bubble.snap_pressure import ComplexArray
 from sonarsynth.randomness import stream
 from sonarsynth.signals.array_paths import NEPER
 from sonarsynth.signals.gridded.nodes import analysis, chebyshev
@@ -80,7 +79,7 @@ def shapes_of(nodes: Floats, band: float, face: float, speed: float, absorption:
     return shapes, np.abs(sampled @ shapes.T).max(axis=0)
 
 
-def tabulated(bare: ComplexArray, samples: int, fine: float, nodes: Floats, basis: tuple[Floats, Floats]) -> PulseModes:
+def tabulated(bare: Complexes, samples: int, fine: float, nodes: Floats, basis: tuple[Floats, Floats]) -> PulseModes:
     """The modes of a pulse of this spectrum (bin,), up to where that ends, on `samples` of a grid of `fine` (Hz).
 
     basis: of `shapes_of`, at frequencies `nodes` (Hz).

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.randomness import stream
@@ -20,7 +20,6 @@ from sonarsynth.validation.validation_rows import Row
 if TYPE_CHECKING:
     from sonarsynth.geometry.mesh import Mesh
 
-Complexes = npt.NDArray[np.complex128]
 
 SOUND_SPEED: Final = 1500.0  # m/s
 BAND: Final = np.arange(25e3, 110.1e3, 5e3)  # Hz

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import j1, struve
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.equations.scattering.modal_series import cylinder_amplitude
@@ -22,7 +22,6 @@ from sonarsynth.validation.bodies.body_cases import (
     BAND,
     PER_ASPECT,
     SOUND_SPEED,
-    Complexes,
     Point,
     backscatter,
     decibels,

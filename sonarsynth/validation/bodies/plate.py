@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.equations.scattering.kirchhoff_integral import circular_plate, rectangular_plate
 from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 from sonarsynth.randomness import stream
@@ -19,7 +19,6 @@ from sonarsynth.validation.bodies.body_cases import (
     PER_ASPECT,
     SEED,
     SOUND_SPEED,
-    Complexes,
     round_x,
     wavenumber,
 )

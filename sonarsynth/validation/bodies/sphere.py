@@ -14,9 +14,8 @@ from itertools import pairwise
 from typing import Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.equations.scattering.kirchhoff_integral import lit_sphere
 from sonarsynth.equations.scattering.modal_series import Fluid, sphere_amplitude
 from sonarsynth.geometry.mesh import Mesh
@@ -41,8 +40,6 @@ from sonarsynth.validation.bodies.body_cases import (
 from sonarsynth.validation.bodies.facet_integral import triangle_rows
 from sonarsynth.validation.run_time import timed
 from sonarsynth.validation.validation_rows import Row
-
-Complexes = npt.NDArray[np.complex128]
 
 HIGHEST = 200e3  # Hz: the pulse is a Hann window of frequencies from 0 to this
 WINDOW = 4e-3  # s: all echoes that matter come within this
