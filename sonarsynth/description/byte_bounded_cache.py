@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from functools import update_wrapper
 from threading import Lock
 from typing import Any, Final, Generic, ParamSpec, TypeVar
@@ -37,8 +37,7 @@ def size_of(*values: object) -> int:
         elif isinstance(value, dict):
             pending += value.values()
         elif is_dataclass(value):
-            pending += [getattr(value, field.name, None) for field in fields(value)]
-            pending += getattr(value, "__dict__", {}).values()
+            pending += vars(value).values()  # fields, and what was computed of them
         else:
             total += int(getattr(value, "nbytes", 0))
     return total

@@ -114,10 +114,8 @@ class DrawnErrors:
         """Delays (sensor,) in s by which channels hear sound from ahead too late; sound_speed in m/s."""
         return np.asarray(self.delay - self.position[:, 0] / sound_speed)
 
-    def response(self, frequency: Floats, sound_speed: float, phases: bool = True) -> np.ndarray:
-        """Response (sensor, bin) of channels that hear, at frequencies (bin,) Hz; without phases and delays, gains."""
-        if not phases:
-            return self.gain[:, None] * np.ones(frequency.size)
+    def response(self, frequency: Floats, sound_speed: float) -> np.ndarray:
+        """Response (sensor, bin) of channels that hear, at frequencies (bin,) Hz."""
         late = self.phase[:, None] - 2.0 * np.pi * np.outer(self.delays(sound_speed), frequency)
         return np.asarray(self.gain[:, None] * np.exp(1j * late))
 

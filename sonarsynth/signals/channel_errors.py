@@ -30,8 +30,7 @@ TAPS, SHAPE = 64, 10.0
 def respond(signals: Signals, drawn: DrawnErrors, sound_speed: float) -> Signals:
     """Signals after gain, phase and delay of each channel; dead ones are silent. Windows are taken for periodic: the
     ends are wrong for as long as the delay."""
-    response = _response(drawn, _length(signals), signals.sampling_frequency, sound_speed)
-    return _filtered(signals, response, drawn.state != SensorState.DEAD)
+    return _through(signals, drawn, sound_speed, drawn.state != SensorState.DEAD, True, False)
 
 
 def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_speed: float) -> Signals:
@@ -39,17 +38,28 @@ def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_
     if errors.known == "none":
         return signals
     works = (drawn.state == SensorState.WORKING) | (drawn.state == SensorState.NOISY)
-    response = _response(drawn, _length(signals), signals.sampling_frequency, sound_speed, errors.known == "all", True)
-    return _filtered(signals, response, works)
+    return _through(signals, drawn, sound_speed, works, errors.known == "all", True)
+
+
+def _through(
+    signals: Signals, drawn: DrawnErrors, sound_speed: float, works: Bools, phases: bool, inverse: bool
+) -> Signals:
+    """Signals after the response of channels that work (sensor,), or its inverse; without phases, of gains alone."""
+    if not (phases and (drawn.phase.any() or drawn.delays(sound_speed).any())):
+        gain = works * (1.0 / drawn.gain if inverse else drawn.gain)
+        return replace(signals, pressure=signals.pressure * gain[:, None].astype(np.float32))
+    return _filtered(
+        signals, _response(drawn, _length(signals), signals.sampling_frequency, sound_speed, inverse), works
+    )
 
 
 @lru_cache(maxsize=4)
 def _response(
-    drawn: DrawnErrors, samples: int, rate: float, sound_speed: float, phases: bool = True, inverse: bool = False
+    drawn: DrawnErrors, samples: int, rate: float, sound_speed: float, inverse: bool
 ) -> npt.NDArray[np.complex64]:
     """As `DrawnErrors.response`, or one over it, at the frequencies of so many samples: the same in all frames of a
     sequence."""
-    response = drawn.response(rfftfreq(samples, 1.0 / rate), sound_speed, phases)
+    response = drawn.response(rfftfreq(samples, 1.0 / rate), sound_speed)
     return (1.0 / response if inverse else response).astype(np.complex64)
 
 
