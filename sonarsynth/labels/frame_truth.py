@@ -34,7 +34,7 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     connect = partial(propagation.direct.connect, medium.profile, medium.depth)
     bent = connect if propagation.bends else None
     appearances = [appearance(body, bodies, sonar_pose, bent) for body in bodies]
-    seen = [(a.corners, b.mesh.faces, a.boxes) for b, a in zip(bodies, appearances, strict=True)]
+    seen = [(a.corners, b.mesh.faces, a.boxes, a.full_box) for b, a in zip(bodies, appearances, strict=True)]
     met_first = beam_views(seen, beams)
     tracks = [body.track if context.receiver.track else body.frozen.track for body in bodies]
     by_lines = medium.profile.uniform and propagation.straight(medium.profile)

@@ -9,7 +9,7 @@ import numpy as np
 
 from sonarsynth.casting.ray_casting import OFFSET, clear_of_body, occluded
 from sonarsynth.columns import alike
-from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -40,19 +40,18 @@ def appearance(
 ) -> Appearance:
     """A body among all bodies; connect: None where rays are straight."""
     corners = _apparent(body, sonar_pose, connect)
-    boxes, visible = (
-        facet_boxes(corners, body.mesh.faces, body.mesh.closed),
-        _visible(body, corners, bodies, sonar_pose),
-    )
-    return Appearance(corners, boxes, whole_box(boxes), *visible, bent=connect is not None)
+    boxes, bent = facet_boxes(corners, body.mesh.faces, body.mesh.closed), connect is not None
+    visible = _visible(body, corners if bent else None, bodies, sonar_pose)
+    return Appearance(corners, boxes, whole_box(boxes), *visible, bent)
 
 
 def _apparent(body: PlacedTarget, sonar_pose: Pose, connect: Connect | None) -> Floats:
     """(vertex, xyz) in the sonar frame: vertices where the array sees them; NaN where no ray arrives."""
+    if connect is None:  # both rotations as one
+        to_sonar = sonar_pose.rotation.T @ body.pose.rotation
+        return body.mesh.vertices @ to_sonar.T + sonar_pose.to_body(body.pose.position)
     world = body.pose.to_world(body.mesh.vertices)
     true = sonar_pose.to_body(world)
-    if connect is None:
-        return true
     apparent = np.full_like(true, np.nan)
     for block in in_blocks(len(world)):
         paths = connect(world[block], alike(sonar_pose.position, len(world[block])))
@@ -63,29 +62,33 @@ def _apparent(body: PlacedTarget, sonar_pose: Pose, connect: Connect | None) -> 
 
 
 def _visible(
-    body: PlacedTarget, corners: Floats, bodies: tuple[PlacedTarget, ...], sonar_pose: Pose
+    body: PlacedTarget, corners: Floats | None, bodies: tuple[PlacedTarget, ...], sonar_pose: Pose
 ) -> tuple[Ints, float]:
-    """The visible facets, in the view of the beams or not, and their share of the area that faces the array."""
+    """The visible facets, in the view of the beams or not, and their share of the area that faces the array; corners:
+    where they appear, None where rays are straight."""
     mesh, visible, facing = body.mesh, [], []
     for block in in_blocks(len(mesh.faces)):
         rows, clear = _leaving(body, bodies, np.arange(block.start, block.stop), sonar_pose.position)
         facing.append(mesh.area[rows])
-        visible.append(rows[clear & finite(corners, mesh.faces[rows])])
+        visible.append(rows[clear if corners is None else clear & finite(corners, mesh.faces[rows])])
     seen = np.concatenate(visible)
     return seen, float(mesh.area[seen].sum() / np.concatenate(facing).sum()) if len(seen) else 0.0
 
 
 def _leaving(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], rows: Ints, to: Floats) -> tuple[Ints, Bools]:
     """Those of facets (row,) on whose outer side a place (xyz), world, is, and which of them no body hides from it."""
-    facet, (start, towards) = np.empty(len(rows), np.int64), np.empty((2, len(rows), 3))
-    mesh, pose = body.mesh, body.pose
-    count = view_kernels.leaving(
-        rows, mesh.centroid, mesh.normal, _offset(body), pose.rotation, pose.position, to, facet, start, towards
-    )
-    facet, start = facet[:count], start[:count]
-    own = np.where(clear_of_body(mesh, facet, towards[:count], np.zeros(count)), 0, NO_TARGET)
-    others = tuple(other for other in bodies if other is not body)
-    return facet, ~occluded((body, *others), start, alike(to, len(start)), own)
+    mesh, offset, others = body.mesh, _offset(body), tuple(other for other in bodies if other is not body)
+    facet, towards = np.empty(len(rows), np.int64), np.empty((len(rows), 3))
+    count = view_kernels.leaving(rows, mesh.centroid, mesh.normal, offset, body.pose.to_body(to), facet, towards)
+    facet = facet[:count]
+    by_own = np.flatnonzero(~clear_of_body(mesh, facet, towards[:count], alike(0.0, count)))
+    hidden = np.zeros(count, bool)
+    for among, of in ((by_own, (body,)), (slice(None), others)):
+        if of:
+            cast = facet[among]
+            start = body.pose.to_world(mesh.centroid[cast] + offset * mesh.normal[cast])
+            hidden[among] |= occluded(of, start, alike(to, len(start)))
+    return facet, ~hidden
 
 
 def _offset(body: PlacedTarget) -> float:

@@ -97,43 +97,48 @@ def _planes(corners: Floats, a: int, b: int, c: int, planes: Floats) -> None:
 @compiled
 def _mark(
     planes: Floats, west: float, east: float, low: float, high: float, cells: Cells, row: int, column: int,
-    covered: Words,
+    covered: Words, place: int,
 ) -> int:  # fmt: skip
-    """Mark the directions of a cell that are inside planes, from azimuth west to east and between sines of elevation
-    low and high; returns how many were not yet. Whole arrays and numbers: to cut a row out of an array takes longer
-    than what is done with it."""
+    """Mark the directions of a cell, at its place in `covered`, that are inside planes, from azimuth west to east and
+    between sines of elevation low and high; returns how many were not yet. Whole arrays and numbers: to cut a row out
+    of an array takes longer than what is done with it."""
     left, strips = cells.strip[column, 0], cells.strip[column, 1]
     bottom, parts, added = cells.level[row, 0], cells.level[row, 1], 0
     lowest, highest = max(int((low - bottom) * parts), 0), min(int((high - bottom) * parts), PARTS - 1)
     for strip in range(max(int((west - left) * strips), 0), min(int((east - left) * strips), STRIPS - 1) + 1):
         for n in range(cells.part[strip * PARTS + lowest], cells.part[strip * PARTS + highest + 1]):
             bit = np.uint64(1) << np.uint64(n & 63)
-            if not west <= cells.azimuth[column, n] <= east or covered[row, column, n >> 6] & bit:
+            if not west <= cells.azimuth[column, n] <= east or covered[place, n >> 6] & bit:
                 continue
             x, y = cells.cosine[row, n] * cells.across[column, n, 0], cells.cosine[row, n] * cells.across[column, n, 1]
             within = True
             for i in range(3):
                 within &= x * planes[i, 0] + y * planes[i, 1] + cells.sine[row, n] * planes[i, 2] >= 0.0
             if within:
-                covered[row, column, n >> 6] |= bit
+                covered[place, n >> 6] |= bit
                 added += 1
     return added
 
 
 @compiled
 def _look(
-    corners: Floats, faces: Int32s, boxes: Floats, cells: Cells, tolerance: float, body: int,
+    corners: Floats, faces: Int32s, boxes: Floats, cells: Cells, body: int, window: tuple[int, int, int],
     covered: Words, count: npt.NDArray[np.int16], target: npt.NDArray[np.int16], facet: Int32s, nearest: Floats,
 ) -> None:  # fmt: skip
     """Mark the directions that meet triangles (facet, 3) of points (vertex, xyz) with boxes (facet, 4) rad in bits
-    (row, column, word), and count them (row, column); and write body, facet and distance (row, column) where beams meet
-    them before anything else."""
+    (cell of a window, word), and count them (row, column); and write body, facet and distance (row, column), NaN as yet
+    for none, where beams meet them before anything else. window: its first row and column, and how many columns."""
     rows, columns, directions = len(cells.sine), len(cells.azimuth), cells.sine.shape[1]
     planes, centre, azimuth, elevation = np.empty((3, 3)), np.zeros(3), cells.beam[0], cells.beam[1]
+    largest = 0.0
+    for n in range(len(corners)):
+        for x in range(3):
+            largest = max(largest, abs(corners[n, x]))
+    tolerance = 3.0 * EDGE * largest * largest
     for f in range(len(faces)):
-        if not boxes[f, 0] <= boxes[f, 1]:  # NaN: nothing of it is seen
-            continue
         west, east, low, high = boxes[f, 0], boxes[f, 1], boxes[f, 2], boxes[f, 3]
+        if not (west <= east and low <= high):  # NaN: nothing of it is seen
+            continue
         left = max(math.floor((west - cells.first[0]) / cells.step[0]), 0)
         right = min(math.floor((east - cells.first[0]) / cells.step[0]), columns - 1)
         bottom = max(math.floor((low - cells.first[1]) / cells.step[1]), 0)
@@ -146,10 +151,11 @@ def _look(
             crossed = low - MARGIN <= elevation[row] <= high + MARGIN
             for column in range(left, right + 1):
                 if count[row, column] < directions:
-                    count[row, column] += _mark(planes, west, east, lowest, highest, cells, row, column, covered)
+                    place = (row - window[0]) * window[2] + column - window[1]
+                    count[row, column] += _mark(planes, west, east, lowest, highest, cells, row, column, covered, place)
                 if crossed and west - MARGIN <= azimuth[column] <= east + MARGIN:
                     far = distance_to_facet(centre, cells.ray[row, column], corners, faces, f, tolerance)
-                    if 0.0 <= far < nearest[row, column]:
+                    if far >= 0.0 and not far >= nearest[row, column]:
                         target[row, column], facet[row, column], nearest[row, column] = body, f, far
 
 
@@ -162,17 +168,39 @@ class BeamViews(NamedTuple):
     coverage: npt.NDArray[np.float32]  # share of the solid angle of the cell: 0.002 rms at one edge
 
 
-def beam_views(bodies: Sequence[tuple[Floats, np.ndarray, Floats]], beams: BeamGrid) -> BeamViews:
+def beam_views(bodies: Sequence[tuple[Floats, np.ndarray, Floats, Floats]], beams: BeamGrid) -> BeamViews:
     """What the beams of a grid meet of bodies.
 
-    bodies: corners seen (vertex, xyz), sonar frame, facets (facet, 3) of them, and their `facet_boxes`.
+    bodies: corners seen (vertex, xyz), sonar frame, facets (facet, 3) of them, their `facet_boxes`, and the `whole_box`
+    of these.
     """
     cells, shape = cells_of(beams), (beams.elevations, beams.azimuths)
-    covered, count = np.zeros((*shape, (DIRECTIONS + 63) // 64), np.uint64), np.zeros(shape, np.int16)
-    target, facet = np.full(shape, NO_TARGET, np.int16), np.full(shape, NO_TARGET, np.int32)
-    nearest = np.full(shape, np.inf)
-    for number, (corners, faces, boxes) in enumerate(bodies):
-        tolerance = 3.0 * EDGE * float(np.nanmax(np.abs(corners), initial=0.0)) ** 2
-        _look(corners, faces, boxes, cells, tolerance, number, covered, count, target, facet, nearest)
-    away = np.where(np.isfinite(nearest), nearest, np.nan).astype(np.float32)
-    return BeamViews(target, facet, away, (count / DIRECTIONS).astype(np.float32))
+    count, target, facet = (
+        np.zeros(shape, np.int16),
+        np.full(shape, NO_TARGET, np.int16),
+        np.full(shape, NO_TARGET, np.int32),
+    )
+    nearest = np.full(shape, np.nan)
+    first, stop = _window(cells, [whole for *_, whole in bodies])
+    size = (stop[0] - first[0]) * (stop[1] - first[1])
+    covered = np.zeros((size, (DIRECTIONS + 63) // 64), np.uint64)
+    window = (*first, stop[1] - first[1])
+    for number, (corners, faces, boxes, _) in enumerate(bodies):
+        _look(corners, faces, boxes, cells, number, window, covered, count, target, facet, nearest)
+    coverage = np.divide(count, DIRECTIONS, dtype=np.float32)
+    return BeamViews(target, facet, nearest.astype(np.float32), coverage)
+
+
+def _window(cells: Cells, boxes: list[Floats]) -> tuple[tuple[int, int], tuple[int, int]]:
+    """First row and column, and last ones + 1, of the cells that hold boxes, each (4,) rad or NaN."""
+    known = [box.tolist() for box in boxes if box[0] <= box[1]]
+    if not known:
+        return (0, 0), (0, 0)
+    west, east, low, high = (f(ends) for f, ends in zip((min, max, min, max), zip(*known, strict=True), strict=True))
+
+    def cell(axis: int, angle: float, most: int) -> int:
+        return min(max(math.floor((angle - cells.first[axis]) / cells.step[axis]), 0), most - 1)
+
+    rows, columns = len(cells.sine), len(cells.azimuth)
+    first = cell(1, low, rows), cell(0, west, columns)
+    return first, (cell(1, high, rows) + 1, cell(0, east, columns) + 1)

@@ -26,10 +26,8 @@ def facet_boxes(corners: Floats, faces: np.ndarray, closed: bool = False) -> Flo
     closed: whether they are a closed surface. Where the sonar is beside it, those whose inner side it would see have
     NaN too: others are before them.
     """
-    boxes, columns = np.empty((len(faces), 4)), corners.T.copy()
-    low, high = columns.min(axis=1, initial=np.inf), columns.max(axis=1, initial=-np.inf)
-    outside = closed and bool(np.isfinite(low + high).all() and (low.max() >= 0.0 or high.min() <= 0.0))
-    view_kernels.boxes_ahead(np.ascontiguousarray(corners, float), faces, outside, boxes)
+    boxes, points = np.empty((len(faces), 4)), np.ascontiguousarray(corners, float)
+    view_kernels.boxes_ahead(points, faces, closed and view_kernels.apart(points), boxes)
     return boxes
 
 

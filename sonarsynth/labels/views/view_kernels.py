@@ -132,6 +132,20 @@ def shows_outer_side(corners: Floats, a: int, b: int, c: int) -> bool:
 
 
 @compiled
+def apart(points: Floats) -> bool:
+    """Whether the origin is beside the box of some points (point, xyz); not where any is NaN."""
+    for x in range(3):
+        low, high = np.inf, -np.inf
+        for n in range(len(points)):
+            if math.isnan(points[n, x]):
+                return False
+            low, high = min(low, points[n, x]), max(high, points[n, x])
+        if low >= 0.0 or high <= 0.0:
+            return True
+    return False
+
+
+@compiled
 def boxes_ahead(corners: Floats, faces: Ints, outside: bool, boxes: Floats) -> None:
     """Write bounds (facet, 4) in azimuth and elevation (rad) of the part of each triangle (facet, 3) of points (vertex,
     xyz) that is ahead, x > 0; NaN where none is, or a corner is NaN, or, `outside`, its outer side is not seen."""
@@ -174,30 +188,21 @@ def box_of_part_ahead(corners: Floats, face: Ints, box: Floats) -> None:
 
 @compiled
 def leaving(
-    rows: Ints, centroid: Floats, normal: Floats, offset: float, rotation: Floats, position: Floats, to: Floats,
-    facet: Ints, start: Floats, towards: Floats,
-) -> int:  # fmt: skip
-    """Write those of facets (row,) on whose outer side a place `to` (xyz), world, is: which, their middles, moved off
-    by `offset` (m), world, and directions from there to it, of length one, in the frame of the body: facet (row,),
-    start and towards (row, xyz). Returns how many. rotation (xyz, xyz), position (xyz): the pose of the body."""
-    own, away, count = np.zeros(3), np.empty(3), 0
-    for x in range(3):
-        for y in range(3):
-            own[x] += rotation[y, x] * (to[y] - position[y])
+    rows: Ints, centroid: Floats, normal: Floats, offset: float, to: Floats, facet: Ints, towards: Floats
+) -> int:
+    """Write those of facets (row,) on whose outer side a place `to` (xyz) is: which, facet (row,), and directions of
+    length one, towards (row, xyz), from their middles, moved off by `offset` (m), to it; all in the frame of the body.
+    Returns how many."""
+    count = 0
     for f in rows:
-        ahead = square = 0.0
-        for x in range(3):
-            away[x] = own[x] - centroid[f, x] - offset * normal[f, x]
-            ahead += normal[f, x] * away[x]
-            square += away[x] ** 2
-        if ahead + offset <= 0.0:
-            continue
-        for x in range(3):
-            start[count, x], towards[count, x] = position[x], away[x] / math.sqrt(square)
-            for y in range(3):
-                start[count, x] += rotation[x, y] * (own[y] - away[y])
-        facet[count] = f
-        count += 1
+        x = to[0] - centroid[f, 0] - offset * normal[f, 0]
+        y = to[1] - centroid[f, 1] - offset * normal[f, 1]
+        z = to[2] - centroid[f, 2] - offset * normal[f, 2]
+        if normal[f, 0] * x + normal[f, 1] * y + normal[f, 2] * z + offset > 0.0:
+            share = 1.0 / math.sqrt(x * x + y * y + z * z)
+            towards[count, 0], towards[count, 1], towards[count, 2] = x * share, y * share, z * share
+            facet[count] = f
+            count += 1
     return count
 
 
