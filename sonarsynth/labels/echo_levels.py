@@ -19,9 +19,9 @@ def echo_levels(arrivals: Arrivals, powers: Powers, targets: int, snap_level: Fl
     loud = (10.0 ** (np.asarray(snap_level, float) / 10.0))[arrivals.snap]
     own = powers.steps[-1] * loud
     sums = echo_sums(arrivals.target, arrivals.arrives_by, arrivals.coherent, own, arrivals.direction, shape)
-    part = powers.part
-    together = np.column_stack([powers.part_power, powers.part_direction]) * loud[part, None]
-    np.add.at(sums, arrivals.target[part] * len(FAMILIES) + arrivals.arrives_by[part], together)
+    if len(part := powers.part):
+        together = np.column_stack([powers.part_power, powers.part_direction]) * loud[part, None]
+        np.add.at(sums, arrivals.target[part] * len(FAMILIES) + arrivals.arrives_by[part], together)
     total, size = sums[:, 0], targets * len(FAMILIES)
     level, azimuth, elevation = np.full(size, np.nan), np.full(size, np.nan), np.full(size, np.nan)
     audible = total > 0.0

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.equations.noise.path_sums import coherent_sums, mean_powers
+from sonarsynth.equations.noise.path_sums import coherent_sums, mean_powers, power_steps
 from sonarsynth.labels.level_band import SLICES, Band
 from sonarsynth.products import FAMILIES, Arrivals
 
@@ -59,21 +59,16 @@ def path_powers(arrivals: Arrivals, band: Band) -> Powers:
     blurs = arrivals.delay_std, arrivals.echo_delay_std
     bins = few.frequency, few.relative, few.weight
     # echo: with the facet's own roughness, which is no loss at a boundary
-    facet, echo, absorbed, blurred = mean_powers(arrivals.snap, *columns, *blurs, *bins, arrivals.centre)
+    facet, *means = mean_powers(arrivals.snap, *columns, *blurs, *bins, arrivals.centre)
     together = _CoherentPaths()
     if arrivals.coherent.any():
         rows = np.flatnonzero(arrivals.coherent)
         mean, together = _coherent(arrivals, rows, band)
         with np.errstate(divide="ignore", invalid="ignore"):
-            for power in (echo, absorbed, blurred):
+            for power in means:
                 power[rows] = np.nan_to_num(power[rows] / facet[rows]) * mean
-    start = arrivals.scattering**2
-    out = start * arrivals.spreading_out**2
-    back = out * arrivals.spreading_in**2
-    faded = back * 10.0 ** (-arrivals.absorption / 10.0)
-    last = faded * arrivals.boundary**2
-    steps = np.stack([start * echo, out * echo, back * echo, faded * absorbed, last * blurred])
-    return Powers(steps, *together)
+    ways = arrivals.scattering, arrivals.spreading_out, arrivals.spreading_in
+    return Powers(power_steps(*ways, arrivals.absorption, arrivals.boundary, np.stack(means)), *together)
 
 
 def _groups(arrivals: Arrivals, rows: Ints, apart: float) -> tuple[Ints, Ints, Floats, float]:

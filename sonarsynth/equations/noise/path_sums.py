@@ -138,6 +138,19 @@ def _phasors(c: Floats, s: Floats, first: float, step: float, count: int) -> Non
 
 
 @compiled
+def _moments(weight: Floats, fade: Floats, relative: Floats) -> Floats:
+    """Sums (snap, 4) over bins of weight (snap, bin) times fade (bin,) times powers 0 to 3 of -relative (bin,)."""
+    moment = np.zeros((len(weight), 4))
+    for n in range(len(weight)):
+        for k in range(len(fade)):
+            value = weight[n, k] * fade[k]
+            for j in range(4):
+                moment[n, j] += value
+                value *= -relative[k]
+    return moment
+
+
+@compiled
 def mean_powers(
     snap: Ints,
     coherent: Bools,
@@ -162,11 +175,17 @@ def mean_powers(
     out = np.zeros((4, loss.size))
     omega, shared = 2.0 * math.pi * frequency, math.log(10.0) / 10.0 * loss.mean()
     fade, largest = np.exp(-shared * relative), np.abs(relative).max()
+    total, moment = weight.sum(axis=1), _moments(weight, fade, relative)
     for e in range(loss.size):
         decay = math.log(10.0) / 10.0 * loss[e] - shared
         small = abs(decay) * largest < SMALL
         own = echo_delay_std[e] ** 2
         others = max(delay_std[e] ** 2 - own, 0.0)
+        if small and own + others == 0.0 and not coherent[e] and not coherent_fraction[e] > 0.0:  # water alone
+            m = moment[snap[e]]
+            out[0, e] = out[1, e] = total[snap[e]]
+            out[2, e] = out[3, e] = m[0] + decay * (m[1] + 0.5 * decay * (m[2] + decay / 3.0 * m[3]))
+            continue
         for k in range(frequency.size):
             power = weight[snap[e], k]
             if coherent[e]:
@@ -185,6 +204,27 @@ def mean_powers(
                 power *= math.exp(-(omega[k] ** 2) * others)
             out[3, e] += power
     return out
+
+
+@compiled
+def power_steps(
+    scattering: Floats, spreading_out: Floats, spreading_in: Floats, loss: Floats, boundary: Floats, means: Floats
+) -> Floats:
+    """Powers (step, path) of paths over that of the snap at 1 m, with one factor more in each: scattering, way out, way
+    in, absorption of loss (path,) dB at the centre, boundaries; means (3, path) over the band of what the facet, then
+    absorption, then roughness do to the power, together."""
+    steps = np.empty((5, len(loss)))
+    for e in range(len(loss)):
+        power = scattering[e] ** 2
+        steps[0, e] = power * means[0, e]
+        power *= spreading_out[e] ** 2
+        steps[1, e] = power * means[0, e]
+        power *= spreading_in[e] ** 2
+        steps[2, e] = power * means[0, e]
+        power *= math.exp(-math.log(10.0) / 10.0 * loss[e])
+        steps[3, e] = power * means[1, e]
+        steps[4, e] = power * boundary[e] ** 2 * means[2, e]
+    return steps
 
 
 @compiled
