@@ -84,10 +84,10 @@ def _tabulated(
     table, levels, size = pattern.table, pattern.table.shape[0], pattern.table.shape[1] - 2
     bulge, y, z = (curvature - focus) / pattern.step, 0.5 * pattern.pitch * apart[1], 0.5 * pattern.pitch * apart[2]
     for k in range(len(frequency)):
-        level = min(max(round(frequency[k] * bulge) - pattern.first, 0), levels - 1)
+        level = min(max(round(frequency[k] * bulge) - pattern.first, 0), levels - 1) if levels > 1 else 0
         across, up = frequency[k] * y, frequency[k] * z
-        across, up = (across - math.floor(across)) * size, (up - math.floor(up)) * size
-        i, j = int(up), int(across)
+        across, up = (across - np.floor(across)) * size, (up - np.floor(up)) * size
+        i, j = np.uint32(up), np.uint32(across)  # without signs no index counts from the end
         v, u = up - i, across - j
         a, b, c, d = table[level, i, j], table[level, i, j + 1], table[level, i + 1, j], table[level, i + 1, j + 1]
         real = (1.0 - v) * ((1.0 - u) * a.real + u * b.real) + v * ((1.0 - u) * c.real + u * d.real)
