@@ -96,7 +96,8 @@ class GriddedSynthesis(Method):
     """Precision of the arrays that pulses are summed in."""
     tolerance: Annotated[Number, Gt(0), Lt(0.1)] = 1.5e-4
     """Error allowed to each of the other approximations, relative to what a path gives: nodes along each axis of the
-    aperture, terms of directivity and of absorption; the quiet ends of the spectrum get 3 % of it each."""
+    aperture, terms of directivity and of absorption; the quiet ends of the spectrum get 3 % of it each, over the
+    coherent gain of paths of one sign."""
 
     def resolve(self, demand: Demand) -> tuple[GriddedSynthesis, float]:
         """Itself, and the bound on what it errs by, relative to the peak of an echo."""

@@ -64,6 +64,12 @@ def audible(spectrum: Complexes, tolerance: float) -> slice:
     return slice(int(ends[0]), min(int(ends[1]) + 1, spectrum.size))
 
 
+def _coherent_gain(front: ArrayPaths) -> float:
+    """By how much more the ends of the spectrum may add up over paths than its middle, where these come at random: with
+    long waves paths of one sign add by amplitude."""
+    return max(1.0, abs(float(np.sign(front.amplitude).sum())) / np.sqrt(front.count))
+
+
 def bins_of(
     segment: Segment, front: ArrayPaths, sonar: Sonar, absorption: Callable[[Floats], Floats] | None, tolerance: float
 ) -> tuple[ArrayPaths, Bins]:
@@ -85,7 +91,7 @@ def bins_of(
         series = slope * stretched_spectra(segment.waveform, sonar.antialias, fs, segment.samples, widest, count)
     if len(series) or _shaped(front):
         front, spectrum, series = _shared(front, frequency, spectrum, series, widest, tolerance)
-    loud = audible(spectrum, tolerance)
+    loud = audible(spectrum, tolerance / _coherent_gain(front))
     frequency, spectrum, series = frequency[loud], spectrum[loud], series[:, loud]
     if front.variance.any():
         front = _loud(front, frequency, spectrum, tolerance)
