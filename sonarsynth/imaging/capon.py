@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Annotated, Literal
 
 import numpy as np
@@ -66,6 +67,12 @@ class Capon(Steering):
                 least = np.maximum(blocks.forms(inverse @ covariance @ inverse, k, beams), 0.0)
                 energy += least / blocks.forms(inverse, k, beams) ** 2
         return snapshots.unit * energy
+
+    def steered(
+        self, snapshots: Snapshots, elements: Elements, sonar: Sonar
+    ) -> Callable[[Floats], npt.NDArray[np.complex64]]:
+        """As `Steering.steered`."""
+        return partial(self.steer, snapshots, elements, sonar)
 
     def steer(
         self, snapshots: Snapshots, elements: Elements, sonar: Sonar, direction: Floats

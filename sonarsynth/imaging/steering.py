@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import ClassVar
 
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from sonarsynth.conventions import Floats, direction
 from sonarsynth.description.method import FrameSize, Method
 from sonarsynth.equations.arrays.beams import beam_spectra
-from sonarsynth.imaging.delay_and_sum.lattice_beams import lattice_beam_spectra
+from sonarsynth.imaging.delay_and_sum.lattice_beams import LatticeBeams
 from sonarsynth.imaging.image_window import Shading, energy_image, snapshots_of, weights
 from sonarsynth.products import BeamSpectra, EnergyImage, Signals, Snapshots
 from sonarsynth.receiver import Elements, Sonar
@@ -32,7 +33,7 @@ class Steering(Method):
     def beams(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> BeamSpectra:
         """Beams of a window of the signals, made when they are asked for."""
         energies = partial(self.energies, snapshots, elements, sonar)
-        return BeamSpectra(snapshots, energies, partial(self.steer, snapshots, elements, sonar))
+        return BeamSpectra(snapshots, energies, self.steered(snapshots, elements, sonar))
 
     def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
         """Energy (elevation, azimuth) in Pa2 s of the beams of the sonar's grid: sum over bins of |B|^2.
@@ -47,16 +48,22 @@ class Steering(Method):
             energy[block] = np.sum(np.abs(beams).astype(float) ** 2, axis=1)
         return np.asarray(snapshots.unit * energy.reshape(grid.shape[:2]))
 
-    def steer(
-        self, snapshots: Snapshots, elements: Elements, sonar: Sonar, direction: Floats
-    ) -> npt.NDArray[np.complex64]:
-        """Spectra (beam, bin) in Pa of beams in `direction` (beam, xyz), sonar frame."""
+    def steered(
+        self, snapshots: Snapshots, elements: Elements, sonar: Sonar
+    ) -> Callable[[Floats], npt.NDArray[np.complex64]]:
+        """What gives spectra (beam, bin) in Pa of beams in directions (beam, xyz), sonar frame."""
         spectra, frequency = snapshots.spectra, snapshots.frequency
         focus, c = self.focus, sonar.assumed_sound_speed
         gain = weights(elements, self.shading)
         if not (elements.on_lattice and self.separable):
-            return beam_spectra(spectra, frequency, elements.position, gain, direction, c, focus)
-        return lattice_beam_spectra(spectra, frequency, elements, gain, direction, c, focus)
+            return partial(beam_spectra, spectra, frequency, elements.position, gain, sound_speed=c, focus=focus)
+        return LatticeBeams(spectra, frequency, elements, gain, c, focus)
+
+    def steer(
+        self, snapshots: Snapshots, elements: Elements, sonar: Sonar, direction: Floats
+    ) -> npt.NDArray[np.complex64]:
+        """Spectra (beam, bin) in Pa of beams in `direction` (beam, xyz), sonar frame."""
+        return self.steered(snapshots, elements, sonar)(direction)
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`, of one image: every beam steered by itself."""

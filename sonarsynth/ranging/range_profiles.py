@@ -60,20 +60,17 @@ class EchoFilter:
         """Step (s) of delays."""
         return 1.0 / (self.length * self.received.beams.snapshots.spacing)
 
-    def _spectra(self, u: Floats) -> npt.NDArray[np.complex64]:
-        window, elements = self.received.beams.snapshots, self.received.elements
-        sine = u * (elements.face / self.received.sonar.assumed_sound_speed)
-        f = window.frequency
-        face = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], f[0], window.spacing, len(f))
-        return np.asarray(ranging_kernels.matched_to(self.received.beams.spectra(u), face, self.share, self.matched))
-
     def profiles(self, u: Floats) -> tuple[npt.NDArray[np.complex64], npt.NDArray[np.float32]]:
         """Spectra (beam, bin) of the profiles of beams (beam, xyz), and these: powers (beam, delay)."""
+        window, sonar = self.received.beams.snapshots, self.received.sonar
+        sine = u * (self.received.elements.face / sonar.assumed_sound_speed)
         spectra = np.empty((len(u), len(self.matched)), np.complex64)
         power = np.empty((len(u), self.count), np.float32)
         for first in range(0, len(u), BEAMS_AT_ONCE):
             block = slice(first, first + BEAMS_AT_ONCE)
-            spectra[block] = self._spectra(u[block])
+            steered, bins = self.received.beams.spectra(u[block]), (window.frequency[0], window.spacing)
+            across, up = sine[block, 1], sine[block, 2]
+            ranging_kernels.match(steered, across, up, *bins, self.share, self.matched, spectra[block])
             ranging_kernels.powers(ifft(spectra[block], self.length, axis=1), power[block])
         return spectra, power
 

@@ -96,6 +96,21 @@ def turned(spectrum: Any, delay: Any, first: float, spacing: float) -> Any:
 
 
 @compiled
+def _face_response(across: float, up: float, first: float, spacing: float, response: Any) -> None:
+    """Fill response (bin,) of one direction, as of `face_responses`."""
+    y, z = np.pi * across, np.pi * up
+    sy, cy, sz, cz = np.sin(first * y), np.cos(first * y), np.sin(first * z), np.cos(first * z)
+    step_y, turn_y = np.sin(spacing * y), np.cos(spacing * y)
+    step_z, turn_z = np.sin(spacing * z), np.cos(spacing * z)
+    for k in range(len(response)):
+        f = first + k * spacing
+        x, w = f * y, f * z
+        response[k] = (sy / x if x != 0.0 else 1.0) * (sz / w if w != 0.0 else 1.0)
+        sy, cy = sy * turn_y + cy * step_y, cy * turn_y - sy * step_y
+        sz, cz = sz * turn_z + cz * step_z, cz * turn_z - sz * step_z
+
+
+@compiled
 def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int) -> Any:
     """sinc(f across) sinc(f up): (row, bin) at f = first + spacing * bin (Hz); across, up (row,) s: face times sine/c.
 
@@ -104,34 +119,22 @@ def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int
     """
     response = np.empty((len(across), bins))
     for i in range(len(across)):
-        y, z = np.pi * across[i], np.pi * up[i]
-        sy, cy, sz, cz = np.sin(first * y), np.cos(first * y), np.sin(first * z), np.cos(first * z)
-        step_y, turn_y, step_z, turn_z = (
-            np.sin(spacing * y),
-            np.cos(spacing * y),
-            np.sin(spacing * z),
-            np.cos(spacing * z),
-        )
-        for k in range(bins):
-            f = first + k * spacing
-            x, w = f * y, f * z
-            response[i, k] = (sy / x if x != 0.0 else 1.0) * (sz / w if w != 0.0 else 1.0)
-            sy, cy = sy * turn_y + cy * step_y, cy * turn_y - sy * step_y
-            sz, cz = sz * turn_z + cz * step_z, cz * turn_z - sz * step_z
+        _face_response(across[i], up[i], first, spacing, response[i])
     return response
 
 
 @compiled
-def matched_to(beams: Any, face: Any, share: Any, matched: Any) -> Any:
-    """beams (beam, bin) times face (beam, bin), over its root mean square by share (bin,), and times matched (bin,)."""
-    out = np.empty(beams.shape, beams.dtype)
+def match(beams: Any, across: Any, up: Any, first: float, spacing: float, share: Any, matched: Any, out: Any) -> None:
+    """Write beams (beam, bin) times `face_responses`, over their root mean square by share (bin,), and times matched
+    (bin,), into out (beam, bin)."""
+    face = np.empty(beams.shape[1])
     for b in range(beams.shape[0]):
+        _face_response(across[b], up[b], first, spacing, face)
         power = 0.0
         for k in range(beams.shape[1]):
-            power += share[k] * face[b, k] * face[b, k]
+            power += share[k] * face[k] * face[k]
         for k in range(beams.shape[1]):
-            out[b, k] = beams[b, k] * (face[b, k] / np.sqrt(power) * matched[k])
-    return out
+            out[b, k] = beams[b, k] * (face[k] / np.sqrt(power) * matched[k])
 
 
 @compiled
@@ -171,7 +174,7 @@ def common_wave(
     for q in range(sensors):
         for k in range(bins):
             response[q, k] *= loud[q]
-    shifted = turned(spectrum, shift, first, spacing)
+    shifted = turned(spectrum, shift, first, spacing) if np.any(shift != 0.0) else spectrum
     total, power = template_sums(shifted, response)
     return shifted, response, total, power
 

@@ -8,7 +8,7 @@ import pytest
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import element_directivity, focus_delay
 from sonarsynth.equations.arrays.beams import beam_spectra
-from sonarsynth.imaging.delay_and_sum.lattice_beams import lattice_beam_spectra
+from sonarsynth.imaging.delay_and_sum.lattice_beams import LatticeBeams
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location.pulse_times import in_band
 from sonarsynth.ranging.range_profiles import template_spectrum
@@ -33,7 +33,7 @@ def random_spectra(sensors, bins):
 
 
 def lattice_beams(spectra, frequencies, array, u, focus):
-    return lattice_beam_spectra(spectra, frequencies, array, array.gain / array.gain.sum(), u, SPEED, focus)
+    return LatticeBeams(spectra, frequencies, array, array.gain / array.gain.sum(), SPEED, focus)(u)
 
 
 @pytest.mark.parametrize("array", LATTICES)

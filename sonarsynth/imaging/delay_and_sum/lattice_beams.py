@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -16,48 +17,66 @@ from sonarsynth.receiver import Elements
 AHEAD = np.array([1.0, 0.0, 0.0])
 
 
-def lattice_beam_spectra(
-    spectra: npt.NDArray[np.complex64], frequencies: Floats, elements: Elements, weight: Floats, directions: Floats,
-    sound_speed: float, focus: float | None,
-) -> npt.NDArray[np.complex64]:  # fmt: skip
-    """As `beams.beam_spectra` for elements on a lattice, focused in every direction as on the axis; several times as
-    fast.
+@dataclass(frozen=True, eq=False)
+class LatticeBeams:
+    """Spectra of beams of elements on a lattice, as `beams.beam_spectra` has them, focused in every direction as on the
+    axis; several times as fast. The elements are focused once, when the first beam is asked for.
 
     The delay of focusing is (sqrt(R^2 + q^2) - R)/c: off the axis that is not quite a sphere (`FocusedDelayAndSum` has
-    a table). weight (sensor,) of sum one. Beams of one elevation share the sums over rows. Float32 sums: error 1e-6 of
-    the largest |B| (508 elements), 3e-6 for 64 in a row, 1.3e-5 for 300.
+    a table). Beams of one elevation share the sums over rows. Float32 sums: error 1e-6 of the largest |B| (508
+    elements), 3e-6 for 64 in a row, 1.3e-5 for 300.
     """
-    from sonarsynth.equations.kernels.lanes import LANES
-    from sonarsynth.equations.kernels.phasors import padded_bins
-    from sonarsynth.imaging.delay_and_sum.lattice_kernel import lattice_beams
 
-    places, heights, columns, middle, later = _halves(elements, focus, sound_speed)
-    padded = padded_bins(spectra, elements.count + 1, LANES)
-    order = np.argsort(directions[:, 2], kind="stable")
-    levels, first = np.unique(directions[order, 2], return_index=True)
-    half = 0.5 * elements.pitch / sound_speed
-    across = directions[order, 1]
-    rise = np.broadcast_to(half * levels[:, None, None], (len(levels), 2, places.shape[1]))
-    beams = np.empty((len(order), padded.shape[1]), np.complex64)
-    lattice_beams(
-        padded.view(np.float32).ravel(),
-        padded.shape[1],
-        places,
-        np.append(weight, 0.0).astype(np.float32),
-        later,
-        heights,
-        elements.rows % 2 == 1,
-        columns % 2 == 1,
-        np.ascontiguousarray(rise),
-        np.append(first, len(order)),
-        half * across,
-        across * (-middle / sound_speed),
-        *first_and_spacing(frequencies),
-        beams.view(np.float32).ravel(),
-    )
-    sums = np.empty((len(order), len(frequencies)), np.complex64)
-    sums[order] = beams[:, : len(frequencies)]
-    return sums
+    spectra: npt.NDArray[np.complex64]  # (sensor, bin)
+    frequencies: Floats  # (bin,) Hz, evenly spaced
+    elements: Elements
+    weight: Floats  # (sensor,) of sum one
+    sound_speed: float  # m/s
+    focus: float | None  # m; None: plane waves
+
+    def __call__(self, directions: Floats) -> npt.NDArray[np.complex64]:
+        """Spectra (beam, bin) of beams in directions (beam, xyz), in the unit of the elements'."""
+        from sonarsynth.imaging.delay_and_sum.lattice_kernel import lattice_beams
+
+        elements, c = self.elements, self.sound_speed
+        places, heights, columns, middle, _ = _halves(elements, self.focus, c)
+        folded, bins = self._focused
+        order = np.argsort(directions[:, 2], kind="stable")
+        levels, first = np.unique(directions[order, 2], return_index=True)
+        half = 0.5 * elements.pitch / c
+        across = directions[order, 1]
+        rise = np.broadcast_to(half * levels[:, None, None], (len(levels), 2, places.shape[1]))
+        beams = np.empty((len(order), bins), np.complex64)
+        lattice_beams(
+            folded,
+            bins,
+            places.shape[2],
+            heights,
+            elements.rows % 2 == 1,
+            columns % 2 == 1,
+            np.ascontiguousarray(rise),
+            np.append(first, len(order)),
+            half * across,
+            across * (-middle / c),
+            *first_and_spacing(self.frequencies),
+            beams.view(np.float32).ravel(),
+        )
+        sums = np.empty((len(order), len(self.frequencies)), np.complex64)
+        sums[order] = beams[:, : len(self.frequencies)]
+        return sums
+
+    @cached_property
+    def _focused(self) -> tuple[npt.NDArray[np.float32], int]:
+        """What `lattice_beams` steers, and its number of bins."""
+        from sonarsynth.equations.kernels.lanes import LANES
+        from sonarsynth.equations.kernels.phasors import padded_bins
+        from sonarsynth.imaging.delay_and_sum.lattice_kernel import focused_halves
+
+        places, *_, later = _halves(self.elements, self.focus, self.sound_speed)
+        padded = padded_bins(self.spectra, self.elements.count + 1, LANES)
+        weight = np.append(self.weight, 0.0).astype(np.float32)
+        pairs, bins = padded.view(np.float32).ravel(), padded.shape[1]
+        return focused_halves(pairs, bins, places, weight, later, *first_and_spacing(self.frequencies)), bins
 
 
 @lru_cache(maxsize=16)

@@ -184,30 +184,42 @@ def lattice_energies(
 
 
 @compiled
-def lattice_beams(
-    pairs: Any, bins: int, places: Any, weight: Any, delay: Any, heights: Any, odd_rows: bool, odd_columns: bool,
-    rise: Any, bounds: Any, across: Any, middle: Any, frequency: float, spacing: float, spectra: Any,
-) -> None:  # fmt: skip
-    """Spectra of beams of an array whose halves, to port and to starboard, are the two sets: (beam, bin) float32 pairs.
-
-    As `lattice_energies`, with places and delay (half, column, row, 4) and heights (column,); rise (level, side of y,
-    column) of beams across[bounds[level] : bounds[level + 1]]; middle (beam,): what a wave is later in the middle of
-    the half to port, and sooner in the other.
-    """
+def focused_halves(
+    pairs: Any, bins: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float
+) -> Any:
+    """What `lattice_beams` steers, float32: an array, focused and folded for each sixteen frequencies, whose halves, to
+    port and to starboard, are the two sets. As for `lattice_energies`; places and delay (half, column, row, 4)."""
     _, columns, rows, _ = places.shape
-    size, levels = 2 * columns * rows * TERM, len(rise)
-    folded, lines = np.empty(GROUPS * size, np.float32), np.empty(2 * GROUPS * columns * TERM, np.float32)
+    size = 2 * columns * rows * TERM
+    folded = np.empty(bins // LANES * size, np.float32)
+    for low in range(0, bins, LANES):
+        into = folded[low // LANES * size :]
+        focus(pairs, bins, low, places, weight, delay, frequency + low * spacing, spacing, 2, into)
+    return folded
+
+
+@compiled
+def lattice_beams(
+    folded: Any, bins: int, rows: int, heights: Any, odd_rows: bool, odd_columns: bool, rise: Any, bounds: Any,
+    across: Any, middle: Any, frequency: float, spacing: float, spectra: Any,
+) -> None:  # fmt: skip
+    """Spectra of beams of an array in two halves, `focused_halves`: (beam, bin) float32 pairs.
+
+    As `lattice_energies`, with heights (column,) of the rows of a half; rise (level, side of y, column) of beams
+    across[bounds[level] : bounds[level + 1]]; middle (beam,): what a wave is later in the middle of the half to port,
+    and sooner in the other.
+    """
+    columns, levels = len(heights), len(rise)
+    size, lines = 2 * columns * rows * TERM, np.empty(2 * GROUPS * columns * TERM, np.float32)
     beams = np.empty(np.max(np.diff(bounds)) * BEAM, np.float32)
     up, port, later = group_turns(rise, spacing), group_turns(across, spacing), group_turns(middle, spacing)
     rise = rise.ravel()
     for low in range(0, bins, CHUNK):
         groups, first = min(GROUPS, (bins - low) // LANES), frequency + low * spacing
-        for group in range(groups):
-            at = low + group * LANES
-            focus(pairs, bins, at, places, weight, delay, frequency + at * spacing, spacing, 2, folded[group * size :])
+        chunk = folded[low // LANES * size :]
         for level in range(0, levels, 2):
             inner, outer = level * 2 * columns, min(level + 1, levels - 1) * 2 * columns
-            sums_over_rows(folded, rows, heights, 2, odd_rows, rise, up, inner, outer, first, spacing, groups, lines)
+            sums_over_rows(chunk, rows, heights, 2, odd_rows, rise, up, inner, outer, first, spacing, groups, lines)
             for which in range(min(2, levels - level)):
                 start, at, stop = which * GROUPS * columns * TERM, bounds[level + which], bounds[level + which + 1]
                 beams[:] = ZERO

@@ -12,23 +12,30 @@ from sonarsynth.ranging.received_window import ReceivedWindow
 
 LINE = 2e3
 """Hz: width over which spectra are summed to find the line that a lobe makes of an echo."""
+FAINT = 0.25
+"""A line that brings less, of what lobes must bring a peak to count, is not followed: lines of the reef recipe that did
+count brought twice as much and more."""
 
 
 def louder_beyond(
-    window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats
+    window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats, counts: Floats
 ) -> tuple[Floats, Ints, Floats]:
     """Directions (echo, xyz), steps of delay and heights of echoes beyond the grid that are louder than peaks in it (b:
-    beam, t: delay, height), where these may be grating lobes of them.
+    beam, t: delay, height), where these may be grating lobes of them; counts (peak,): power that lobes must bring a
+    peak to count.
 
     A lobe brings of an echo a line: that of the frequency at which all sensors of the lattice are in step. Where it is
     is seen in the spectrum of the peak's own beam, and with it whence the echo comes: directions whose components along
-    the lattice are whole multiples of c/(f pitch) off.
+    the lattice are whole multiples of c/(f pitch) off. A line is f over the rows or columns wide, whichever are fewer,
+    at most: no lobe brings much more than that part of the spectrum does.
     """
     elements, c, f = window.elements, window.sonar.assumed_sound_speed, window.beams.snapshots.frequency
     none = np.zeros((0, 3)), np.zeros(0, int), np.zeros(0)
     if not (elements.on_lattice and len(b)):
         return none
-    peak, line = np.arange(len(b)), _lines(profiles, f, b, t)
+    line, brought = _lines(profiles, f, b, t, min(elements.rows, elements.columns))
+    may_count = brought > FAINT * counts
+    b, t, height, line = b[may_count], t[may_count], height[may_count], line[may_count]
     most = int(2.0 * elements.pitch * f[-1] / c)
     orders = np.stack(np.meshgrid(*2 * [np.arange(-most, most + 1)]), axis=-1).reshape(-1, 2)
     along = profiles.direction[b, None, 1:] + orders * (c / (elements.pitch * line))[:, None, None]
@@ -53,10 +60,15 @@ def louder_beyond(
     return u[louder], late[louder], loudest[louder]
 
 
-def _lines(profiles: Profiles, f: Floats, b: Ints, t: Ints) -> Floats:
-    """Frequencies (peak,) at which the spectra of peaks are largest, about their delays."""
+def _lines(profiles: Profiles, f: Floats, b: Ints, t: Ints, steps: int) -> tuple[Floats, Floats]:
+    """Frequencies (peak,) at which the spectra of peaks are largest, about their delays, and the power that the part of
+    the spectrum about it that is f/steps wide, or `LINE`, would bring a peak by itself."""
     turn = np.exp(2j * np.pi * profiles.step * t[:, None] * (f - f[0]))
     spectrum = profiles.spectra[b] * turn
-    width = max(int(LINE / (f[1] - f[0])), 1) if len(f) > 1 else 1
+    spacing = f[1] - f[0] if len(f) > 1 else LINE
+    width = max(int(LINE / spacing), 1)
     smooth = [uniform_filter1d(part, width, axis=1, mode="constant") for part in (spectrum.real, spectrum.imag)]
-    return np.asarray(f[(smooth[0] ** 2 + smooth[1] ** 2).argmax(axis=1)])
+    power = smooth[0] ** 2 + smooth[1] ** 2
+    line = f[power.argmax(axis=1)]
+    bins = np.minimum(np.maximum(width, line / (steps * spacing)), len(f))
+    return line, power.max(axis=1) * (bins / profiles.filter.length) ** 2

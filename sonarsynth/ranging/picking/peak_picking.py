@@ -229,7 +229,7 @@ def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: F
     least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
     u, delay = profiles.direction[b], profiles.step * t.astype(float)
     own = _over(window, profiles.width, u, delay, height, least)
-    beyond, late, power = louder_beyond(window, profiles, b[own], t[own], height[own])
+    beyond, late, power = louder_beyond(window, profiles, b[own], t[own], height[own], least[own] / LOBES)
     if len(power):
         u, delay = np.concatenate([u[own], beyond]), np.concatenate([delay[own], profiles.step * late])
         unasked = np.full(len(power), np.inf)
