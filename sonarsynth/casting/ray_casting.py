@@ -172,17 +172,6 @@ def enclosing(body: PlacedTarget) -> tuple[Floats, float]:
     return np.asarray(body.pose.to_world(ready.centre)), (1.0 + 1e-5) * ready.size
 
 
-def inside(body: PlacedTarget, point: Floats) -> bool:
-    """Whether a point (xyz) of the world is inside a closed body: the facet above it shows its inner side."""
-    own, box = body.pose.to_body(point), body.mesh.box
-    margin = 1e-5 * (1.0 + np.ptp(box, axis=0))  # rounding of places
-    if not len(body.mesh.faces) or (own < box[0] - margin).any() or (own > box[1] + margin).any():
-        return False
-    up = np.array([[1e-3, 2e-3, 1.0]])  # off the edges of boxes
-    facet, _ = first_hit(body.mesh, body.pose.to_body(point[None]), body.pose.turn_to_body(up))
-    return bool(facet[0] >= 0 and body.mesh.normal[facet[0]] @ body.pose.turn_to_body(up)[0] > 0.0)
-
-
 def first_hit(mesh: Mesh, origin: Floats, direction: Floats, far: float = np.inf) -> tuple[Ints, Floats]:
     """Facet (ray,) that each ray meets first, and its distance (m); -1 and NaN where it meets none within `far` (m).
 

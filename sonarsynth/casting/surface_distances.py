@@ -1,4 +1,4 @@
-"""Distances of points from the surface of a body, compiled: exact, by the tree of its facets."""
+"""Distances of points from the surface of a body, compiled: exact, by the tree of its facets; and which are in it."""
 
 from __future__ import annotations
 
@@ -7,12 +7,30 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.casting.ray_casting import casting_mesh
+from sonarsynth.casting.ray_casting import casting_mesh, first_hit
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Bools, Floats
 from sonarsynth.geometry.placed_target import PlacedTarget
 
 Int32s = npt.NDArray[np.int32]
+TOUCHING = 1e-6
+"""m from the surface of a body: what is no farther touches it."""
+UP = np.array([1e-3, 2e-3, 1.0])
+"""In the frame of a body, off the edges of boxes."""
+
+
+def enclosed(body: PlacedTarget, points: Floats) -> Bools:
+    """Which points (point, xyz) of the world are inside a closed body, where the facet above them shows its inner side,
+    or touch its surface."""
+    own, box, out = body.pose.to_body(points), body.mesh.box, np.zeros(len(points), bool)
+    margin = 1e-5 * (1.0 + np.ptp(box, axis=0))  # rounding of places
+    near = np.flatnonzero(((own >= box[0] - margin) & (own <= box[1] + margin)).all(axis=1))
+    if not len(near) or not len(body.mesh.faces):
+        return out
+    facet, _ = first_hit(body.mesh, own[near], np.broadcast_to(UP, (len(near), 3)))
+    inner = (facet >= 0) & (body.mesh.normal[facet] @ UP > 0.0)
+    out[near] = inner | (surface_distances(body, points[near]) <= TOUCHING)
+    return out
 
 
 def surface_distances(body: PlacedTarget, points: Floats) -> Floats:

@@ -25,6 +25,8 @@ def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
     """
     environment, band = scene.world.environment, scene.sonar.band
     field_notes = [("sound_speed", note) for note in profile.notes]
+    if scene.physics.tracing.layered:
+        field_notes += [("sound_speed", note) for note in _steps(profile, band.low)]
     field_notes += [
         ("absorption", note)
         for note in absorption_notes(environment.absorption, [[band.low], [band.high]], [0.0, environment.depth])
@@ -34,6 +36,26 @@ def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
             field_notes += [(f"{name}.{field}", note) for field, note in boundary_notes(boundary, band.low, band.high)]
     lines = [f"scene.world.environment.{field}: {note}" for field, note in field_notes]
     return (*lines, *noise_notes(scene), *(f"{'.'.join(BELIEVED)}: {note}" for note in _believed(scene)))
+
+
+STEP = 2.0
+"""m/s: a change of the sound speed within a wavelength that is said: it reflects what grazes it by 3 degrees."""
+
+
+def _steps(profile: Profile, frequency: float) -> list[str]:
+    """Whether the sound speed changes so much within a wavelength (at a frequency, Hz) that rays do not tell how."""
+    wavelength = float(profile.speed.min()) / frequency
+    above, below = (profile.at(profile.depth + side * wavelength) for side in (-0.5, 0.5))
+    change = np.abs(below - above)
+    at = int(np.argmax(change))
+    if profile.uniform or change[at] <= STEP:
+        return []
+    grazing = np.rad2deg(np.arccos(min(above[at], below[at]) / max(above[at], below[at])))
+    return [
+        f"changes by {change[at]:.2g} m/s within a wavelength of {frequency:g} Hz at {profile.depth[at]:.4g} m: waves "
+        f"that meet it at less than {grazing:.1f} deg are reflected there with a phase up to 90 deg off, and what it "
+        "reflects of others is left out"
+    ]
 
 
 BELIEVED = ("scene", "processing", "placing", "profile")

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import inside
+from sonarsynth.casting.surface_distances import enclosed
 from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats, depth
 from sonarsynth.description import FieldError
 from sonarsynth.environment.casts import profile_of
@@ -32,6 +32,10 @@ FARTHEST = 1e6
 """m from the origin: beyond, travel times lose their microseconds."""
 CLOSEST = 1e-3
 """m: a snap no nearer to the centre of the array, or to a hydrophone."""
+LATEST = 1e6
+"""s from the instant of a frame: beyond, the times of its sound lose their nanoseconds."""
+OLDEST = 1e10
+"""s from the start of the motions: beyond, what moves at some metres a second loses its micrometres."""
 LOUDEST = 300.0
 """dB re 1 uPa at 1 m: single precision holds the signals of no louder snap everywhere."""
 LONGEST_SNAP = 0.1
@@ -127,6 +131,11 @@ def check_shrimp(scene: Scene) -> None:
                 ("scene", "world", "sources", i, "position"),
                 f"depth {down:.12g} m is outside the water (0 to {bottom_depth:g} m)",
             )
+        if late := [time for time in source.times if not abs(time) <= LATEST]:
+            raise FieldError(
+                ("scene", "world", "sources", i, source.times_field),
+                f"{late[0]:g} s is more than {LATEST:g} s from the instant of a frame",
+            )
         try:
             _check_pulse(source, bottom_depth, scene.sonar)
         except ValueError as error:
@@ -142,9 +151,13 @@ def check_shrimp(scene: Scene) -> None:
 def check_frame(scene: Scene, frame: Frame) -> None:
     """The array and every body must be in the water, and no snap inside a body or the array."""
     bottom_depth = scene.world.environment.depth
-    reach = elements(scene.sonar.array).position
+    hydrophones = frame.sonar_pose.to_world(elements(scene.sonar.array).position)
     when = f"frame {frame.index}"
-    _check_depth(("scene", "trajectory", "sonar"), "the array", frame.sonar_pose.to_world(reach), bottom_depth, when)
+    if not abs(frame.time) <= OLDEST:
+        raise FieldError(
+            ("scene", "trajectory"), f"{when} is {frame.time:.3g} s from the start of the motions: too far"
+        )
+    _check_depth(("scene", "trajectory", "sonar"), "the array", hydrophones, bottom_depth, when)
     for i, body in enumerate(frame.moment.bodies):
         path = ("scene", "world", "targets", i, "motion")
         if not _box_in_water(body, bottom_depth):
@@ -152,8 +165,12 @@ def check_frame(scene: Scene, frame: Frame) -> None:
         if scene.physics.doppler:
             _check_speed(scene, frame, i)
             _check_met(scene, frame, i)
-        if inside(body, frame.sonar_pose.position):
-            raise FieldError(path, f"target '{body.name}' contains the sonar at frame {frame.index}")
+        if enclosed(body, frame.sonar_pose.position[None])[0]:
+            raise FieldError(path, f"target '{body.name}' contains the sonar at {when}, or touches it")
+        if (sensors := enclosed(body, hydrophones)).any():
+            raise FieldError(
+                path, f"target '{body.name}' contains hydrophone {sensors.argmax()} at {when}, or touches it"
+            )
     _check_snaps(scene, frame)
     for number, field in enumerate(frame.moment.scatterers):
         scatterer_path = ("scene", "world", "scatterers", number)
@@ -175,8 +192,8 @@ def _check_met(scene: Scene, frame: Frame, number: int) -> None:
         if not _box_in_water(moved, bottom_depth):
             _check_depth(path, name, _places(moved), bottom_depth, f"frame {frame.index}")
     for snap in snaps:
-        if snap.time and inside(body.later(snap.time), snap.position):
-            raise FieldError(path, f"{name} contains a snap at frame {frame.index}")
+        if snap.time and enclosed(body.later(snap.time), snap.position[None])[0]:
+            raise FieldError(path, f"{name} contains a snap at frame {frame.index}, or touches it")
 
 
 def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
@@ -207,8 +224,8 @@ def _check_snaps(scene: Scene, frame: Frame) -> None:
         if scene.physics.doppler and math.hypot(*snap.velocity, *frame.sonar_velocity) > 0.4 * MAX_DOPPLER * slowest:
             raise FieldError(path, f"moves too fast for sound in water at frame {frame.index}")
         for body in frame.moment.bodies:
-            if inside(body, snap.position):
-                raise FieldError(path, f"is inside target '{body.name}' at frame {frame.index}")
+            if enclosed(body, snap.position[None])[0]:
+                raise FieldError(path, f"is inside target '{body.name}' at frame {frame.index}, or touches it")
 
 
 def check_located(scene: Scene, frame: Frame, products: frozenset[str]) -> None:

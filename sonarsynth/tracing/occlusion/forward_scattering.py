@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import inside
+from sonarsynth.casting.surface_distances import enclosed
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.scattering import Component, FacetLaw
@@ -38,7 +38,7 @@ def blocking_bodies(context: FrameContext, source: Floats | None = None) -> tupl
     return tuple(
         body
         for body, law in zip(context.bodies, context.laws, strict=True)
-        if not shadow_parts(law) or (source is not None and inside(body, source))
+        if not shadow_parts(law) or (source is not None and enclosed(body, source[None])[0])
     )
 
 
