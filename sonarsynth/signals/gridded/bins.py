@@ -67,7 +67,7 @@ def audible(spectrum: Complexes, tolerance: float) -> slice:
 def _coherent_gain(front: ArrayPaths) -> float:
     """By how much more the ends of the spectrum may add up over paths than its middle, where these come at random: with
     long waves paths of one sign add by amplitude."""
-    return max(1.0, abs(float(np.sign(front.amplitude).sum())) / np.sqrt(front.count))
+    return max(1.0, abs(float(np.sign(front.amplitude).sum())) / float(np.sqrt(front.count)))
 
 
 def bins_of(
