@@ -216,6 +216,17 @@ def clear_of_body(mesh: Mesh, facet: Ints, direction: Floats, slope: Floats) -> 
     return np.asarray(horizons.clear_of_body(facet, direction, slope, *tables))
 
 
+def met_again(mesh: Mesh, facet: Ints, offset: float, direction: Floats, distance: Floats) -> Bools:
+    """Whether rays (ray,) from the middles of facets, moved off them by `offset` (m), in directions (ray, xyz), of
+    length one, in the frame of the mesh, meet it again within distances (ray,) m."""
+    met = ~clear_of_body(mesh, facet, direction, alike(0.0, len(facet)))
+    rays, ready = np.flatnonzero(met), casting_mesh(mesh)
+    rows = facet[rays]
+    start = (mesh.centroid[rows] + offset * mesh.normal[rows] - ready.centre) / ready.size
+    met[rays] = ready.within(start, direction[rays], distance[rays] / ready.size, any_hit=True)[0] >= 0
+    return met
+
+
 def occluded(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, own: Ints | None = None) -> Bools:
     """Whether any body stands in each straight segment from start (segment, xyz) to end (segment, xyz) in the world;
     own (segment,): the body that surely does not (`clear_of_own_body`), -1 for none.

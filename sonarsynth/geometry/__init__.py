@@ -24,7 +24,10 @@ def quaternion(heading: float, pitch: float = 0.0, roll: float = 0.0) -> Floats:
 
 def quaternion_product(p: npt.ArrayLike, q: npt.ArrayLike) -> Floats:
     """Hamilton product p q of quaternions (..., 4): rotate by q first, then by p."""
-    return np.stack(_product(*(np.moveaxis(np.asarray(a, float), -1, 0) for a in (p, q))), axis=-1)
+    a, b = np.asarray(p, float), np.asarray(q, float)
+    if a.ndim == b.ndim == 1:
+        return np.array(_product(a.tolist(), b.tolist()))
+    return np.stack(_product(np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)), axis=-1)
 
 
 def _product(p: Any, q: Any) -> tuple[Any, Any, Any, Any]:

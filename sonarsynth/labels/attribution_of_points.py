@@ -112,8 +112,7 @@ def attribution(
     gate, reach = GATE / width, elements.aperture / listening.sound_speed
     clock = _clock(arrivals, listening.clock, gate)
     moment = clock + late
-    corners = np.abs(arrivals.corner_delays).T
-    longer = np.maximum(np.maximum(corners[0], corners[1]), corners[2])
+    longer = kernels.largest(arrivals.corner_delays)
     slowness = listening.sound_speed / arrivals.sound_speed
     across = gate + reach * kernels.farthest(arrivals.direction, slowness, beam)
     window = np.array([[-1.0], [1.0]]) * (across + longer.max(initial=0.0))
@@ -172,8 +171,10 @@ def _code(paths: Arrivals, snaps: int) -> Ints:
 
 def _loud(power: Floats, code: Ints) -> Bools:
     """(path,) without those that together bring `FAINT` of the power of their group, of one code, at most."""
-    loud, faint = np.empty(len(power), bool), np.asarray(FAINT * np.bincount(code, power))
-    kernels.louder(power, code, np.argsort(power, kind="stable"), faint, loud)
+    faint = np.asarray(FAINT * np.bincount(code, power))
+    loud = np.asarray(power > faint[code])
+    others = np.flatnonzero(~loud)  # that may be left out
+    kernels.louder(power, code, others[np.argsort(power[others], kind="stable")], faint, loud)
     return loud
 
 

@@ -67,9 +67,19 @@ def farthest(vectors: Floats, factor: float, others: Floats) -> float:
 
 
 @compiled
+def largest(values: Floats) -> Floats:
+    """Largest size (row,) of values (row, column)."""
+    out = np.zeros(len(values))
+    for n in range(len(values)):
+        for k in range(values.shape[1]):
+            out[n] = max(out[n], abs(values[n, k]))
+    return out
+
+
+@compiled
 def louder(power: Floats, code: Ints, order: Ints, faint: Floats, loud: Bools) -> None:
-    """Write which paths (path,) are more than those that, from the faintest of their code on, bring `faint` (code,) at
-    most; order (path,): ascending in power."""
+    """Write which of some paths are more than those that, from the faintest of their code on, bring `faint` (code,) at
+    most; order (row,): which paths, ascending in power."""
     up_to = np.zeros(len(faint))
     for e in order:
         up_to[code[e]] += power[e]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import OFFSET, clear_of_body, occluded
+from sonarsynth.casting.ray_casting import OFFSET, met_again, occluded
 from sonarsynth.columns import alike
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.geometry import Pose
@@ -77,17 +77,15 @@ def _visible(
 
 def _leaving(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], rows: Ints, to: Floats) -> tuple[Ints, Bools]:
     """Those of facets (row,) on whose outer side a place (xyz), world, is, and which of them no body hides from it."""
-    mesh, offset, others = body.mesh, _offset(body), tuple(other for other in bodies if other is not body)
-    facet, towards = np.empty(len(rows), np.int64), np.empty((len(rows), 3))
-    count = view_kernels.leaving(rows, mesh.centroid, mesh.normal, offset, body.pose.to_body(to), facet, towards)
+    mesh, pose, offset, others = body.mesh, body.pose, _offset(body), tuple(b for b in bodies if b is not body)
+    facet, towards, distance = np.empty(len(rows), np.int64), np.empty((len(rows), 3)), np.empty(len(rows))
+    own = mesh.centroid, mesh.normal, offset, pose.to_body(to)
+    count = view_kernels.leaving(rows, *own, facet, towards, distance)
     facet = facet[:count]
-    by_own = np.flatnonzero(~clear_of_body(mesh, facet, towards[:count], alike(0.0, count)))
-    hidden = np.zeros(count, bool)
-    for among, of in ((by_own, (body,)), (slice(None), others)):
-        if of:
-            cast = facet[among]
-            start = body.pose.to_world(mesh.centroid[cast] + offset * mesh.normal[cast])
-            hidden[among] |= occluded(of, start, alike(to, len(start)))
+    hidden = met_again(mesh, facet, offset, towards[:count], distance[:count])
+    if others:
+        start = pose.to_world(mesh.centroid[facet] + offset * mesh.normal[facet])
+        hidden |= occluded(others, start, alike(to, count))
     return facet, ~hidden
 
 
