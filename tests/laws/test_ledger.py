@@ -118,6 +118,20 @@ def test_levels_are_the_energy_of_the_sums_of_paths_in_the_band(coherent: bool |
         assert received[snap, target, kind] == pytest.approx(expected, abs=0.03)
 
 
+@pytest.mark.parametrize("spread", [0.5, 60.0])
+def test_water_takes_of_each_path_what_it_takes_at_each_frequency(spread: float) -> None:
+    """Losses near their mean go by a series, others do not."""
+    of, band = some_paths(50, 7, coherent=False), the_band()
+    plain = {name: np.zeros(50) for name in ("delay_std", "coherent_fraction", "height_delay_std")}
+    loss = np.linspace(20.0, 20.0 + spread, 50)
+    steps = path_powers(replace(of, absorption=loss, **plain), band).steps
+    sliced = band.sliced(16)
+    left = 10.0 ** (-np.outer(loss, 1.0 + sliced.relative) / 10.0)
+    np.testing.assert_allclose(steps[3] / steps[2], (sliced.weight[of.snap] * left).sum(axis=1), rtol=5e-6)
+    for step, factor in ((0, of.scattering), (1, of.spreading_out), (2, of.spreading_in), (4, of.boundary)):
+        np.testing.assert_allclose(steps[step], (steps[step - 1] if step else 1.0) * factor**2, rtol=1e-12)
+
+
 def test_losses_are_means_of_the_losses_of_paths_and_phases_are_in_the_scattering() -> None:
     """All paths alike but for place: a common loss is that of each, whatever the phases do."""
     of = some_paths(60, 2, coherent=True)
