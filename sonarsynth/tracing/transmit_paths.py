@@ -59,11 +59,8 @@ class TransmitPaths(Columns):
 
     def merged(self) -> TransmitPaths:
         """The ways with those that coincide added up: from a snap on the bottom, say, and its image there."""
-        first = np.ones(len(self.facet), bool)
-        same = (np.diff(self.facet) == 0) & (np.abs(np.diff(self.travel_time)) < COINCIDENCE_TIME)
-        first[1:] = ~(
-            same & (np.diff(self.delay_std) == 0) & (np.abs(np.diff(self.arrival, axis=0)) < 1e-9).all(axis=1)
-        )
+        first = self._apart
+        first[1:] |= np.diff(self.delay_std) != 0
         if first.all():
             return self
         number = np.cumsum(first) - 1
@@ -76,6 +73,23 @@ class TransmitPaths(Columns):
     def bounces(self) -> Ints:
         """(way,) reflections from surface and bottom."""
         return np.asarray(self.surface + self.bottom)
+
+    @property
+    def counted(self) -> Ints:
+        """(way,) reflections that count towards the most of a path, once ways are merged: the fewest of those that
+        coincide. A snap on a rough bottom and its image there, which comes blurred, are one place."""
+        if not self.delay_std.any():
+            return self.bounces
+        first = self._apart
+        return np.asarray(np.minimum.reduceat(self.bounces, np.flatnonzero(first))[np.cumsum(first) - 1])
+
+    @property
+    def _apart(self) -> Bools:
+        """Which ways (way,) do not coincide with the one before."""
+        first = np.ones(len(self.facet), bool)
+        same = (np.diff(self.facet) == 0) & (np.abs(np.diff(self.travel_time)) < COINCIDENCE_TIME)
+        first[1:] = ~(same & (np.abs(np.diff(self.arrival, axis=0)) < 1e-9).all(axis=1))
+        return first
 
 
 def directed(snap: Emission, departure: Floats) -> tuple[Floats | float, Floats | float]:
@@ -90,13 +104,13 @@ def path_pairs(out: TransmitPaths, legs: ReceivePaths, facets: int, bounces: int
     """Every pair of a way out to one of so many facets, each of which has a leg, and a leg from it, with no more than
     so many bounces: which way, or a slice of all of them, and which leg. Legs are sorted by facet, the pairs by way."""
     if len(legs.row) == facets:
-        way, leg = picked(out.bounces + legs.bounces[out.facet] <= bounces), out.facet
+        way, leg = picked(out.counted + legs.bounces[out.facet] <= bounces), out.facet
         return way, leg[way]
     begin = np.searchsorted(legs.row, np.arange(facets + 1))
     count = np.diff(begin)[out.facet]
     way = np.repeat(np.arange(len(count)), count)
     leg = begin[out.facet[way]] + np.arange(len(way)) - np.repeat(np.cumsum(count) - count, count)
-    within = out.bounces[way] + legs.bounces[leg] <= bounces
+    within = out.counted[way] + legs.bounces[leg] <= bounces
     return way[within], leg[within]
 
 

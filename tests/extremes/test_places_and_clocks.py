@@ -121,3 +121,27 @@ def test_points_of_what_turns_may_be_none() -> None:
     mover = Mover(Circle(centre=(22.0, 3.0, -29.0), radius=4.0, speed=1.4), 0.3)
     assert mover.points(np.empty((0, 3)), np.empty(0)).shape == (0, 3)
     assert mover.velocity(np.empty((0, 3)), np.empty(0)).shape == (0, 3)
+
+
+@pytest.mark.parametrize(("bounces", "begin"), [(1, 0.0443), (2, 0.0683)])
+def test_echoes_of_a_snap_on_a_hardly_rough_bottom_are_those_of_a_smooth_one(bounces: int, begin: float) -> None:
+    """Its image, which lies where it does, counts as no reflection, whether it comes blurred or not; begin (s): of the
+    echoes by so many reflections, of which none is the image's."""
+    smooth, rough = (
+        ss.render(
+            ss.plan(
+                crate(
+                    f"{SNAP}={{kind: snapping_shrimp, position: [12, -6]}}",
+                    f"scene.world.environment.bottom.rms_height={height} m",
+                    f"scene.physics.tracing={{kind: auto, bounces: {bounces}}}",
+                ),
+                ["signals"],
+            ),
+            0,
+        )
+        for height in (0.0, 1e-9)
+    )
+    first = round((begin - float(smooth["signals/start"])) * 196e3)
+    echo = slice(first, first + round(3e-3 * 196e3))
+    a, b = (frame["signals/pressure"].values[:, echo] for frame in (smooth, rough))
+    assert np.abs(a - b).max() < 2e-3 * np.abs(a).max() > 0.0
