@@ -16,6 +16,9 @@ GATE_TAPER: Final = 1e-4
 SENSORS_AT_ONCE: Final = 64
 """Sensors whose gates are transformed together: they stay in the cache."""
 
+SHORT: Final = 256
+"""Samples up to which waves in a matrix are faster than a transform."""
+
 
 def gate_samples(
     start: float, stop: float, first_time: float, sampling_frequency: float, samples: int
@@ -92,8 +95,12 @@ def gated_spectra(
 
 
 def short_spectra(rows: Floats, first: int, stop: int) -> npt.NDArray[np.complex128]:
-    """The bins `first` to `stop` of the rfft of rows (row, sample): where these are short and of a length that is not
-    fast, in half of its time."""
+    """The bins `first` to `stop` of the rfft of rows (row, sample): of short ones, whose length is not fast, in half of
+    its time."""
+    if rows.shape[1] > SHORT:
+        from scipy.fft import rfft
+
+        return np.asarray(rfft(rows, axis=1)[:, first:stop])
     return np.asarray((rows @ _waves(rows.shape[1], first, stop)).view(complex))
 
 

@@ -44,6 +44,7 @@ SHARED = 0.05
 """Share of a pulse's power at the sensors that its wavefront may leave unexplained, unless it is the noise's own:"""
 AUDIBLE = 4.0
 """no more than this factor over the power of the quiet."""
+LOST = 0.5  # the share of other sound with which a pulse is refused without a look at how long it lasts
 PERIODS_OFF = 1 / 6
 """Standard error of the first fit, root mean square over the sensors, in periods of a tone: with more, a sensor may be
 taken a whole period early or late, and the pulse to come from a grating lobe."""
@@ -130,7 +131,7 @@ def _loudest(track: Floats, candidates: Candidates, signals: Signals, snaps: int
 def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: float, bend: Bend | None) -> SourceFix:
     """The loudest pulse about `centre` (s) by itself; refused where its data do not support a place."""
     elements, sonar = knowledge.elements, knowledge.sonar
-    fitted = fit_pulse(signals, elements, sonar, centre, half, knowledge.velocity)
+    fitted = fit_pulse(signals, elements, sonar, centre, half, knowledge.velocity, knowledge.quiet)
     if isinstance(fitted, int):
         return refused(fitted)
     wave, pulse, elements = fitted
@@ -174,10 +175,10 @@ def _clipping_error(signals: Signals, elements: Elements, sonar: Sonar, centre: 
 
 
 def fit_pulse(
-    signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats
+    signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats, quiet: float
 ) -> tuple[Wavefront, Pulse, Elements] | int:
     """Wavefront of the pulse about `centre` (s), the pulse as measured last, and the sensors where they hear it; or why
-    it is refused, of REASONS. velocity (xyz): of the array, m/s, sonar frame.
+    it is refused, of REASONS. velocity (xyz): of the array, m/s, sonar frame; quiet as `SonarKnowledge` has it.
 
     Envelope peaks of the sensors give eq. 6 in closed form, then the sphere, robustly; then the sensors are aligned
     and their lags measured coherently, until these settle.
@@ -195,7 +196,7 @@ def fit_pulse(
         if aligned is None or np.abs(expected - aligned.time).max() > aside:
             aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=longer)
         pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
-        if pulse.lasts:
+        if pulse.lasts and not (pulse.share > LOST and pulse.noise > AUDIBLE * longer * quiet):
             whole = _whole(signals, elements, sonar, wave)
             if whole is None:
                 return BAND
