@@ -10,7 +10,7 @@ import pytest
 from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.environment.sea import Profile
 from sonarsynth.environment.sound_speed import mean_gradient
-from sonarsynth.equations.arrays.spherical_wave import tangent_plane
+from sonarsynth.equations.arrays.spherical_wave import envelope_peak, tangent_plane
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.motion import Track
@@ -19,9 +19,9 @@ from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.refraction import first_rays
 from sonarsynth.ranging.location.source_position import ACCEPTED, UNRESOLVED, bending_covariance
 from sonarsynth.ranging.location.triggered import Triggered
-from sonarsynth.receiver import PlanarLattice, Romanis, Sonar, elements
+from sonarsynth.receiver import Band, PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.state import Receiver, Survey, Trigger
-from tests.heard import RATE, envelope_late, hear, hear_direct, silence
+from tests.heard import RATE, envelope_late, hear, hear_direct, pulse_spectrum, silence
 
 C = 1540.0
 ROMANIS = elements(Romanis())
@@ -363,3 +363,16 @@ def test_without_noise_the_time_of_a_pulse_errs_by_what_is_predicted_at_any_angl
         found = locate(hear_direct(array, source), array, source, sonar=sonar, method=SensorDelays(on_bottom=False))
         off.append((found.time[0] - 12.0 / C - envelope_late()) / found.time_error[0])
     assert np.max(np.abs(off)) < 4.0 and np.sqrt(np.mean(np.square(off))) < 1.5
+
+
+def test_the_time_of_a_pulse_is_right_where_a_null_of_the_faces_lies_between_two_bins():
+    """In a band of eight bins, as the null moves through it with the source's angle."""
+    lattice, band = PlanarLattice(columns=6, rows=6, pitch=0.06, face=0.06), Band(low=25e3, high=50e3)
+    array, f, off = elements(lattice), np.linspace(20e3, 60e3, 801), []
+    sonar = Sonar(array=lattice, band=band, assumed_sound_speed=C, sound_speed_error=0.0)
+    late = envelope_peak(f, pulse_spectrum(f), band.low, band.high)[0]
+    for degrees in np.arange(25.0, 75.0, 2.5):
+        source = 12.0 * direction(np.deg2rad(degrees), -0.02)
+        found = locate(hear_direct(array, source), array, source, sonar=sonar, method=SensorDelays(on_bottom=False))
+        off.append((found.time[0] - 12.0 / C - late) / found.time_error[0])
+    assert np.max(np.abs(off)) < 4.0

@@ -15,7 +15,7 @@ from sonarsynth.equations.arrays.gates import short_spectra
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, wavefront_delays
 from sonarsynth.products import Signals
 from sonarsynth.ranging import ranging_kernels
-from sonarsynth.receiver import Band, Elements
+from sonarsynth.receiver import Band, Elements, Sonar
 
 PULSE_HALF = 160e-6
 """Half length (s) of what is kept round a pulse after alignment: the snap in band and the ringing of its filter."""
@@ -26,13 +26,10 @@ PERIODS = 2.0
 CUT = 0.1
 """Of the peak of the envelope: what is louder where the window falls is a pulse that lasts longer, whose time and whose
 lags would be in part those of the window: it is looked at in one `LONGER` times as long."""
-HOLLOW = 0.02
-"""Power of a bin over the loudest, times the taper of the band, below which faces have a null in the band: there the
-waveform holds much more of what cutting the pulse's tail off adds. Its peak erred by up to 76 ns (5 cm, 30 to 46 deg),
-88 ns (4.2 cm, 70 deg), and in bands of 2.4 kHz, whose pulses last long, by 3 us
-"""
 LONGER = 3.0
-"""and by under 1 ns, 1 ns and 40 ns as measured over a window so many times as long."""
+"""Where faces have a null in the band, the waveform holds much more of what cutting the pulse's tail off adds: its peak
+erred by up to 88 ns (4.2 cm, 70 deg), 2.1 us (11.8 cm, 49 deg, 10 to 34 kHz), and in bands of 2.4 kHz, whose pulses
+last long, by 3 us; and by under 1 ns, 95 ns and 40 ns as measured over a window so many times as long."""
 DEAF = 1e-4
 """Mean square response (of one sensor on its axis) below which a bin counts as not heard at all."""
 DEAFEST = 1e-8
@@ -95,11 +92,6 @@ class Pulse:
         return bool(power @ (self.frequency - mean) ** 2 * (2 * np.pi / mean) ** 2 < share * power.sum())
 
     @property
-    def hollow(self) -> bool:
-        """Whether the faces have a null in the band."""
-        return bool(np.min(self.power / _taper(len(self.power))) < HOLLOW * self.power.max())
-
-    @property
     def noise_to_signal(self) -> float:
         """Noise of the mean of all sensors over the wave, power in a bin, times `NEXT_TO_NULL`: `DEAF` at most, and
         `DEAFEST` at least."""
@@ -110,6 +102,15 @@ class Pulse:
 def half_length(band: Band) -> float:
     """Half length (s) of what is kept round a pulse: a band's narrowest pulse lasts 1/bandwidth."""
     return max(PULSE_HALF, PERIODS / (band.high - band.low))
+
+
+def null_in_band(elements: Elements, sonar: Sonar, direction: Floats) -> bool:
+    """Whether faces hear nothing of a wave from a direction (xyz, sonar frame) at a frequency in the band.
+
+    That is where they are a whole number of wavelengths wide along it. The bins, as few as 7, may lie beside it.
+    """
+    across = np.abs(direction[1:]) * elements.face / sonar.assumed_sound_speed  # s, from edge to edge
+    return bool(np.any(np.floor(across * sonar.band.high) > np.floor(across * sonar.band.low)))
 
 
 def rounding(signals: Signals, peak: float, half: float = PULSE_HALF) -> float:
