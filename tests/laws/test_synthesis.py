@@ -207,6 +207,19 @@ def test_many_echoes_of_one_sign_keep_the_error_of_each(seed: int) -> None:
     assert np.abs(fast - exact).max() < deposit_error(method) * np.abs(exact).max()
 
 
+@pytest.mark.parametrize("distance", [12.0, 14.0, 16.0, 20.0])
+@pytest.mark.parametrize("tolerance", [1e-3, 1.5e-4])
+def test_a_pulse_by_itself_keeps_the_bound(distance: float, tolerance: float) -> None:
+    """Its error at the nodes over the aperture is that of the signal: no other path averages it out."""
+    method = GriddedSynthesis(tolerance=tolerance)
+    places = [(0.0, 0.05 * y, 0.05 * z) for y in range(-4, 4) for z in range(-3, 3)]
+    array = elements(PositionTable(positions=tuple(places), face=0.05))
+    found = arrivals(np.array([0.02]), np.array([[0.88, 0.45, 0.15]]), np.array([distance]), np.ones(1))
+    exact, _ = exact_signals(found, SNAPS, array, SONAR, None, 0.0185, 1024)
+    fast, _ = method.pressure(found, SNAPS, array, SONAR, None, 0.0185, 1024)
+    assert np.abs(fast - exact).max() < deposit_error(method) * np.abs(exact).max()
+
+
 @pytest.mark.parametrize("distance", [20.0, 6.0, 2.5])
 @pytest.mark.parametrize("refracted", [False, True])
 def test_kernel_deposit_is_the_exact_sum(distance: float, refracted: bool) -> None:

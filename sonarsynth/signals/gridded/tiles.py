@@ -24,6 +24,9 @@ MOST_TERMS = 24
 FEW = 4
 """So many paths are each steered to itself."""
 
+ALONE = 0.1
+"""Share of the tolerance that nodes along each axis get of a path by itself: errors of many average out, not its."""
+
 
 @dataclass(frozen=True, eq=False)
 class TileSettings:
@@ -276,7 +279,7 @@ def _alone(paths: Ints, front: Wavefronts, aim: TileSettings) -> Tile:
     reference, size = front.select(paths), _probes(aim.elements, False).size
     gradient = aperture_gradient(reference, _probes(aim.elements, True).points)
     bend = slopes(reference, gradient, aim.weights[0] * aim.highest, aim.highest).max(axis=1) * size
-    x, y, z = (nodes_for(p, aim.weights, aim.tolerance) for p in (_drift(reference, aim) + bend).tolist())
+    x, y, z = (nodes_for(p, aim.weights, ALONE * aim.tolerance) for p in (_drift(reference, aim) + bend).tolist())
     axes = (x, y, z) if 2 * x.nodes * y.nodes * z.nodes < aim.elements.count else None
     cost, modes = _cost_alone(paths.size, 0, aim), np.eye(reference.modes.shape[1])
     return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.zeros(0, int), modes, cost)
