@@ -14,6 +14,7 @@ from sonarsynth.equations.arrays.spherical_wave import envelope_peak, tangent_pl
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.motion import Track
+from sonarsynth.planning.notes.source_notes import OBLIQUE, oblique_error
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.refraction import first_rays
@@ -338,6 +339,13 @@ def test_uniform_water_of_any_speed_changes_nothing():
     there = locate(signals, ROMANIS, source, profile=Profile(np.array([0.0, 9.0]), np.array([1500.0, 1500.0])))
     for name, value in vars(here).items():
         assert np.array_equal(value, getattr(there, name)), name
+
+
+@pytest.mark.parametrize("speed", [1500.0, 1532.0, 1548.0])
+def test_the_note_on_the_speed_of_sound_names_the_error_of_directions(speed):
+    source, method = 100.0 * direction(np.deg2rad(OBLIQUE), 0.0), SensorDelays(on_bottom=False)
+    found = locate(hear_direct(SMALL, source, sound_speed=speed), SMALL, source, method=method)
+    assert abs(np.rad2deg(found.azimuth[0]) - OBLIQUE) == pytest.approx(oblique_error(C / speed), rel=0.02)
 
 
 @pytest.mark.parametrize("off", [(28.0, 12.0), (31.0, 27.0), (40.0, 12.0)])

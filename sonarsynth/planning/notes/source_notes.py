@@ -21,6 +21,8 @@ OFF = 3.0
 OTHER_WATER = 2.0
 """A speed of sound so many standard errors from the water's is taken for another: with what else errs, places are then
 past three predicted errors in more than one of twenty frames."""
+OBLIQUE = 45
+"""Angle (deg) off the axis of a plane array of which the note on the speed of sound says by how much it errs."""
 LOBE = 0.1
 """Energy of a grating lobe over that of the main lobe, up to which nothing is said: no shipped snap has one as loud."""
 PULSE_SAMPLES = 4096
@@ -66,9 +68,16 @@ def assumed_speed_notes(looks: Sequence[SampledScene]) -> list[str]:
             worst = abs(speed - assumed) / max(error, 1e-9)
             lines = [
                 f"the sonar assumes sound at {assumed:g} m/s, good to {error:g} m/s, and the water about it has "
-                f"{speed:.4g} m/s: places are further off than predicted (scene.sonar.assumed_sound_speed)"
+                f"{speed:.4g} m/s: directions {OBLIQUE} deg off the axis of a plane array err by "
+                f"{oblique_error(assumed / speed):.2g} deg, those beyond by more, and places are further off than "
+                "predicted (scene.sonar.assumed_sound_speed)"
             ]
     return lines
+
+
+def oblique_error(ratio: float) -> float:
+    """By how much (deg) directions `OBLIQUE` to the axis of a plane array err; ratio: sound speed assumed over true."""
+    return abs(float(np.rad2deg(np.arcsin(min(ratio * np.sin(np.deg2rad(OBLIQUE)), 1.0)))) - OBLIQUE)
 
 
 def steering_notes(looks: Sequence[SampledScene]) -> list[str]:
