@@ -80,7 +80,10 @@ class Rays:
 
 
 def rays(water: Water, start: Floats, end: Floats, family: Family) -> Rays:
-    """The ray of a family between points (ray, xyz) of the world, z up, without more turning points than one."""
+    """The ray of a family between points (ray, xyz) of the world, z up, without more turning points than one.
+
+    NaN too where all rays cross a level faster than both ends and turn beyond one of them: those are not looked for.
+    """
     away = end[:, :2] - start[:, :2]
     r = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-12)
     first = -start[:, 2]
