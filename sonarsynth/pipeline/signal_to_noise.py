@@ -6,15 +6,13 @@ is taken as channels without errors would have it, before the converter.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Bools, Floats, Ints, direction
-from sonarsynth.equations.arrays.gates import GATE_TAPER
+from sonarsynth.conventions import Bools, Ints, direction
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.labels.estimate_labels import heard_first
@@ -24,7 +22,7 @@ from sonarsynth.pipeline.stored_values import Values, table
 from sonarsynth.pipeline.synthesis import array_signals, known_elements, true_elements
 from sonarsynth.planning import Plan
 from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE
-from sonarsynth.products import Arrivals, EnergyImage, Kind, Signals, Truth
+from sonarsynth.products import Arrivals, EnergyImage, Kind, Signals, Snapshots, Truth
 from sonarsynth.recipe.scene import Frame
 
 MOST: Final = 64
@@ -72,7 +70,6 @@ def snr_values(
     stop = signals.start + signals.pressure.shape[1] / signals.sampling_frequency
     if any(map(len, beams)) and signals.start <= window[0] < window[1] <= stop and elements.gain.any():
         look = _Look(plan, frame, signals, window)
-        heard = {name: look.of_record(parts.pressure[name]) for name in parts.names}
         near = look.near(plan, arrivals)
         scattered = look.alone(plan, frame, arrivals, near & (arrivals.kind == Kind.REVERBERATION))
         for n in targets:
@@ -80,11 +77,11 @@ def snr_values(
                 continue
             own = (arrivals.target == n) & (arrivals.kind != Kind.REVERBERATION)
             only = own.any() and not (near & ~own).any()
-            echo = look.of_record(parts.pressure[PATHS]) if only else look.alone(plan, frame, arrivals, near & own)
+            echo = parts.pressure[PATHS] if only else look.alone(plan, frame, arrivals, near & own)
             weight = max(int(np.count_nonzero(truth.beam_target == n)), 1) / len(beams[n])
             energy["echo"][n] = weight * look.energy(echo, beams[n])
             for name in parts.names:
-                energy[name][n] = weight * look.energy(heard[name], beams[n])
+                energy[name][n] = weight * look.energy(parts.pressure[name], beams[n])
             if scattered is not None:
                 energy["reverberation"][n] += weight * look.energy(scattered, beams[n])
     audible = {name: np.maximum(value, SILENCE) for name, value in energy.items()}
@@ -118,14 +115,6 @@ def _window(plan: Plan, frame: Frame, arrivals: Arrivals, image: EnergyImage | N
     return light + plan.windows.echo_start, light + plan.windows.echo_stop
 
 
-@dataclass(frozen=True, eq=False)
-class _Heard:
-    """A part of the sound in a window: what steers beams at it, and the unit of their powers."""
-
-    unit: float
-    steered: Callable[[Floats], npt.NDArray[np.complex64]]
-
-
 class _Look:
     """Into a window of the record of a frame, by delay and sum."""
 
@@ -136,42 +125,26 @@ class _Look:
         self.method = FocusedDelayAndSum(focus=method.focus, shading=getattr(method, "shading", "uniform"))
         beams = self.sonar.beams
         self.grid = direction(beams.azimuth, beams.elevation[:, None]).reshape(-1, 3)
+        self._made: dict[int, tuple[Part, Snapshots]] = {}
 
     def near(self, plan: Plan, arrivals: Arrivals) -> Bools:
         """(path,) whether any of it may be in the window, at any sensor."""
-        early, late = self._ends(plan, arrivals)
-        return np.asarray((late > self.window[0]) & (early < self.window[1]))
-
-    def _ends(self, plan: Plan, arrivals: Arrivals) -> tuple[Floats, Floats]:
-        """From when to when (path,) s paths are heard, at any sensor."""
         spare, supports = self.sensors.aperture / arrivals.sound_speed, plan.windows.supports
-        return arrivals.delay - supports.before - spare, arrivals.delay + supports.after + spare
+        ends = arrivals.delay - supports.before - spare, arrivals.delay + supports.after + spare
+        return np.asarray((ends[1] > self.window[0]) & (ends[0] < self.window[1]))
 
-    def of_record(self, pressure: Part) -> _Heard | None:
-        """Sound (sensor, sample) of the frame's record, in the window."""
-        return None if pressure is None else self._heard(replace(self.signals, pressure=pressure), self.window)
+    def alone(self, plan: Plan, frame: Frame, arrivals: Arrivals, mask: Bools) -> Part:
+        """Pressure of some paths (path,) alone."""
+        return array_signals(plan, frame, arrivals.select(mask), self.sensors).pressure if mask.any() else None
 
-    def alone(self, plan: Plan, frame: Frame, arrivals: Arrivals, mask: Bools) -> _Heard | None:
-        """Some paths (path,) alone, as long as they last in the window; for a pulse at least, so that the band is
-        resolved."""
-        if not mask.any():
-            return None
-        some, rate = arrivals.select(mask), self.signals.sampling_frequency
-        (early, late), (first, last) = self._ends(plan, some), self.window
-        pulse = plan.windows.supports.before + plan.windows.supports.after
-        start = max(min(float(early.min()), last - pulse) - GATE_TAPER, first)
-        stop = min(max(float(late.max()), first + pulse) + GATE_TAPER, last)
-        samples = int((stop - start) * rate)
-        return self._heard(
-            array_signals(plan, frame, some, self.sensors, (start, samples)), (start, start + samples / rate)
-        )
-
-    def _heard(self, signals: Signals, window: tuple[float, float]) -> _Heard:
-        prepared = snapshots_of(signals, self.sonar, *window, lasting=window[1] - window[0])
-        return _Heard(prepared.unit, self.method.steered(prepared, self.elements, self.sonar))
-
-    def energy(self, heard: _Heard | None, beams: Ints) -> float:
-        """Energy in Pa2 s of sound in beams (beam,), added up."""
-        if heard is None:
+    def energy(self, pressure: Part, beams: Ints) -> float:
+        """Energy in Pa2 s of pressure in beams (beam,), added up."""
+        if pressure is None:
             return 0.0
-        return float(heard.unit * np.sum(np.abs(heard.steered(self.grid[beams])).astype(float) ** 2))
+        if id(pressure) not in self._made:
+            heard = replace(self.signals, pressure=pressure)
+            prepared = snapshots_of(heard, self.sonar, *self.window, lasting=self.window[1] - self.window[0])
+            self._made[id(pressure)] = pressure, prepared  # kept, so that no other has its id
+        _, snapshots = self._made[id(pressure)]
+        steered = self.method.steer(snapshots, self.elements, self.sonar, self.grid[beams])
+        return float(snapshots.unit * np.sum(np.abs(steered).astype(float) ** 2))

@@ -52,14 +52,13 @@ def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> Signals:
     return array_signals(plan, frame, arrivals_of(plan, frame, part), part.elements)
 
 
-def array_signals(
-    plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements, part: tuple[float, int] | None = None
-) -> Signals:
-    """What hydrophones hear of arrivals, expanded over all of them; what comes from behind, through the baffle. In the
-    frame's record, or a part of it: from when (s), and how many samples."""
+def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> Signals:
+    """What hydrophones hear of arrivals, expanded over all of them; what comes from behind, through the baffle."""
     method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
-    start, samples = part or (frame_start(plan, frame), plan.windows.samples)
-    return method.signals(behind_baffle(arrivals, sonar), snaps, sensors, sonar, plan.absorption, start, samples)
+    start = frame_start(plan, frame)
+    return method.signals(
+        behind_baffle(arrivals, sonar), snaps, sensors, sonar, plan.absorption, start, plan.windows.samples
+    )
 
 
 def errors_of(plan: Plan, frame: Frame) -> DrawnErrors | None:
