@@ -30,7 +30,7 @@ TAPS, SHAPE = 64, 10.0
 def respond(signals: Signals, drawn: DrawnErrors, sound_speed: float) -> Signals:
     """Signals after gain, phase and delay of each channel; dead ones are silent. Windows are taken for periodic: the
     ends are wrong for as long as the delay."""
-    return _through(signals, drawn, sound_speed, drawn.state != SensorState.DEAD, True, False)
+    return _through(signals, drawn, sound_speed, drawn.state != SensorState.DEAD)
 
 
 def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_speed: float) -> Signals:
@@ -38,19 +38,24 @@ def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_
     if errors.known == "none":
         return signals
     works = (drawn.state == SensorState.WORKING) | (drawn.state == SensorState.NOISY)
-    return _through(signals, drawn, sound_speed, works, errors.known == "all", True)
+    return _through(signals, drawn, sound_speed, works, phases=errors.known == "all", inverse=True)
 
 
 def _through(
-    signals: Signals, drawn: DrawnErrors, sound_speed: float, works: Bools, phases: bool, inverse: bool
+    signals: Signals,
+    drawn: DrawnErrors,
+    sound_speed: float,
+    works: Bools,
+    *,
+    phases: bool = True,
+    inverse: bool = False,
 ) -> Signals:
     """Signals after the response of channels that work (sensor,), or its inverse; without phases, of gains alone."""
     if not (phases and (drawn.phase.any() or drawn.delays(sound_speed).any())):
         gain = works * (1.0 / drawn.gain if inverse else drawn.gain)
         return replace(signals, pressure=signals.pressure * gain[:, None].astype(np.float32))
-    return _filtered(
-        signals, _response(drawn, _length(signals), signals.sampling_frequency, sound_speed, inverse), works
-    )
+    response = _response(drawn, _length(signals), signals.sampling_frequency, sound_speed, inverse)
+    return _filtered(signals, response, works)
 
 
 @lru_cache(maxsize=4)

@@ -175,12 +175,8 @@ def beam_views(bodies: Sequence[tuple[Floats, np.ndarray, Floats, Floats]], beam
     of these.
     """
     cells, shape = cells_of(beams), (beams.elevations, beams.azimuths)
-    count, target, facet = (
-        np.zeros(shape, np.int16),
-        np.full(shape, NO_TARGET, np.int16),
-        np.full(shape, NO_TARGET, np.int32),
-    )
-    nearest = np.full(shape, np.nan)
+    count, nearest = np.zeros(shape, np.int16), np.full(shape, np.nan)
+    target, facet = np.full(shape, NO_TARGET, np.int16), np.full(shape, NO_TARGET, np.int32)
     first, stop = _window(cells, [whole for *_, whole in bodies])
     size = (stop[0] - first[0]) * (stop[1] - first[1])
     covered = np.zeros((size, (DIRECTIONS + 63) // 64), np.uint64)

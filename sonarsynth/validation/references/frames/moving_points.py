@@ -29,9 +29,8 @@ class Mover:
             position, rotation, speed = self._line
             return position + (t if self.moves else 0.0 * t)[:, None] * speed, np.broadcast_to(rotation, (len(t), 3, 3))
         poses = [pose(self.motion, self.instant + float(elapsed)) for elapsed in t]
-        return np.array([p.position for p in poses]).reshape(-1, 3), np.array([p.rotation for p in poses]).reshape(
-            -1, 3, 3
-        )
+        positions, rotations = np.array([p.position for p in poses]), np.array([p.rotation for p in poses])
+        return positions.reshape(-1, 3), rotations.reshape(-1, 3, 3)
 
     def points(self, body: Floats, time: Floats) -> Floats:
         """Points of the body (time, xyz), given in its own frame, in the world, each at its own time (time,)."""
