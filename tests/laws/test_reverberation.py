@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from scipy.fft import irfft
 
+from sonarsynth.environment.boundaries import SeaBottom, Sediment
 from sonarsynth.environment.reverberation import Reverberation
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.reverberation.speckle import SINC
 from sonarsynth.frontiers.signal_knobs import speckle_points
+from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Still
 from sonarsynth.pipeline import render, synthesise, trace_at
 from sonarsynth.pipeline.frame_reverberation import scattered_paths
@@ -28,9 +30,14 @@ from sonarsynth.recipe.tolerance import Accuracy
 from sonarsynth.scattering.boundaries import Lambert, WindySurface
 from sonarsynth.signals.filtered_pulse import pulse_spectrum, snap_gains
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import path_error
-from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
+from sonarsynth.state import Emission, Medium, Receiver
 from sonarsynth.tracing.reverberation.cells import cells_about, scatterers, texture
+from sonarsynth.tracing.reverberation.geometry_of_paths import back_ways, out_ways
+from sonarsynth.tracing.reverberation.geometry_of_paths import scattered_paths as scattering_paths
 from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
+from tests.echoes import BOTTOM_DEPTH, EAST, PROFILE, ROMANIS, WATER
+from tests.echoes import heard as heard_at_rest
 from tests.scenes import remus
 
 SPEED, DEPTH, HEIGHT, MU = 1500.0, 60.0, 8.0, -15.0
@@ -269,3 +276,26 @@ def test_points_that_scatterers_make_say_so_and_those_of_targets_stay(
     assert echo.sizes["point"] > 0
     assert (echo.distance < 0.3).all()
     assert (beside.origin == origin).sum() > 50
+
+
+@pytest.mark.parametrize("source", [(30.0, 4.0, -BOTTOM_DEPTH), (30.0, 4.0, -12.0), (30.0, 4.0, 0.0)])
+@pytest.mark.parametrize("bounces", [0, 1, 2, 3])
+def test_what_lights_a_scatterer_is_what_a_hydrophone_hears_there(source: tuple[float, ...], bounces: int) -> None:
+    """Way by way. Of a snap on the bottom, or at the surface where they cancel, it and its image there are one way and
+    add as pressures, not as energies."""
+    place = np.array([3.0, -2.0, -15.0])
+    water = replace(WATER, bottom=SeaBottom(reflection=Sediment(name="medium sand")))
+    direct = heard_at_rest((), np.array(source), (), array=place, bounces=bounces, water=water)
+    _, same = np.unique(np.round(direct.delay, 12), return_inverse=True)
+    pressure = np.zeros(same.max() + 1, complex)
+    np.add.at(pressure, same, direct.amplitude * np.exp(1j * direct.phase))
+    medium = Medium(water, PROFILE)
+    snap = Emission(np.array(source), 0.0, LogarithmicBubble(), None)
+    receiver = Receiver(Pose(place + [0.0, 5.0, 0.0], EAST), ROMANIS)
+    end = np.array([-place[2]])
+    (back, *_) = back_ways(medium, receiver, end, 0, "volume")
+    out = out_ways(medium, snap, end, bounces, "volume")
+    found = [scattering_paths(place[None], snap, medium, receiver, way, back) for way in out]
+    lit = np.array([float(p.amplitude[0] * p.back[0]) for p in found])
+    lit, known = lit[np.argsort([p.delay[0] for p in found])], np.abs(pressure)
+    assert np.allclose(lit[lit > 1e-12], known[known > 1e-12], rtol=1e-9, atol=0.0)

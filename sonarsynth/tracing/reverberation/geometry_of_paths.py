@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonarsynth.conventions import Floats, depth
-from sonarsynth.environment.boundary_numbers import coefficient
+from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
+from sonarsynth.environment.boundary_numbers import coefficient, delay_std
 from sonarsynth.equations.reverberation.bottom_strength import Angles
 from sonarsynth.sources.sound_source import Emission
 from sonarsynth.state import Medium, Receiver
@@ -71,10 +72,16 @@ def scattered_paths(
     towards = np.column_stack([level, np.broadcast_to(back.climb, r2.shape)]) / r2[:, None]
     sine_in, sine_out = np.abs(out.climb) / r1, np.abs(back.climb) / r2
     forward = -(away[:, 0] * level[:, 0] + away[:, 1] * level[:, 1]) / (over * beside)
-    factor = np.ones(len(position))
+    factor: Floats = np.ones(len(position))
+    mirrored = factor
     if emission.directivity is not None:
         leaving = np.column_stack([position[:, :2] - begin[:2], np.broadcast_to(out.climb, r1.shape)]) / r1[:, None]
-        factor = factor * emission.directivity(leaving)
+        factor = emission.directivity(leaving)
+        mirrored = emission.directivity(leaving * (1.0, 1.0, -1.0)) if out.own else factor
+    if out.own:
+        factor = _with_own_image(medium, out.own, sine_in, receiver.centre, factor, mirrored)
+    if back.own:
+        factor = factor * _with_own_image(medium, back.own, sine_out, receiver.centre, 1.0, 1.0)
     if receiver.sonar.baffle:
         factor = factor * np.where((towards @ receiver.pose.rotation)[:, 0] < 0.0, receiver.sonar.behind, 1.0)
     factor = (
@@ -101,3 +108,16 @@ def _reflected(medium: Medium, path: UnfoldedPaths, sine: Floats, frequency: flo
     grazing, environment = np.arcsin(np.minimum(sine, 1.0)), medium.environment
     top = np.abs(coefficient(environment.surface, grazing, frequency)) ** path.surface if path.surface else 1.0
     return top * (np.abs(coefficient(environment.bottom, grazing, frequency)) ** path.bottom if path.bottom else 1.0)
+
+
+def _with_own_image(
+    medium: Medium, own: str, sine: Floats, frequency: float, sent: Floats | float, mirrored: Floats | float
+) -> Floats:
+    """Root of the energy (point,) that a source on a boundary and its image at the same place send: sent and V times
+    what it sends the mirrored way, in phase as far as roughness leaves the reflection so."""
+    boundary: SeaSurface | SeaBottom = getattr(medium.environment, own)
+    grazing = np.arcsin(np.minimum(sine, 1.0))
+    image = coefficient(boundary, grazing, frequency) * mirrored
+    blur = delay_std(boundary, grazing, medium.profile.at(0.0 if own == "surface" else medium.depth))
+    coherent = np.exp(-0.5 * (2.0 * np.pi * frequency * blur) ** 2)
+    return np.sqrt(np.maximum(sent**2 + np.abs(image) ** 2 + 2.0 * sent * image.real * coherent, 0.0))

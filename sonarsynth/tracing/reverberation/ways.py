@@ -17,6 +17,7 @@ from sonarsynth.propagation.images import images
 class UnfoldedPaths:
     """From a point to points (point,), unfolded; a single value stands for all of them."""
 
+    own: str  # "surface" or "bottom": the point lies on it, and its image there goes this way as well; else ""
     surface: int  # reflections
     bottom: int
     climb: Floats  # (point,) m: height that the ray gains, up positive, as it starts
@@ -26,6 +27,10 @@ class UnfoldedPaths:
     def bounces(self) -> int:
         """Reflections."""
         return self.surface + self.bottom
+
+
+TOUCHING = 1e-9
+"""m: a point so near to a boundary and its image there are one."""
 
 
 @lru_cache(maxsize=16)
@@ -38,8 +43,11 @@ def ways(
 ) -> list[UnfoldedPaths]:
     """All ways from depth start (m) to depths end (point,) by at most so many reflections, the straight one first.
 
-    To the bottom those that arrive from above, to the surface from below: a reflection there is none before it.
+    To the bottom those that arrive from above, to the surface from below: a reflection there is none before it. A point
+    on a boundary and its image there are one: its ways are those that leave the boundary, for both of them as far as
+    one reflection more is allowed.
     """
+    own = "surface" if start < TOUCHING else "bottom" if bottom_depth - start < TOUCHING else ""
     layers, begin, paths = _water(profile, bottom_depth), np.full(end.shape, start), []
     top, low, bottom = np.minimum(begin, end), np.maximum(begin, end), np.full(end.shape, bottom_depth)
 
@@ -53,10 +61,14 @@ def ways(
     above, between, below = mean(np.zeros(end.shape), top), mean(top, low), mean(low, bottom)
     for image in images(begin, end, bottom_depth, bounces):
         falls = image.climb * image.turns < 0.0
+        outwards = image.climb > 0.0 if own == "surface" else image.climb < 0.0
+        if own and outwards.any():
+            continue
+        both = own if image.surface + image.bottom < bounces else ""
         if (owner == "bottom" and not falls.all()) or (owner == "surface" and (falls | (image.climb == 0.0)).any()):
             continue
         crossed = image.above * above + image.between * between + image.below * below
         all_of_it = image.above + image.between + image.below
         slowness = np.where(all_of_it > 1e-9, crossed / np.maximum(all_of_it, 1e-9), between)
-        paths.append(UnfoldedPaths(image.surface, image.bottom, image.climb, slowness))
+        paths.append(UnfoldedPaths(both, image.surface, image.bottom, image.climb, slowness))
     return paths
