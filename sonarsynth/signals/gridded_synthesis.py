@@ -144,6 +144,6 @@ class GriddedSynthesis(Method):
         method = (self.width, self.oversampling, self.precision, self.tolerance)
         for span in plan.stretches:
             paths, bins = bins_of(span, front.select(_apart(span.paths)), sonar, absorption, self.tolerance)
-            origin, highest = start + span.first / fs, stop_frequency(sonar.antialias)
-            add_segment(out, span, paths, elements, bins, origin=origin, highest=highest, method=method)
+            origin, stop = start + span.first / fs, stop_frequency(sonar.antialias)
+            add_segment(out, span, paths, elements, bins, origin=origin, stop=stop, method=method)
         return out, plan.outside

@@ -11,7 +11,7 @@ import pytest
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind
-from sonarsynth.receiver import BandPass, Elements, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import Band, BandPass, Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import fir
@@ -205,6 +205,19 @@ def test_many_echoes_of_one_sign_keep_the_error_of_each(seed: int) -> None:
     exact, _ = exact_signals(found, SNAPS, array, sonar, None, 0.0185, 1024)
     fast, _ = method.pressure(found, SNAPS, array, sonar, None, 0.0185, 1024)
     assert np.abs(fast - exact).max() < deposit_error(method) * np.abs(exact).max()
+
+
+@pytest.mark.parametrize(("low", "width", "transition"), [(1e3, 100.0, 5e3), (5e3, 200.0, 1e3), (60e3, 500.0, 5e3)])
+@pytest.mark.parametrize("count", [1, 100])
+def test_what_a_narrow_filter_leaks_is_heard(low: float, width: float, transition: float, count: int) -> None:
+    """A thousandth of the sound is beyond the stop edge: the bound holds it, and many hydrophones hear it alike."""
+    band, chosen = Band(low=low, high=low + width), BandPass(low=low, high=low + width, transition=transition)
+    sonar, method = Sonar(band=band, filter=chosen), GriddedSynthesis(width=8, tolerance=2e-5)
+    found = target_at(20.0, count, 3, direct=False)
+    start, samples = window(found, sonar, FACES)
+    exact, _ = exact_signals(found, SNAPS, some_of(FACES, 127), sonar, absorption, start, samples)
+    fast, _ = method.pressure(found, SNAPS, FACES, sonar, absorption, start, samples)
+    assert error(fast[::127], exact) < deposit_error(method)
 
 
 @pytest.mark.parametrize("distance", [12.0, 14.0, 16.0, 20.0])

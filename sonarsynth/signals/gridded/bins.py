@@ -28,6 +28,8 @@ SHAPES = 0.02
 """Share of the tolerance that the shapes of the pulses get, beside their terms."""
 
 
+LEAK = 0.1
+"""Share of the tolerance that the spectrum may hold, by modulus, above the frequency up to which errors are kept."""
 MOST_DECAY = 2.0
 """Range of absorption (Np) that is among the modes of pulses; a wider one keeps terms."""
 
@@ -62,6 +64,14 @@ def audible(spectrum: Complexes, tolerance: float) -> slice:
     mass = np.cumsum(np.abs(spectrum))
     ends = np.searchsorted(mass, np.array([0.03 * tolerance, 1.0 - 0.03 * tolerance]) * mass[-1])
     return slice(int(ends[0]), min(int(ends[1]) + 1, spectrum.size))
+
+
+def highest_heard(bins: Bins, stop: float, tolerance: float, oversampling: float) -> float:
+    """The frequency (Hz) up to which errors are to be kept: where the filter stops, or beyond, where it is narrow and
+    what it leaks counts; and the grid is to hold all bins."""
+    mass = np.cumsum(np.abs(bins.spectrum))
+    leaks = int(np.searchsorted(mass, (1.0 - LEAK * tolerance) * mass[-1]))
+    return max(stop, float(bins.frequency[min(leaks, mass.size - 1)]), float(bins.frequency[-1]) / oversampling)
 
 
 def _coherent_gain(front: ArrayPaths) -> float:

@@ -13,7 +13,7 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.noise import filters
 from sonarsynth.receiver import Elements
 from sonarsynth.signals.array_paths import NEPER, Wavefronts, delay_and_gain, steered_spread, tilt
-from sonarsynth.signals.gridded.bins import Bins
+from sonarsynth.signals.gridded.bins import Bins, highest_heard
 from sonarsynth.signals.gridded.interpolation import to_sensors
 from sonarsynth.signals.gridded.low_rank import face_pairs, spectral_quantiles, term_products
 from sonarsynth.signals.gridded.spectral_factors import (
@@ -42,21 +42,23 @@ def add_segment(
     bins: Bins,
     *,
     origin: float,
-    highest: float,
+    stop: float,
     method: tuple[int, float, str, float],
 ) -> None:
     """Add to out (sensor, sample) the pressure of paths in a stretch, which begins at `origin` (s).
 
-    highest (Hz) is the stop edge of the filter; method is width, oversampling, precision and tolerance of
+    stop (Hz) is the stop edge of the filter; method is width, oversampling, precision and tolerance of
     `GriddedSynthesis`.
     """
     samples = segment.samples
     width, oversampling, dtype, tolerance = method
+    highest = highest_heard(bins, stop, tolerance, oversampling)
     bins, grid = _on_grid(bins, highest, width, oversampling, dtype)
+    weights = spectral_quantiles(bins.frequency, bins.spectrum, highest)
     aim = TileSettings(
         elements=elements,
         highest=highest,
-        weights=spectral_quantiles(bins.frequency, bins.spectrum, highest),
+        weights=weights if highest == stop else (*weights[:-1], 1.0),  # what leaks is little, but at all frequencies
         steepest=float(np.abs(bins.relative[bins.frequency <= highest]).max(initial=0.0)),
         fading=float(np.abs(bins.relative) @ np.abs(bins.spectrum) / np.abs(bins.spectrum).sum()),
         tolerance=tolerance,
@@ -66,7 +68,8 @@ def add_segment(
         lasting=(segment.before + segment.after) * samples * bins.step,
     )
     wave = kernel(-8 * (-width // 8), samples * bins.step / highest, 2 * samples, dtype)  # as wide as its lanes
-    stage = Stage(aim, bins, origin, segment, grid, oversampling, wave, dtype)
+    tails = highest > stop or tolerance <= 10.0 * filters.SUPPORT_TOLERANCE
+    stage = Stage(aim, bins, origin, segment, grid, oversampling, wave, dtype, tails)
     front = front.without_faint_shadows(0.1 * tolerance, elements.count)
     for tile in tiles(front, aim) if front.count else ():
         paths, most = front.select(tile.paths), max(1, LARGEST // (len(tile.nodes(elements)) * samples))
@@ -105,8 +108,7 @@ def _lasting(tile: Tile, paths: Wavefronts, stage: Stage) -> tuple[Ints, int]:
     segment, rate = stage.segment, stage.segment.samples * stage.bins.step
     centre, spread = paths.delay - stage.origin, 0.0 if tile.alone else steered_spread(paths, slice(None))
     early, wide = (centre, 0.0) if tile.alone else (centre.min(keepdims=True), float(np.ptp(centre)))
-    short = stage.aim.tolerance > 10.0 * filters.SUPPORT_TOLERANCE  # without tails that absorption leaves
-    spare = GUARD if short else segment.samples
+    spare = segment.samples if stage.tails else GUARD
     begin = np.maximum(((early - segment.before - spread) * rate).astype(int) - spare, 0)
     length = int((segment.before + segment.after + 2.0 * spread + wide) * rate) + 2 * spare + 2
     return begin, min(length, segment.samples)

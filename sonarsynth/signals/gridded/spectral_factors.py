@@ -76,6 +76,7 @@ class Stage(NamedTuple):
     oversampling: float  # of that grid, at least
     wave: Kernel  # of time at twice the sampling rate, that hydrophones hear
     dtype: str
+    tails: bool  # what absorption leaves, and leaks cut at half the sampling frequency, lasts beyond the pulses
 
 
 def responses(weight: Floats, stage: Stage) -> npt.NDArray[Any]:
