@@ -23,7 +23,7 @@ class Band:
 
     low: float  # Hz
     high: float  # Hz
-    energy: Floats  # (snap, slice) of the filtered snap at 1 m, in any unit, in equal slices of the band
+    energy: Floats  # (snap, slice) Pa2 s of the filtered snap at 1 m, at positive frequencies, in equal slices
     relative: Floats  # (slice,) absorption in the middle of each over that at the centre of the band, less one
 
     @property

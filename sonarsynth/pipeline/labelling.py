@@ -14,6 +14,7 @@ from sonarsynth.planning import Plan
 from sonarsynth.products import Arrivals, LinkBudget, PointCloud, PointLabels, SourceEstimates
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.direct_sum import relative_absorption
+from sonarsynth.signals.filtered_pulse import snap_gains
 from sonarsynth.signals.isolated_paths import energy_in_slices, measured_levels
 from sonarsynth.state import Emission
 
@@ -32,7 +33,8 @@ def expansion_error(plan: Plan, arrivals: Arrivals) -> float:
 def band_of(plan: Plan, snaps: tuple[Emission, ...]) -> Band:
     """The band that levels are taken in."""
     sonar = plan.scene.sonar
-    energy = np.array([energy_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)
+    alike = np.array([energy_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)
+    energy = alike * snap_gains(snaps)[:, None] ** 2
     band = Band(sonar.band.low, sonar.band.high, energy, np.zeros(SLICES))
     return replace(band, relative=relative_absorption(plan.absorption, band.frequency, sonar.band.centre))
 

@@ -65,7 +65,8 @@ def several(**more: Any) -> Recipe:
         Target(name="ball", shape=Sphere(radius=0.3, edge=0.1), motion=still[0]),
         Target(name="crate", shape=Box(size=(0.8, 0.5, 0.4), edge=0.1), motion=still[1]),
     )
-    shrimp = (SnappingShrimp(position=(9.0, 5.0)), SnappingShrimp(position=(10.0, -6.0), snap_times=(3e-3,)))
+    loud = SnappingShrimp(position=(9.0, 5.0), source_level=200.0)
+    shrimp = (loud, SnappingShrimp(position=(10.0, -6.0), snap_times=(3e-3,)))
     scene = base.scene
     physics = replace(scene.physics, tracing=AutoTracing(bounces=1))
     world = replace(scene.world, targets=targets, sources=shrimp)
@@ -147,6 +148,22 @@ def test_what_each_group_brings_is_what_its_signals_alone_have_there(crowd: Made
     near = exact > 0.01 * exact.max(axis=1, keepdims=True)
     apart = 10.0 * np.log10(found.power[near] / exact[near])
     assert np.median(np.abs(apart - np.median(apart))) < 1.0
+
+
+def test_a_beam_holds_the_energy_of_the_signal_that_a_path_brings(crowd: Made) -> None:
+    """Of each snap as loud as it is: its direct pulse alone, at one hydrophone, whatever the level of the other."""
+    one, sonar = elements_of(PositionTable(positions=((0.0, 0.0, 0.0),))), crowd.plan.scene.sonar
+    for row in np.flatnonzero(crowd.arrivals.direct & (crowd.arrivals.surface + crowd.arrivals.bottom == 0)):
+        alone, snaps = crowd.arrivals.select(np.array([row])), crowd.frame.moment.snaps
+        start, fs = alone.delay[0] - 0.02, sonar.sampling_frequency
+        signals = GriddedSynthesis().signals(alone, snaps, one, sonar, crowd.plan.absorption, start, 8192)
+        f, wave = np.fft.rfftfreq(8192, 1.0 / fs), np.fft.rfft(signals.pressure[0].astype(float)) / fs
+        energy = 2.0 * np.sum(np.abs(wave[(f > sonar.band.low) & (f < sonar.band.high)]) ** 2) * fs / 8192
+        case = crowd._replace(arrivals=alone, listening=replace(crowd.listening, elements=one))
+        found = attribution(
+            alone, case.band, case.listening, alone.direction, alone.delay - case.listening.clock, np.full(1, np.inf)
+        )
+        assert found.energy.sum() == pytest.approx(energy, rel=0.02)
 
 
 def test_a_table_of_the_pattern_says_what_the_sensors_say(crowd: Made) -> None:
