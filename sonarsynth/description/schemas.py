@@ -146,6 +146,12 @@ class _Schema(GenerateJsonSchema):
     def encode_default(self, dft: Any) -> Any:
         return super().encode_default(dft.item() if isinstance(dft, np.generic) else dft)
 
+    def default_schema(self, schema: Any) -> dict[str, Any]:
+        result, factory = super().default_schema(schema), schema.get("default_factory")
+        if factory is None:
+            return result
+        return result | {"default": {"kind": factory.kind} if hasattr(factory, "kind") else {}}
+
     def dataclass_schema(self, schema: Any) -> dict[str, Any]:
         result = super().dataclass_schema(schema)
         for cls in schema["cls"].__mro__:

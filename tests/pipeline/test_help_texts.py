@@ -30,6 +30,21 @@ def test_help_gives_parameters_with_bounds_units_and_defaults() -> None:
     assert "Parameters\n----------" not in DESCRIBED["Thermocline"]["description"]
 
 
+def test_a_default_is_the_one_that_a_field_has() -> None:
+    """None only where nothing is the default, and of a method its kind."""
+    compared = 0
+    for name in set(DESCRIBED) & set(ss.__all__):
+        for field, info in getattr(getattr(ss, name), "__pydantic_fields__", {}).items():
+            if not info.is_required():
+                default = info.get_default(call_default_factory=True)
+                told = DESCRIBED[name]["properties"][field].get("default")
+                assert (told is None) == (default is None), (name, field)
+                if hasattr(default, "kind"):
+                    assert told["kind"] == default.kind
+                    compared += 1
+    assert compared > 10
+
+
 FUNCTIONS = [name for name in ss.__all__ if inspect.isfunction(getattr(ss, name))]
 
 

@@ -53,5 +53,5 @@ def linked(word: str, others: dict[str, Any]) -> str:
 
 
 def escaped(text: str) -> str:
-    """Text of a docstring as Markdown: names in angle brackets are no tags."""
-    return "\n".join(cell(line) if line.strip() else "" for line in text.splitlines())
+    """Text of a docstring as Markdown: names in angle brackets are no tags, what is indented is a table of its own."""
+    return "\n".join(line if line.startswith("    ") else cell(line) for line in text.splitlines())
