@@ -73,7 +73,8 @@ def mesh_report(mesh: Mesh, wavelength: float, allowed: float = FIVE_PERCENT) ->
 
 def _said(length: float, digits: int = 3) -> str:
     """A length (m) as people say it."""
-    return f"{1e3 * length:.{digits}g} mm" if length < 0.995 else f"{length:.{digits}g} m"
+    number, unit = (1e3 * length, "mm") if length < 0.995 else (length, "m")
+    return f"{np.format_float_positional(number, digits, fractional=False, trim='-')} {unit}"
 
 
 def checked(mesh: Mesh, wavelength: float, allowed: float = FIVE_PERCENT) -> Mesh:

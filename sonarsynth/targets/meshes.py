@@ -137,4 +137,4 @@ def _unit(shape: MeshFile, vertices: Floats, faces: Ints) -> tuple[str, tuple[st
         )
     if not LARGEST_IN_METRES < size <= 1e3 * LARGEST_IN_METRES:
         return "m", ()
-    return "mm", (f"taken to be in mm, {1e-3 * size:.3g} m across: in m it would be {size:.3g}; give the `unit`",)
+    return "mm", (f"taken to be in mm, {1e-3 * size:.3g} m across: in m it would be {size:.0f}; give the `unit`",)

@@ -118,10 +118,20 @@ def test_the_filter_is_drawn_with_half_its_response_at_the_cutoff() -> None:
     frequency, decibels = response.lines[0].get_data()
     assert np.interp(110.0, frequency, decibels) == pytest.approx(-6.02, abs=0.05)
     assert waveform.lines[0].get_ydata().max() == pytest.approx(1e-3 * 10 ** (190 / 20) * 1e-6, rel=0.02)
+    assert waveform.get_ylabel() == "pressure at 1 m (kPa)"
     assert waveform.get_xlim()[0] >= -110.0 and waveform.get_xlim()[1] <= 110.0  # us
     assert "snap: peak 190.0 dB" in waveform.get_legend().get_texts()[0].get_text()
     both = [line.get_ydata() for line in levels.lines]
     assert np.allclose(both[1] - both[0], decibels, atol=1e-6)
+
+
+@pytest.mark.parametrize(("level", "peak", "unit"), [(179.0, 891.0, "Pa"), (121.0, 1.122, "Pa"), (61.0, 1.122, "mPa")])
+def test_a_snap_is_drawn_in_a_unit_of_its_size(level: float, peak: float, unit: str) -> None:
+    """1 Pa is 120 dB re 1 uPa."""
+    b = LogarithmicBubble()
+    (waveform, *_) = snap_figure(lambda highest: b.pulse(0.0, highest), Fir(0.0, 110e3, 10e3, 80.0), level).axes
+    assert waveform.lines[0].get_ydata().max() == pytest.approx(peak, rel=0.02)
+    assert waveform.get_ylabel() == f"pressure at 1 m ({unit})"
 
 
 def test_width_and_bandwidth_of_a_tone_in_a_gaussian_are_those_of_the_closed_form() -> None:

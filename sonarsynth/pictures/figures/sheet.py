@@ -18,7 +18,19 @@ from sonarsynth.pictures.figures.frame_figure import (
     set_outlines,
 )
 from sonarsynth.pictures.figures.ghost_rings import GhostMarks, box_of, legend, place
-from sonarsynth.pictures.figures.style import ERROR_MAP, INK, MARKS, OUTLINES, PALE, figure, grid, label, placed, settle
+from sonarsynth.pictures.figures.style import (
+    ERROR_MAP,
+    INK,
+    MARKS,
+    OUTLINES,
+    PALE,
+    figure,
+    grid,
+    label,
+    placed,
+    pressure_unit,
+    settle,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -151,7 +163,7 @@ def draw_cloud(axes: Axes, onto: Figure, view: View, errors: Errors, space: Wind
 def draw_beams(panels: list[Axes], beams: list[Beam]) -> None:
     """Pressure in the beams on one scale (figure 18 of the thesis)."""
     peak = max(float(np.abs(beam.pressure).max()) for beam in beams)
-    factor, unit = (1.0, "Pa") if peak >= 1.0 else (1e3, "mPa") if peak >= 1e-3 else (1e6, "uPa")
+    factor, unit = pressure_unit(peak)
     first, last = _span(beams)
     for axes, beam, number, colour in zip(panels, beams, "123", MARKS, strict=False):
         grid(axes)

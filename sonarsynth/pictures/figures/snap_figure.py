@@ -10,7 +10,7 @@ from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
 from sonarsynth.equations.bubble.pulses import Pulse, filtered, gain_for_level, levels, reach, spectrum
 from sonarsynth.equations.noise.filters import Fir, response
 from sonarsynth.pictures.figures.snap_comparison import SnapComparison, draw_comparison
-from sonarsynth.pictures.figures.style import INK, MARKS, figure, grid, label
+from sonarsynth.pictures.figures.style import INK, MARKS, figure, grid, label, pressure_unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -89,14 +89,15 @@ def _energy_level(density: np.ndarray) -> Floats:
 
 def _waveforms(axes: Axes, time: Floats, waves: dict[str, Floats], decibels: dict[str, Floats]) -> None:
     grid(axes)
+    factor, unit = pressure_unit(max(float(np.abs(wave).max()) for wave in waves.values()))
     for (name, wave), colour in zip(waves.items(), (INK, MARKS[0]), strict=True):
         (peak, both), width = decibels[name], half_width(time, wave)
         text = f"{name}: peak {peak:.1f} dB, peak to peak {both:.1f} dB,\n{1e6 * width:.3g} us wide at half the peak"
-        axes.plot(1e6 * time, 1e-3 * wave, color=colour, linewidth=1.0, label=text)
+        axes.plot(1e6 * time, factor * wave, color=colour, linewidth=1.0, label=text)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.4 * (high - low))  # room for the legend
     axes.legend(fontsize=7.5, frameon=False, loc="upper left")
-    label(axes, "time after the collapse (us)", "pressure at 1 m (kPa)", "waveform, dB re 1 uPa at 1 m")
+    label(axes, "time after the collapse (us)", f"pressure at 1 m ({unit})", "waveform, dB re 1 uPa at 1 m")
 
 
 def _levels(axes: Axes, frequency: Floats, densities: dict[str, Floats]) -> None:

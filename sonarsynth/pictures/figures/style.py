@@ -46,6 +46,13 @@ def decibels(energy: npt.ArrayLike, reference: float) -> Floats:
         return 10.0 * np.log10(np.asarray(energy, float) / reference)
 
 
+def pressure_unit(peak: float) -> tuple[float, str]:
+    """Factor on pressures (Pa) up to `peak`, and the unit in which they are drawn."""
+    units = (1e3, "kPa"), (1.0, "Pa"), (1e-3, "mPa")
+    size, unit = next((one for one in units if peak >= one[0]), (1e-6, "uPa"))
+    return 1.0 / size, unit
+
+
 def compass(bearing: float) -> str:
     """A horizontal direction (rad, from x to y: east to north) as people say it: "NE (045 deg)", from north by east."""
     degrees = float(np.rad2deg(0.5 * np.pi - bearing)) % 360.0

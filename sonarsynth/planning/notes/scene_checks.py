@@ -110,7 +110,7 @@ def _check_plain(scene: Scene, number: int) -> None:
     body = PlacedTarget(target.name, plain, pose(target.motion, scene.trajectory.time(0)), np.zeros(3))
     if not _box_in_water(body, bottom_depth):
         size = float(np.ptp(plain.box, axis=0).max())
-        name = f"target '{body.name}', {size:.3g} m long {target.shape.read_as},"
+        name = f"target '{body.name}', {f'{size:.3g} m long {target.shape.read_as}'.strip()},"
         _check_depth(
             ("scene", "world", "targets", number, "motion"), name, _places(body), bottom_depth, "the first frame"
         )
