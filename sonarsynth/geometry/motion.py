@@ -212,6 +212,11 @@ class Track:
         """Whether it stays where it is."""
         return (self.motion is None and not self.velocity.any()) or isinstance(self.motion, Still)
 
+    @property
+    def straight(self) -> bool:
+        """Whether it keeps its velocity and does not turn, at any time."""
+        return self.motion is None or isinstance(self.motion, Still | Line | ConstantVelocity)
+
     def part(self, offset: Floats) -> Track:
         """The track of a point of it, offset (xyz) m in its own frame."""
         turned = self.pose.turn_to_world(offset)
@@ -233,7 +238,7 @@ class Track:
 
     def positions(self, seconds: Floats) -> Floats:
         """Where it is (..., xyz) m, world, so many seconds (...) s after."""
-        if self.motion is None or isinstance(self.motion, Still | Line | ConstantVelocity):
+        if self.straight:
             return np.asarray(self.pose.position + seconds[..., None] * self.velocity)
         places = [self.later(late).pose.position for late in seconds.ravel().tolist()]
         return np.array(places).reshape(*seconds.shape, 3)

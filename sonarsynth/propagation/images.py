@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints, depth
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +36,22 @@ def images(start: Floats, end: Floats, bottom_depth: float, bounces: int) -> lis
             climb = start - end if n == 0 else (-1.0 if down else 1.0) * sum(climbs)
             paths.append(Image(surface, below, np.asarray(climb, float), 1.0 - 2.0 * (n % 2), *climbs))
     return paths
+
+
+def lengths(start: Floats, end: Floats, bottom_depth: float, bounces: int) -> Floats:
+    """Lengths (family, pair) m of all of `images` between points (pair, xyz) of the world."""
+    level = np.linalg.norm((end - start)[:, :2], axis=1)
+    ways = images(depth(start), depth(end), bottom_depth, bounces)
+    reflected = [np.hypot(level, way.climb) for way in ways[1:]]
+    return np.stack([np.linalg.norm(end - start, axis=1), *reflected])
+
+
+def family(surface: Ints, bottom: Ints, falls: Bools) -> Ints:
+    """Which of `images` rays (ray,) are, by their reflections; falls: whether each that has as many from the surface as
+    from the bottom starts, and arrives, downwards."""
+    bounces = surface + bottom
+    down = np.where(bounces % 2 == 1, bottom > surface, falls)
+    return np.asarray(np.maximum(2 * bounces - down, 0))
 
 
 def order(time: Floats) -> Ints:

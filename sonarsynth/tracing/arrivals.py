@@ -57,17 +57,17 @@ def trace_each(
     else:
         found = [[] for _ in own]
         begun = set[int]()
-        for group in occasions(context, moving):
-            moved = replace(receiver, pose=group.meeting.sonar.pose)
-            lights = tuple(snaps[index] for index in group.snaps)
-            met = facet_paths(replace(context, bodies=group.bodies, receiver=moved), propagation, group.owners, lights)
-            array = replace(met, meeting=group.meeting)
+        for group in occasions(context, moving, propagation.bounces):
+            moved = replace(context, bodies=group.bodies, receiver=replace(receiver, pose=group.meeting.sonar.pose))
+            lights = tuple(snaps[index] for index in group.snaps) if group.direct else None
+            array = facet_paths(moved, propagation.reflected(group.bounces), group.owners, lights)
+            array = replace(array, propagation=propagation, meeting=group.meeting, ways=group.ways)
             for of, own_blocks in zip(own, found, strict=True):
                 together = [index for index in group.snaps if index in of]
-                new = [index for index in together if index not in begun]
+                new = [index for index in together if group.direct and index not in begun]
                 own_blocks.extend(_direct(_hearing(array, snaps[index], moving), index) for index in new)
                 own_blocks.extend(_echoes(array, together))
-            begun |= set(group.snaps)
+            begun |= set(group.snaps if group.direct else ())
     speed = receiver.speed(context.medium)
     every = [join(blocks or [no_arrivals(array.legs)], speed, receiver.centre) for blocks in found]
     return [of.but(snap=of.snap - first) for of, first in zip(every, last, strict=False)]

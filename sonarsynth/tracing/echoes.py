@@ -14,6 +14,7 @@ from sonarsynth.equations.kernels.unit_vectors import to_moved_images
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind
+from sonarsynth.propagation.images import family
 from sonarsynth.propagation.reflections import reflections
 from sonarsynth.scattering import Component
 from sonarsynth.scattering.facet_geometry import PulseResponse
@@ -235,6 +236,8 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
     out = TransmitPaths.of(paths, bounced, row[paths.pair], snap, float(medium.profile.at(depth(snap.position))))
     out = out.select(picked(out.spreading != 0.0)).merged()
+    if array.ways is not None:
+        out = out.select(np.isin(family(out.surface, out.bottom, out.arrival[:, 2] < 0.0), array.ways))
     own = facets.clear_of_own(bodies, out.facet, -out.arrival)
     out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet), own)))
     for number, before in overlapping(bodies):

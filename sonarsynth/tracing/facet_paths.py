@@ -49,6 +49,7 @@ class FacetPaths:
     first: int = 0  # of the legs, in the wavefronts
     owners: tuple[int, ...] | None = None  # of the facets; None: all
     meeting: Meeting | None = None  # when bodies and array are where they are here; None: nothing moves
+    ways: tuple[int, ...] | None = None  # families, as of `images.family`, by which snaps light them; None: all
 
     @property
     def fronts(self) -> AperturePaths:

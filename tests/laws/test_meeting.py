@@ -9,13 +9,19 @@ import pytest
 from scipy.optimize import brentq
 
 from sonarsynth.description import FieldError
+from sonarsynth.geometry.hovering import Hover
 from sonarsynth.geometry.motion import Circle, ConstantVelocity, Still, Track, Waypoint, Waypoints, pose, spin, velocity
 from sonarsynth.labels import label
+from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.planning import Choices, plan
+from sonarsynth.planning.measured.sampled_arrivals import context_of
 from sonarsynth.planning.notes.scene_checks import check_frame
-from sonarsynth.propagation import Refracted, Straight
-from sonarsynth.receiver import BeamGrid, Sonar
+from sonarsynth.propagation import AutoTracing, Refracted, Straight
+from sonarsynth.receiver import BeamGrid, PlanarLattice, Sonar
+from sonarsynth.recipe import Recipe
+from sonarsynth.recipe.scene import Physics
 from sonarsynth.state import FrameContext, Medium, Receiver
+from sonarsynth.tracing.arrivals import trace
 from tests.laws.test_traced_families import BOTTOM_DEPTH, ONE, RIGID, SONAR, THERMOCLINE, UNIFORM, C, ball
 from tests.laws.test_traced_families import snap as snap_at
 from tests.scenes import remus
@@ -115,8 +121,36 @@ def test_a_target_that_sound_would_meet_out_of_the_water_is_refused() -> None:
             check_frame(scene, frame)
 
 
-def test_a_plan_bounds_what_turning_leaves_out() -> None:
-    """By less than a phase that can be heard for a vehicle that turns at 20 degrees a second."""
-    turning = Circle(centre=(20.0, 0.0, -4.5), radius=4.0, speed=1.4)
-    (row,) = (o for o in plan(moved(turning), ("signals",), Choices()).left_out if "motion" in o.what)
-    assert 0.0 < float(row.bound.split(" rad")[0]) < 0.02
+def reflected(motion):
+    """A vehicle on a motion in 60 m of water, heard by four hydrophones with up to two reflections."""
+    scene = moved(motion).scene
+    environment = replace(scene.world.environment, depth=60.0)
+    (shrimp,) = scene.world.sources
+    world = replace(scene.world, environment=environment, sources=(replace(shrimp, position=(14.0, -5.0, -8.0)),))
+    sonar = replace(scene.sonar, array=PlanarLattice(columns=2, rows=2, pitch=0.01))
+    return Recipe(scene=replace(scene, world=world, sonar=sonar, physics=Physics(tracing=AutoTracing(bounces=2))))
+
+
+@pytest.mark.parametrize("speed", [0.6, 1.4])
+def test_a_plan_says_by_how_much_signals_err_where_bodies_turn(speed: float) -> None:
+    """Beside each family traced for itself: no less than that, and no more than ten times as much."""
+    recipe = reflected(Circle(centre=(20.0, 0.0, -4.5), radius=4.0, speed=speed))
+    made = plan(recipe, ("signals",), Choices(negligible=1e-11))
+    frame = made.recipe.frame(0)[1]
+    context, heard = context_of(made, frame), []
+    for shared in (context.tolerances.shared, 0.0):
+        apart = replace(context, tolerances=replace(context.tolerances, shared=shared))
+        arrivals = trace(apart, made.propagation)
+        heard.append(frame_signals(made, frame, arrivals.select(~arrivals.direct)).pressure)
+    (row,) = (o for o in made.left_out if "motion" in o.what)
+    error, said = np.abs(heard[0] - heard[1]).max() / np.abs(heard[1]).max(), float(row.bound.split(" of the")[0])
+    assert 0.0 < error < said < 10.0 * error < made.recipe.accuracy.signal
+
+
+def test_a_target_that_turns_is_refused_where_a_reflection_would_meet_it_out_of_the_water() -> None:
+    """In the water till the direct sound has met it."""
+    rising = Hover(position=(20.0, 0.0, -0.17), heave=0.5, period=2.0)  # at 1.6 m/s
+    scene, frame = reflected(rising).frame(0)
+    check_frame(replace(scene, physics=Physics()), frame)
+    with pytest.raises(FieldError, match=r"'remus', where sound meets it, is .* m above the surface at frame 0"):
+        check_frame(scene, frame)

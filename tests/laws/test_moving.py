@@ -17,6 +17,7 @@ from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
 from tests.laws.test_traced_families import (
     ARRAY,
+    BOTTOM_DEPTH,
     ONE,
     RIGID,
     ROMANIS,
@@ -181,6 +182,27 @@ def test_snaps_together_are_heard_as_each_alone(bounces: int) -> None:
         assert np.array_equal(mine.facet, alone.facet)
         np.testing.assert_allclose(mine.delay, alone.delay, atol=1e-10)
         np.testing.assert_allclose(mine.amplitude, alone.amplitude, rtol=1e-5)
+
+
+@pytest.mark.parametrize("bottom", [False, True])
+def test_families_that_are_traced_apart_are_all_of_those_together_and_each_once(bottom: bool) -> None:
+    """Of what hardly turns, each family for itself, through bent water: no path is lost, and none is heard twice. Sound
+    of a snap on the bottom, and of its image there, is one."""
+    slow = replace(CIRCLE, speed=1e-7)
+    lit = replace(snap(), position=np.array([4.0, -7.0, -BOTTOM_DEPTH])) if bottom else snap()
+    bodies, track = (on(slow), ball((19.0, -3.0, -5.0))), Track(SONAR, np.array([0.5, 0.0, 0.0]))
+    water, laws = Medium(RIGID, THERMOCLINE), (Isotropic(strength=1.0),) * 2
+    context = FrameContext(0.0, bodies, (lit,), water, Receiver(SONAR, ONE, track=track), laws)
+    together, apart = (
+        trace(replace(context, tolerances=replace(context.tolerances, shared=shared)), AutoTracing(bounces=3))
+        for shared in (1e3, 0.0)
+    )
+    order = [np.lexsort((np.round(of.delay, 9), of.facet, of.target)) for of in (together, apart)]
+    assert not np.array_equal(*order)
+    for name in ("target", "facet", "surface", "bottom", "lit_by", "arrives_by"):
+        assert np.array_equal(getattr(together, name)[order[0]], getattr(apart, name)[order[1]]), name
+    for name in ("delay", "amplitude"):
+        np.testing.assert_allclose(getattr(apart, name)[order[1]], getattr(together, name)[order[0]], rtol=1e-5)
 
 
 TURNING = Circle(centre=(0.0, 3.0, -5.0), radius=3.0, speed=1.5, bearing=np.pi)

@@ -12,6 +12,7 @@ from sonarsynth.equations.rays import ray_solutions
 from sonarsynth.geometry.motion import Circle, ConstantVelocity, Motion, Still
 from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start, plan
+from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Band, PlanarLattice, Sonar
 from sonarsynth.recipe import Accuracy, Recipe, reading
 from sonarsynth.recipe.scene import Physics, Scene, Trajectory, World
@@ -66,17 +67,19 @@ def test_a_frame_of_a_shipped_recipe_is_what_its_description_says(
     assert max(away(made, sensors)) < ALLOWED
 
 
-def crossing(target: Motion, sonar: Motion, edge: float = 0.15) -> Plan:
+def crossing(
+    target: Motion, sonar: Motion, edge: float = 0.15, bounces: int = 0, times: tuple[float, ...] = (-0.1, 0.0, 0.1)
+) -> Plan:
     """A crate before a small array, with snaps 100 ms before the instant, at it and 100 ms after it."""
     made = Scene(
         world=World(
             environment=Environment(depth=60.0, sound_speed=Isovelocity(speed=1500.0)),
             targets=(Target(name="crate", shape=Box(size=(1.2, 0.7, 0.6), edge=edge), motion=target),),
-            sources=(SnappingShrimp(position=(12.0, -7.0, -33.0), snap_times=(-0.1, 0.0, 0.1)),),
+            sources=(SnappingShrimp(position=(12.0, -7.0, -33.0), snap_times=times),),
         ),
         sonar=Sonar(array=PlanarLattice(columns=8, rows=6, pitch=0.05), assumed_sound_speed=1500.0),
         trajectory=Trajectory(start=1.0, sonar=sonar),
-        physics=Physics(),
+        physics=Physics(tracing=AutoTracing(bounces=bounces)),
     )
     return plan(Recipe(title="crossing", scene=made, accuracy=Accuracy(signal=1e-3)), ("signals",), Choices())
 
@@ -93,10 +96,13 @@ def test_what_moves_is_heard_where_the_sound_met_it(speed: float, sonar: float) 
     assert max(away(made, [0, 47])) < ALLOWED
 
 
-def test_what_turns_is_heard_as_it_stood_when_the_sound_met_it() -> None:
-    """A crate on a circle at 20 degrees a second."""
+@pytest.mark.parametrize(("bounces", "times"), [(0, (-0.1, 0.0, 0.1)), (3, (0.0,))])
+def test_what_turns_is_heard_as_it_stood_when_the_sound_met_it(bounces: int, times: tuple[float, ...]) -> None:
+    """A crate on a circle at 20 degrees a second, which has turned on by 3 degrees when sound comes to it by surface
+    and bottom."""
     circle = Circle(centre=(22.0, 3.0, -29.0), radius=4.0, speed=1.4, bearing=0.3)
-    assert away(crossing(circle, Still(position=(0.0, 0.0, -30.0), heading=0.5 * np.pi), edge=0.35), [29])[0] < ALLOWED
+    ours = Still(position=(0.0, 0.0, -30.0), heading=0.5 * np.pi)
+    assert away(crossing(circle, ours, 0.35, bounces, times), [29])[0] < ALLOWED
 
 
 def test_faces_that_a_wave_takes_long_to_cross_hear_the_whole_pulse() -> None:

@@ -9,7 +9,7 @@ from sonarsynth.environment.casts import profile_of
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.planning.choices import ALL_PRODUCTS
 from sonarsynth.planning.measured.ray_bending import bending_error
-from sonarsynth.planning.measured.sampled_arrivals import one_facet_in
+from sonarsynth.planning.measured.sampled_arrivals import context_of, one_facet_in
 from sonarsynth.planning.notes.formula_validity import curved_waves
 from sonarsynth.planning.plan_tables import Omission
 from sonarsynth.planning.plans import Plan
@@ -24,6 +24,7 @@ from sonarsynth.state import FrameContext, Receiver, Tolerances
 from sonarsynth.targets.mesh_resolution import expected_error
 from sonarsynth.targets.relief import BOTTOM, highest_within
 from sonarsynth.tracing.arrivals import trace
+from sonarsynth.tracing.meetings import meetings
 
 ENOUGH = 2500
 """Facets of a target that its reflections are estimated from."""
@@ -68,7 +69,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     if moving and not scene.physics.doppler:
         rows.append(Omission("Doppler", "not requested: positions are those at the time of the frame", _moved(plan)))
     elif moving:
-        model = "bodies are posed when sound meets their centre; from there constant velocity and spin"
+        model = "bodies are posed when sound meets their middle; from there constant velocity and spin"
         rows.append(Omission("motion of targets beyond constant velocity and spin", model, _carried(plan, frame)))
     rows += _chorus_left_out(plan) + reverberation_left_out(plan)
     if not environment.noises:
@@ -225,21 +226,25 @@ def _facets_leave_out(plan: Plan) -> list[Omission]:
 
 
 def _carried(plan: Plan, frame: Frame) -> str:
-    """What velocity and spin leave out of the first frame, from when a body's middle is met to when a facet is: the
-    rest of the phase, and how far bodies are that hide others from where they are then."""
-    speed, bottom_depth = float(plan.profile.speed.min()), plan.scene.world.environment.depth
-    bounces, phase, off = plan.propagation.bounces, 0.0, 0.0
-    bodies, ends = frame.moment.bodies, [frame.sonar_pose.position, *(s.position for s in frame.moment.snaps)]
-    for body in bodies:
-        size = 2.0 * body.mesh.radius
-        apart = max(float(np.linalg.norm(body.pose.position - end)) for end in ends)
-        late = (size + (np.hypot(apart, (bounces + 1) * bottom_depth) - apart if bounces else 0.0)) / speed
-        v, turn = float(np.linalg.norm(body.velocity)), float(np.linalg.norm(body.track.spin)) * late
-        phase = max(phase, 0.5 * turn * (turn * size + v * late))
-        others = max((float(np.linalg.norm(body.pose.position - b.pose.position)) for b in bodies), default=0.0)
-        off = max(off, v * (late + 2.0 * others / speed))
-    radians = 4.0 * np.pi * plan.scene.sonar.band.high / speed * phase
-    return f"{radians:.1g} rad at the top of the band; occlusion by positions up to {off:.1g} m off"
+    """What velocity and spin leave out of the first frame, from when the first sound that is traced together meets a
+    body's middle to when the last does, and its far side: the rest of the phase, of families as loud as they are beside
+    the direct one; and how far bodies are that hide others from where they are then."""
+    context, speed, signal, off = context_of(plan, frame), float(plan.profile.speed.min()), 0.0, 0.0
+    bodies, times = context.bodies, meetings(context, frame.sonar_track, plan.propagation.bounces)
+    places = [body.pose.position for body in bodies]
+    for snap, emission in enumerate(context.snaps):
+        for owners, ways in times.classes(snap):
+            first = times.when(snap, ways)[0]
+            for n in (owner for owner in owners if owner < len(bodies)):
+                body, met = bodies[n], times.met[:, snap, n]
+                across = 2.0 * body.mesh.radius / speed
+                for way in range(len(met)) if ways is None else ways:
+                    late, weaker = met[way] - first[n] + across, (met[0] - emission.time) / (met[way] - emission.time)
+                    beyond = times.beyond(body.track.later(first[n]), late, body.mesh.radius)
+                    signal = max(signal, min(beyond, 1.0) * weaker)
+                    others = max(float(np.linalg.norm(places[n] - place)) for place in places)
+                    off = max(off, float(np.linalg.norm(body.velocity)) * (late + 2.0 * others / speed))
+    return f"{signal:.1g} of the signals; occlusion by positions up to {off:.1g} m off"
 
 
 def _moved(plan: Plan) -> str:

@@ -25,8 +25,8 @@ from sonarsynth.signals.filtered_pulse import heard_part
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.sources.sound_source import SoundSource
-from sonarsynth.state import meeting_times
 from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.tracing.meetings import family_times
 
 FARTHEST = 1e6
 """m from the origin: beyond, travel times lose their microseconds."""
@@ -185,8 +185,9 @@ def _check_met(scene: Scene, frame: Frame, number: int) -> None:
     snaps, path = frame.moment.snaps, ("scene", "world", "targets", number, "motion")
     if body.track.still or not snaps:
         return
-    met = meeting_times([body.track], snaps, lambda start, end: np.linalg.norm(end - start, axis=1) / slowest)
     bottom_depth, name = scene.world.environment.depth, f"target '{body.name}', where sound meets it,"
+    bounces = 0 if body.track.straight else scene.physics.tracing.bounces  # what turns is met anew by each family
+    met = family_times([body.track], snaps, bottom_depth, bounces, slowest)
     for late in {float(met.min()), float(met.max())}:
         moved = body.later(late)
         if not _box_in_water(moved, bottom_depth):
