@@ -158,7 +158,8 @@ class Recipe:
         """What targets are called, in the order of the recipe."""
         world = self.described.world
         names = [target.category for target in world.targets]
-        names += [str(v.value) for _, e in self.spanned.entries for v in listed_values(e) if _sets(e, "category")]
+        categories = (e for _, e in self.spanned.entries if any(path.endswith(".category") for path in e.path))
+        names += [str(value.value) for entry in categories for value in listed_values(entry)]
         names += [p.category(n) for p in world.populations for n in range(len(p.models))]
         return tuple(dict.fromkeys(names))
 
@@ -188,11 +189,6 @@ class Recipe:
         meshes = {name: [mesh.digest for mesh in variants] for name, variants in self.meshes.items()}
         text = json.dumps([_by_content(deciding), meshes], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _sets(entry: Axis | Variation, field: str) -> bool:
-    """Whether what varies sets a field of this name."""
-    return any(path.endswith(f".{field}") for path in entry.path)
 
 
 def _by_content(value: Any) -> Any:

@@ -12,7 +12,7 @@ from sonarsynth.description import description
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.scattering.facet_law import FacetLaw
-from sonarsynth.scattering.law_validity import COARSE, Scatterer, facets_note
+from sonarsynth.scattering.law_validity import Scatterer, facets_note
 
 
 @description
@@ -30,7 +30,7 @@ class Isotropic(FacetLaw):
             f"each of {count} facets echoes by {level:.3g} dB re 1 m2, whatever its area, ka and angle: that is for "
             "calibration, and not the level of a body"
         )
-        notes = level_note, facets_note(body, COARSE)
+        notes = level_note, facets_note(body)
         return tuple(note for note in notes if note)
 
     def amplitude(

@@ -99,10 +99,10 @@ def aside_note(body: Scatterer) -> str | None:
     )
 
 
-def facets_note(body: Scatterer, longest: float) -> str | None:
-    """One line if facets, each echoing from its middle, are longer than this (m); None if not."""
+def facets_note(body: Scatterer) -> str | None:
+    """One line if facets, each echoing from its middle, are longer than `COARSE`; None if not."""
     edge = longest_edge((body.mesh.vertices, body.mesh.faces))
-    if not edge > longest:
+    if not edge > COARSE:
         return None
     return (
         f"facets up to {edge:.2g} m long ({edge / body.shortest:.1g} wavelengths at the top of the band), each "

@@ -73,7 +73,7 @@ class MirrorLobe(FacetLaw):
             if self.phases == "alike"
             else None
         )
-        notes = self.too_small(body), facets_note(body, COARSE), aside_note(body), wide, alike
+        notes = self.too_small(body), facets_note(body), aside_note(body), wide, alike
         return tuple(note for note in notes if note)
 
     def amplitude(

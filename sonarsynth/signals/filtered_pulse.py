@@ -67,14 +67,6 @@ def pulse_support(
     LONGEST_TAIL: `cut_tail` says what is left there. sloped: differentiated, as a smooth facet does. rough: from rough
     facets with a `height_delay_std` (s) up to this, of any share. Facets make it longer by their corners, at both ends.
     """
-    return support_of(waveform, chosen, PulseChanges(turned, sloped, rough), tolerance)
-
-
-def support_of(
-    waveform: Waveform, chosen: Filter, shape: PulseChanges, tolerance: float = filters.SUPPORT_TOLERANCE
-) -> tuple[float, float]:
-    """As `pulse_support`."""
-    turned, sloped, rough = shape
     supports = [] if sloped else [_plain_support(waveform, chosen, tolerance)]
     if turned or sloped:
         supports.append(_shaped_support(waveform, chosen, tolerance, PulseChanges(turned, sloped))[:2])
@@ -159,15 +151,15 @@ def _shaped(wave: Floats, step: float, shape: PulseChanges) -> Floats:
 
 
 @lru_cache(maxsize=64)
-def silencing_blur(waveform: Waveform, chosen: Filter, tolerance: float = filters.SUPPORT_TOLERANCE) -> float:
-    """The blur (s) that leaves no more than `tolerance` of the modulus of the filtered snap's spectrum."""
-    window = 4.0 * sum(_plain_support(waveform, chosen, tolerance))
+def silencing_blur(waveform: Waveform, chosen: Filter) -> float:
+    """The blur (s) that leaves no more than `SUPPORT_TOLERANCE` of the modulus of the filtered snap's spectrum."""
+    window = 4.0 * sum(_plain_support(waveform, chosen, filters.SUPPORT_TOLERANCE))
     f, value = _tapered(waveform, chosen, window)
     mass = np.abs(value) / np.abs(value).sum()
     low, high = 0.0, 1e3 / f[1]
     while high > 1.01 * low and high > 1e-12:
         middle = np.sqrt(max(low, 1e-3 * high) * high)
-        silent = mass @ np.exp(-0.5 * (2.0 * np.pi * middle * f) ** 2) <= tolerance
+        silent = mass @ np.exp(-0.5 * (2.0 * np.pi * middle * f) ** 2) <= filters.SUPPORT_TOLERANCE
         low, high = (low, middle) if silent else (middle, high)
     return float(high)
 

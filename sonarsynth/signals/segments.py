@@ -13,7 +13,7 @@ from sonarsynth.equations.scattering.facet_pulses import rough_factor
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths, delay_and_gain, face_reach, reach, steered_spread
-from sonarsynth.signals.filtered_pulse import PULSE_FEET, PulseChanges, at_longest, silencing_blur, support_of
+from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, pulse_support, silencing_blur
 from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
 
@@ -116,8 +116,8 @@ def _supports(
         kinds = front.coherent + 2 * turned + 4 * rough
         table = np.zeros((8, len(snaps), 2))
         for kind in np.flatnonzero(np.bincount(kinds)).tolist():
-            shape = PulseChanges(turned=kind & 2 > 0, sloped=kind % 2 == 1, rough=roughest * (kind >= 4))
-            table[kind] = [support_of(w, chosen, shape, tolerance) for w in longest]
+            turn, slope, blur = kind & 2 > 0, kind % 2 == 1, roughest * (kind >= 4)
+            table[kind] = [pulse_support(w, chosen, tolerance, turned=turn, sloped=slope, rough=blur) for w in longest]
         return np.asarray(table[kinds, arrivals.snap].T)
 
     none, silent = np.zeros(front.count, bool), np.zeros(front.count, bool)

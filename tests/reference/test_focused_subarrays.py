@@ -44,7 +44,7 @@ def applied(array, beams, focus, cut):
     glass = lens(array, focus, SPEED, cut)
     delay = np.full((beams.elevations, beams.azimuths, array.count), np.nan)
     for zone in zones_of(glass, for_sensors(array, uniform(array), BAND), beams, cut):
-        for row in range(zone.low, zone.high):
+        for row in range(len(quadrant(beams))):
             for column in range(zone.near, zone.far):
                 u = quadrant(beams)[row, column]
                 for up in (-1, 1):

@@ -35,25 +35,25 @@ def fano_factor(counts: Ints) -> float:
 
 
 def path_counts(
-    gain: Floats, delay: Floats, weight: Floats, source: tuple[float, float], levels: Floats, apart: float = APART
+    gain: Floats, delay: Floats, weight: Floats, source: tuple[float, float], levels: Floats
 ) -> list[CountMoments]:
     """Moments of the number of arrivals above each level (level,) in dB, of snaps that are Poisson in place and time.
 
     gain (place, path): dB from the source level to what arrives; delay (place, path) s; weight (place,): snaps/s there;
-    source: mean and standard deviation (dB) of source levels, normal. Paths within `apart` (s) of the one before count
-    once; and so do snaps: of arrivals of a rate R, R exp(-R apart) are found (a paralysable counter; Feller 1948),
-    which leaves 1 - 2 R apart of the Fano factor. Waves that overlap do not interfere.
+    source: mean and standard deviation (dB) of source levels, normal. Paths within `APART` of the one before count
+    once; and so do snaps: of arrivals of a rate R, R exp(-R APART) are found (a paralysable counter; Feller 1948),
+    which leaves 1 - 2 R APART of the Fano factor. Waves that overlap do not interfere.
     """
     order = np.argsort(-gain, axis=1)
     louder, late = (np.take_along_axis(x, order, axis=1) for x in (gain, delay))
     groups = np.ones(gain.shape)
     for paths in range(2, gain.shape[1] + 1):
-        groups[:, paths - 1] += (np.diff(np.sort(late[:, :paths], axis=1), axis=1) > apart).sum(axis=1)
+        groups[:, paths - 1] += (np.diff(np.sort(late[:, :paths], axis=1), axis=1) > APART).sum(axis=1)
     moments = []
     for level in levels.tolist():
         reached = ndtr((source[0] + louder - level) / max(source[1], 1e-9))  # (place, path): so many paths, or more
         exactly = reached - np.append(reached[:, 1:], np.zeros((len(gain), 1)), axis=1)
         first, second = (float(weight @ (exactly * groups**power).sum(axis=1)) for power in (1, 2))
-        fano = second / first * max(1.0 - 2.0 * first * apart, 0.0) if first > 0.0 else 1.0
-        moments.append(CountMoments(first * np.exp(-first * apart), fano))
+        fano = second / first * max(1.0 - 2.0 * first * APART, 0.0) if first > 0.0 else 1.0
+        moments.append(CountMoments(first * np.exp(-first * APART), fano))
     return moments

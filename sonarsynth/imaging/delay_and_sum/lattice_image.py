@@ -28,8 +28,7 @@ def check_lattice(elements: Elements) -> None:
 class SteeredZone:
     """How a zone is focused and steered: what `lattice_kernel.lattice_energies` takes."""
 
-    rows: slice  # of the image: those above that are in the zone
-    columns: slice  # likewise those to port
+    columns: slice  # of the image: those to port that are in the zone
     odd: tuple[bool, bool]  # whether a subarray has an odd number of rows, and of columns
     places: Ints  # (set, subarray, half column, half row, 4) sensors
     heights: Ints  # (subarray, half column) rows in use
@@ -41,7 +40,6 @@ class SteeredZone:
 
 def steered(zone: Zone, elements: Elements, beams: BeamGrid, glass: Lens) -> SteeredZone:
     """The delays and the steps of a zone on a lattice."""
-    rows = slice(beams.elevations // 2 + zone.low, beams.elevations // 2 + zone.high)
     columns = slice(beams.azimuths // 2 + zone.near, beams.azimuths // 2 + zone.far)
     half = 0.5 * elements.pitch
     y, z = (half_coordinates(count, elements.pitch) for count in (glass.subarray_columns, glass.subarray_rows))
@@ -49,23 +47,23 @@ def steered(zone: Zone, elements: Elements, beams: BeamGrid, glass: Lens) -> Ste
     places, heights = _fold(elements, glass)
     if zone.shared:
         places = np.stack([places[0], places[0][..., [1, 0, 3, 2]]])  # the middle column is at +y alone
-        up, port = zone.sines(glass, beams.elevation[rows], beams.azimuth[columns])
+        up, port = zone.sines(glass, beams.elevation[beams.elevations // 2 :], beams.azimuth[columns])
         delay = np.repeat(glass.even(y[:, None], z, zone.centre)[None, ..., None], 4, axis=-1)
         across = (half / glass.sound_speed) * np.sqrt(1.0 - up * up)[:, None] * port
         rise = np.repeat((half / glass.sound_speed) * up[:, None, None, None], len(y), axis=-1)
-        return SteeredZone(rows, columns, odd, places, heights, delay, rise, across[None], np.zeros((1, *across.shape)))
+        return SteeredZone(columns, odd, places, heights, delay, rise, across[None], np.zeros((1, *across.shape)))
     middle_z, middle_y = (m.ravel()[:, None, None] for m in np.meshgrid(*_middles(glass), indexing="ij"))
     delay = np.stack(
         [glass.bulge(middle_y + b * y[:, None], middle_z + a * z, zone.centre) for a in (1, -1) for b in (1, -1)], -1
     )
-    u = quadrant(beams)[zone.low : zone.high, zone.near : zone.far]
+    u = quadrant(beams)[:, zone.near : zone.far]
     level = np.stack(np.broadcast_arrays(zone.centre[0], u[:, 0, 1]), axis=-1)[:, None, None, None, :]
     rise = glass.slope_along_z(middle_y + np.stack([y, -y]), middle_z, level, zone.centre)
     rise = level[..., 1] / glass.sound_speed - rise
     across = u[..., 0] / glass.sound_speed - glass.slope_along_y(middle_y, middle_z, u, zone.centre)
     middle = glass.bulge(middle_y, middle_z, u) - glass.bulge(middle_y, middle_z, zone.centre)
     middle -= (u[..., 0] * middle_y + u[..., 1] * middle_z) / glass.sound_speed
-    return SteeredZone(rows, columns, odd, places, heights, delay, half * rise, half * across, middle)
+    return SteeredZone(columns, odd, places, heights, delay, half * rise, half * across, middle)
 
 
 def _middles(glass: Lens) -> tuple[Floats, Floats]:
@@ -129,5 +127,5 @@ def lattice_image(
         energy = np.asarray(lattice_energies(pairs, bins, *sensors, *steps, *first_and_spacing(frequencies)))
         # From the far corner on: beams on an axis are their own mirror images, and are taken from the zone itself.
         for mirror, seen in ((3, image[::-1, ::-1]), (2, image[::-1]), (1, image[:, ::-1]), (0, image)):
-            seen[zone.rows, zone.columns] = energy[mirror]
+            seen[beams.elevations // 2 :, zone.columns] = energy[mirror]
     return image

@@ -128,12 +128,10 @@ class ArrayMoments:
 
 @dataclass(frozen=True, eq=False)
 class Zone:
-    """A rectangle of the quadrant of a beam grid above and to port; its mirror images go with it."""
+    """Columns of the quadrant of a beam grid above and to port; their mirror images go with them."""
 
-    low: int  # first of its rows, counted from the middle of the grid
-    high: int  # the row after its last
-    near: int  # first of its columns, likewise
-    far: int
+    near: int  # first of its columns, counted from the middle of the grid
+    far: int  # the column after its last
     centre: Floats  # (yz): direction that it is focused on
     shared: bool  # whether it and its mirror images take the same delays
     axial: bool = False  # whether it takes those of the acoustic axis, and no slopes
@@ -228,13 +226,13 @@ def zones_of(glass: Lens, moments: ArrayMoments, beams: BeamGrid, subarrays: Sub
     u = quadrant(beams)
     wide = u.shape[1]
     if subarrays == "axis":
-        return [Zone(0, u.shape[0], 0, wide, np.zeros(2), True, True)]
+        return [Zone(0, wide, np.zeros(2), True, True)]
     whole = _zone(u, 0, wide, False)
     if subarrays != (1, 1):
         return [whole]
 
     def estimate(zone: Zone) -> float:
-        ends = u[[zone.low, zone.high - 1]][:, [zone.near, zone.far - 1]]
+        ends = u[[0, -1]][:, [zone.near, zone.far - 1]]
         return zone.estimate(glass, moments, ends.reshape(-1, 2))
 
     worst = max(estimate(whole), estimate(_zone(u, wide - 1, wide, False)))
@@ -250,4 +248,4 @@ def zones_of(glass: Lens, moments: ArrayMoments, beams: BeamGrid, subarrays: Sub
 def _zone(u: Floats, near: int, far: int, shared: bool) -> Zone:
     directions = u[:, near:far].reshape(-1, 2)
     centre = 0.5 * (directions.min(axis=0) + directions.max(axis=0))
-    return Zone(0, u.shape[0], near, far, centre, shared)
+    return Zone(near, far, centre, shared)

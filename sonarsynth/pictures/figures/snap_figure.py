@@ -24,6 +24,12 @@ AS_MADE = Fir(0.0, 1e6, 0.2e6, 80.0)
 AROUND = 100e-6
 """s that are drawn before and after the collapse."""
 
+HIGHEST = 200e3
+"""Hz: spectra are drawn up to this."""
+
+WITHIN = 10.0
+"""dB under the highest level: down to there a bandwidth reaches."""
+
 LOWEST_RESPONSE = -120.0
 """The filter is drawn down to this (dB)."""
 
@@ -33,17 +39,16 @@ def snap_figure(
     fir: Fir,
     source_level: float | None = None,
     comparison: SnapComparison | None = None,
-    highest: float = 200e3,
 ) -> Figure:
     """The snap at 1 m, scaled to `source_level` (dB re 1 uPa at 1 m peak; None: its own), before and after the filter.
 
-    pulse: gives it for waves up to a frequency (Hz). Drawn for 200 us about the collapse, up to `highest` (Hz), with
+    pulse: gives it for waves up to a frequency (Hz). Drawn for 200 us about the collapse, up to `HIGHEST`, with
     level, width and bandwidth; under it, where there is one, a comparison with a measured snap.
     """
-    fine, received = pulse(reach(AS_MADE)), pulse(max(reach(fir), highest))
+    fine, received = pulse(reach(AS_MADE)), pulse(max(reach(fir), HIGHEST))
     gain = gain_for_level(fine, source_level)
     time = np.linspace(-AROUND, AROUND, 4001)
-    frequency = np.linspace(highest / 800, highest, 800)
+    frequency = np.linspace(HIGHEST / 800, HIGHEST, 800)
     passed = response(frequency, fir)
     density = gain * spectrum(frequency, received)
     rows = 1 if comparison is None else 2
@@ -57,7 +62,7 @@ def snap_figure(
     _levels(panels[1], frequency, {"snap": _energy_level(density), "filtered": _energy_level(density * passed)})
     _response(panels[2], frequency, passed)
     if comparison is not None:
-        draw_comparison((fig.add_subplot(layout[1, 0]), fig.add_subplot(layout[1, 1])), comparison, highest)
+        draw_comparison((fig.add_subplot(layout[1, 0]), fig.add_subplot(layout[1, 1])), comparison, HIGHEST)
     return fig
 
 
@@ -75,9 +80,9 @@ def half_width(time: Floats, pressure: Floats) -> float:
     return float(ends[1] - ends[0])
 
 
-def bandwidth(frequency: Floats, level: Floats, down: float = 10.0) -> tuple[float, float]:
-    """Lowest and highest frequency (Hz) at which levels (frequency,) are at most `down` dB under the highest."""
-    loud = frequency[level >= level.max() - down]
+def bandwidth(frequency: Floats, level: Floats) -> tuple[float, float]:
+    """Lowest and highest frequency (Hz) at which levels (frequency,) are `WITHIN` of the highest."""
+    loud = frequency[level >= level.max() - WITHIN]
     return float(loud[0]), float(loud[-1])
 
 
@@ -104,7 +109,7 @@ def _levels(axes: Axes, frequency: Floats, densities: dict[str, Floats]) -> None
     grid(axes)
     for (name, level), colour in zip(densities.items(), (INK, MARKS[0]), strict=True):
         low, high = bandwidth(frequency, level)
-        text = f"{name}: {1e-3 * low:.3g} to {1e-3 * high:.3g} kHz within 10 dB"
+        text = f"{name}: {1e-3 * low:.3g} to {1e-3 * high:.3g} kHz within {WITHIN:g} dB"
         axes.plot(1e-3 * frequency, level, color=colour, linewidth=1.0, label=text)
     top = float(densities["snap"].max())
     axes.set_ylim(top - 70.0, top + 18.0)
