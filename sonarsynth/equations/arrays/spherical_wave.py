@@ -151,6 +151,15 @@ def _wavefront(fit: tuple[Any, ...], curved: bool) -> Wavefront | None:
     return Wavefront(*wave)
 
 
+def parabola(left: npt.ArrayLike, middle: npt.ArrayLike, right: npt.ArrayLike) -> tuple[Floats, Floats]:
+    """Place (in samples from the middle, within +-0.5) and height of the vertex through three equidistant values."""
+    a, b, c = (np.asarray(v, float) for v in (left, middle, right))
+    bend = a - 2 * b + c
+    safe = np.where(bend < 0, bend, -1.0)
+    offset = np.where(bend < 0, np.clip(0.5 * (a - c) / safe, -0.5, 0.5), 0.0)
+    return np.asarray(offset), np.asarray(b - 0.25 * (a - c) * offset)
+
+
 def envelope_peak(
     frequency: npt.ArrayLike, spectrum: npt.ArrayLike, low: float, high: float, noise: npt.ArrayLike = 0.0
 ) -> tuple[float, float]:

@@ -212,8 +212,7 @@ def fit_pulse(
         return UNFIT
     if pulse.one_tone(SHARED) and not off < PERIODS_OFF / sonar.band.centre:
         return UNRESOLVED
-    lasting = pulse_times.half_length(sonar.band) > pulse_times.PULSE_HALF
-    if lasting or pulse_times.null_in_band(elements, sonar, wave.direction):
+    if pulse_times.cuts_tails(sonar.band) or pulse_times.null_in_band(elements, sonar, wave.direction):
         aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=longer * pulse_times.LONGER)
         known = wave.direction, wave.curvature, wave.time, pulse.noise_to_signal
         pulse = replace(pulse, longer=pulse_times.measure(aligned, elements, c, *known))

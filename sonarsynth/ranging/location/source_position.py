@@ -36,8 +36,8 @@ over a fluid sediment the phase turns by up to 8 rad per rad of grazing angle (B
 PHASE_SLOPE = 8.0
 """rad/rad: that phase. Over angles of standard deviation s from the array it bends the wavefront by slope^2 s^2/2 rad,
 which moves the time: by 0.1 to 3 times that below the critical angle (sand to rock, 7 to 14 m), by less above."""
-LEFT = 0.015
-"""Of what a longer window changes of a time, what it leaves: 0.004 to 0.018 were seen."""
+LEFT = 0.05
+"""Of what a longer window changes of a time, what it leaves: 0.001 to 0.1 were seen, 0.05 root mean square."""
 ACCEPTED, SILENT, ARRAY, BAND, UNFIT, UNRESOLVED, OUTSIDE, ECHO, RANGE = range(len(REASONS))
 
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d
 
 from sonarsynth.conventions import Floats, Ints
+from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
@@ -84,7 +85,7 @@ def pick(profiles: Profiles, image: EnergyImage, locality: float) -> AxisEchoes:
     rows = np.arange(count)
     top = np.clip(power.argmax(axis=1), 1, power.shape[1] - 2)
     own = power[rows, top]
-    offset, _ = pulse_times.parabola(*(np.sqrt(power[rows, top + i]) for i in (-1, 0, 1)))
+    offset, _ = parabola(*(np.sqrt(power[rows, top + i]) for i in (-1, 0, 1)))
     near = np.maximum(_loudest_near(profiles, image, top), own)
     anywhere = maximum_filter1d(power.max(axis=0), profiles.about * 2 + 1)[top]
     noise = np.median(power[:, ::OVERSAMPLING], axis=1)

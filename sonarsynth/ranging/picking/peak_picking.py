@@ -14,6 +14,7 @@ from scipy.special import diric
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.arrays.apertures import live_gain
 from sonarsynth.equations.arrays.noise_peaks import peak_level
+from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond
@@ -220,7 +221,7 @@ def _tops(
     """
     top = power[b, t].astype(float) ** SIXTH
     sides = np.minimum(beside(power, index, *beams, b, t).astype(float) ** SIXTH, top)
-    offset, height = pulse_times.parabola(sides[:, 0], top, sides[:, 1])
+    offset, height = parabola(sides[:, 0], top, sides[:, 1])
     return offset.T * resolved, np.prod((height[resolved] / top) ** 3, axis=0)
 
 
