@@ -65,6 +65,11 @@ ABSURD = [
     ("stop: [10, 1, -5], duration: 1", "stop: [10, 400, -5], duration: 1", "target 'box' moves at 400 m/s at frame 0"),
     ("stop: [10, 1, -5], duration: 1", "stop: [10, 1, -5], duration: 5e-300", "target 'box' moves at 2e+299 m/s"),
     (
+        "kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1",
+        "kind: circle, centre: [10, 0, -5], radius: 1e-3, speed: 1",
+        "scene.world.targets.0.motion: target 'box' moves and turns at up to",
+    ),
+    (
         "frames: 20,",
         "sonar: {kind: line, start: [0, 0, -5], stop: [0, 999, -5], duration: 1}, frames: 20,",
         "16: scene.trajectory.sonar: the array moves at 999 m/s at frame 0, too fast for sound in water",

@@ -13,7 +13,7 @@ from sonarsynth.environment.casts import profile_of
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays.ray_solutions import TOLERANCE
 from sonarsynth.geometry.mesh import in_blocks
-from sonarsynth.geometry.motion import pose
+from sonarsynth.geometry.motion import Track, pose
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.planning.notes.noise_checks import check_noises
@@ -199,14 +199,20 @@ def _check_met(scene: Scene, frame: Frame, number: int) -> None:
 
 def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
     """Nothing moves so fast that the pulses are stretched beyond what the synthesis can do (`MAX_DOPPLER`)."""
-    body, array = frame.moment.bodies[number], math.hypot(*frame.sonar_velocity)
-    own = math.hypot(*body.velocity)  # which squares nothing, so that absurd speeds do not overflow
+    body, sonar = frame.moment.bodies[number], frame.sonar_track
+    array, own = _fastest(sonar, elements(scene.sonar.array).aperture), _fastest(body.track, body.mesh.radius)
     slowest = float(profile_of(scene.world.environment.sound_speed).speed.min())
     if array + 2.0 * own > 0.9 * MAX_DOPPLER * slowest:
-        sonar = array > 2.0 * own
-        path = ("scene", "trajectory", "sonar") if sonar else ("scene", "world", "targets", number, "motion")
-        name, speed = ("the array", array) if sonar else (f"target '{body.name}'", own)
-        raise FieldError(path, f"{name} moves at {speed:.3g} m/s at frame {frame.index}, too fast for sound in water")
+        faster = array > 2.0 * own
+        path = ("scene", "trajectory", "sonar") if faster else ("scene", "world", "targets", number, "motion")
+        name, speed, track = ("the array", array, sonar) if faster else (f"target '{body.name}'", own, body.track)
+        moves = "moves and turns at up to" if track.spin.any() else "moves at"
+        raise FieldError(path, f"{name} {moves} {speed:.3g} m/s at frame {frame.index}, too fast for sound in water")
+
+
+def _fastest(track: Track, reach: float) -> float:
+    """Speed (m/s) of the fastest part of what moves, and turns, and reaches so far (m) from its origin."""
+    return math.hypot(*track.velocity) + math.hypot(*track.spin) * reach  # squares nothing: absurd speeds overflow
 
 
 def _check_snaps(scene: Scene, frame: Frame) -> None:
