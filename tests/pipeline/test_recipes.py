@@ -126,8 +126,10 @@ def test_files_that_are_not_there(tmp_path: Path) -> None:
 
 def test_settings_reach_into_lists_and_make_mappings(small_file: Path) -> None:
     sets = ("scene.world.targets.0.name=crate", "scene.sonar.converter.full_scale=20 kPa", "seed=0o17")
-    recipe = reading.load(small_file, sets)
-    assert recipe.scene.world.targets[0].name == "crate"
+    by_name = ("targets.crate.category=box", "trajectory.frames=3")  # as in a grid
+    recipe = reading.load(small_file, (*sets, *by_name))
+    assert recipe.scene.world.targets[0].name == "crate" and recipe.scene.world.targets[0].category == "box"
+    assert recipe.scene.trajectory.frames == 3
     assert recipe.scene.sonar.converter == Converter(full_scale=20e3)
     assert recipe.seed == 15
 
@@ -138,6 +140,8 @@ def test_settings_reach_into_lists_and_make_mappings(small_file: Path) -> None:
         ("scene.sonar.sampling_frequency=150 kHz", "--set: scene.sonar.sampling_frequency: 150000 Hz is under twice"),
         ("scene.sonar.beems=1", "--set: scene.sonar.beems: 'beems' is not a field here; did you mean 'beams'?"),
         ("scene.world.targets.3.name=x", "--set: scene.world.targets.3.name: '3' is not one of the 1 entries"),
+        ("targets.nobody.name=x", "--set: scene.world.targets.nobody.name: 'nobody' is not one of the 1 entries"),
+        ("trajectory.frames=x", "--set: scene.trajectory.frames: must be"),
         ("title.x=3", "--set: title.x: 'title' has no fields"),
         ("title", "--set: 'title' is not path=value"),
         ("seed=[", "--set: seed: is not YAML"),

@@ -19,7 +19,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from sonarsynth.recipe.variation.values import Where, put
+from sonarsynth.recipe.variation.values import Where, by_number, in_full, put, where
 
 MAX_BYTES: Final = 2_000_000
 MAX_VALUES: Final = 50_000
@@ -109,11 +109,12 @@ def read_text(text: str, name: str, folder: Path) -> Source:
 
 
 def override(source: Source, setting: str) -> Source:
-    """The source with one `path=value` of the command line set. Raises RecipeError."""
+    """The source with one `path=value` of the command line set: paths go as in a grid, by number or by name. Raises
+    RecipeError."""
     path, equals, text = setting.partition("=")
     if not equals or not path.strip():
         raise RecipeError(source.name, SET, "", f"'{setting}' is not path=value")
-    keys: Where = tuple(int(p) if p.isdecimal() else p for p in path.strip().split("."))
+    keys = by_number(source.data, where(in_full(path.strip())))
     reader = _Reader(source.name, {}, SET)
     node = _compose(text, source.name, SET, path.strip())
     value = None if node is None else reader.value(node, keys)

@@ -118,7 +118,7 @@ def _paths(value: Any) -> tuple[str, ...]:
     texts = (value,) if isinstance(value, str) else value
     if not isinstance(texts, (list, tuple)) or not texts or not all(isinstance(t, str) for t in texts):
         raise ValueError("must be a path such as scene.world.targets.0.motion.heading, or a list of them")
-    texts = [f"{SHORT[text.split('.')[0]]}{text}" if text.split(".")[0] in SHORT else text for text in texts]
+    texts = [in_full(text) for text in texts]
     for text in texts:
         if not text.startswith(VARYING):
             raise ValueError(
@@ -149,6 +149,24 @@ Paths = Annotated[
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}, "minItems": 1}]}),
 ]
 """Where a value goes: one path into the scene, or several that all get it."""
+
+
+def in_full(path: str) -> str:
+    """A dotted path with what may be left out before it."""
+    return SHORT.get(path.partition(".")[0], "") + path
+
+
+def by_number(data: Any, path: Where) -> Where:
+    """A path into `data` with numbers for the names of members of lists."""
+    keys: list[str | int] = []
+    for key in path:
+        names = [item.get("name") for item in data if isinstance(item, dict)] if isinstance(data, list) else []
+        keys.append(names.index(key) if key in names and len(names) == len(data) else key)
+        try:
+            data = data[keys[-1]]
+        except (LookupError, TypeError):
+            data = None
+    return tuple(keys)
 
 
 def where(path: str) -> Where:
