@@ -91,6 +91,16 @@ class ArrayExpansion(Columns):
         """Bound (path,) on the modulus of a quantity over the aperture."""
         return np.asarray(np.abs(getattr(self, name)).sum(axis=1))
 
+    def mean_square(self, points: Floats) -> Floats:
+        """Mean square (path,) over places (point, xyz) m of 1 + amplitude b(q): what is faint in the middle may be loud
+        at the rim."""
+        terms = self.amplitude.shape[1]
+        if not terms:
+            return np.ones(len(self.amplitude))
+        gain = self.amplitude + np.eye(1, terms)
+        basis = _terms_at(points, self.aperture, terms)
+        return np.asarray(np.einsum("pt,pt->p", gain @ (basis.T @ basis / len(points)), gain))
+
     def gradient(self, points: Floats, *names: str) -> Floats:
         """Gradient (xyz, point, term) in 1/m of as many polynomials as some quantities have, at places (point, xyz)."""
         terms, step = max(getattr(self, name).shape[1] for name in names), 1e-4 * self.aperture

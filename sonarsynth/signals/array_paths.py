@@ -69,8 +69,8 @@ class Wavefronts(Columns):
         every = not isinstance(keep, slice) and len(keep) == self.count and np.array_equal(keep, np.arange(self.count))
         return self if every else super().select(keep)
 
-    def without_faint_shadows(self, tolerance: float, sensors: int) -> Self:
-        """The paths with some of those that miss a part of so many hydrophones reaching all or none, as is nearer.
+    def without_faint_shadows(self, tolerance: float, elements: Elements) -> Self:
+        """The paths with some of those that miss a part of the hydrophones reaching all or none, as is nearer.
 
         It is the faintest, as many as change the energy of all by `tolerance` squared at most, where no path counts as
         louder than the loudest of those. Paths to none are left out.
@@ -78,7 +78,8 @@ class Wavefronts(Columns):
         rows = np.flatnonzero(self.occluded.any(axis=1))
         if not len(rows):
             return self
-        missed, energy = np.bitwise_count(self.occluded[rows]).sum(axis=1) / sensors, self.amplitude**2
+        missed = np.bitwise_count(self.occluded[rows]).sum(axis=1) / elements.count
+        energy = self.amplitude**2 * self.expansion.mean_square(elements.position)
         change = energy[rows] * np.minimum(missed, 1.0 - missed)
         order = np.argsort(change, kind="stable")
         faint = order[np.cumsum(change[order]) <= tolerance**2 * np.minimum(energy, energy[rows].max()).sum()]

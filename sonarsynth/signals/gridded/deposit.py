@@ -70,7 +70,7 @@ def add_segment(
     wave = kernel(-8 * (-width // 8), samples * bins.step / highest, 2 * samples, dtype)  # as wide as its lanes
     tails = highest > stop or tolerance <= 10.0 * filters.SUPPORT_TOLERANCE
     stage = Stage(aim, bins, origin, segment, grid, oversampling, wave, dtype, tails)
-    front = front.without_faint_shadows(0.1 * tolerance, elements.count)
+    front = front.without_faint_shadows(0.1 * tolerance, elements)
     for tile in tiles(front, aim) if front.count else ():
         paths, most = front.select(tile.paths), max(1, LARGEST // (len(tile.nodes(elements)) * samples))
         if not tile.alone or paths.count <= most:
