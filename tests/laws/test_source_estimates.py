@@ -21,7 +21,7 @@ from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.locating import fit_wave
 from sonarsynth.ranging.location.pulse_times import Pulse, lag_variance
-from sonarsynth.receiver import Band, PlanarLattice, Sonar, elements
+from sonarsynth.receiver import Band, PlanarLattice, PositionTable, Sonar, elements
 from sonarsynth.state import Receiver, Survey
 from tests.heard import RATE, add_noise, envelope_late, hear, hear_direct, silence
 from tests.scenes import point_scene
@@ -109,6 +109,29 @@ def test_an_echo_does_not_pass_for_a_snap() -> None:
     found = locate(early, 45.0, snaps=2)
     assert list(found.reason) == [0, 0]
     assert min(np.linalg.norm(found.position - target, axis=1)) < 0.02
+
+
+def test_the_image_in_the_surface_is_no_snap_of_unknown_range() -> None:
+    """Six hydrophones in water 3 m deep cannot tell how far it is, and what is known to be on the bottom is not above
+    them; the snap itself is located. Where sources may be anywhere, neither is refused."""
+    random, seen = np.random.default_rng(4), []
+    for _ in range(6):
+        places = [(0.0, *p) for p in random.uniform(-0.04, 0.04, (6, 2)).tolist()]
+        array = PositionTable(positions=tuple(places))
+        sonar, heard = Sonar(array=array, assumed_sound_speed=C), elements(array)
+        pose, source = (
+            Pose(np.array([0.0, 0.0, -1.5]), quaternion(0.0)),
+            np.array([random.uniform(2.0, 6.0), 0.5, -1.5]),
+        )
+        for place in (source, source * [1.0, 1.0, -3.0]):
+            signals = hear_direct(heard, place, noise=0.08, random=random)
+            for on_bottom in (True, False):
+                method = SensorDelays(on_bottom=on_bottom)
+                found = method.locate(signals, Receiver(pose, heard, sonar), Survey(3.0, WATER), 1)
+                seen.append(REASONS[found.reason[0]])
+    bottom, anywhere, image, either = (set(seen[n::4]) for n in range(4))
+    assert bottom == {"accepted"} and image == {"outside_the_water"}, (bottom, image)
+    assert "outside_the_water" not in anywhere and "range_unknown" in either
 
 
 def test_snaps_at_one_instant_on_the_bottom_are_all_found() -> None:

@@ -22,7 +22,15 @@ from sonarsynth.conventions import Bools, Floats
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
 from sonarsynth.ranging import ranging_kernels
-from sonarsynth.ranging.location.source_position import ACCEPTED, ECHO, RANGE, SonarKnowledge, SourceFix, refused
+from sonarsynth.ranging.location.source_position import (
+    ACCEPTED,
+    ECHO,
+    OUTSIDE,
+    RANGE,
+    SonarKnowledge,
+    SourceFix,
+    refused,
+)
 from sonarsynth.receiver import Band
 
 SIGMAS = 4.0
@@ -39,6 +47,9 @@ BOUNCES = 2
 """Reflections at surface and bottom after which sound may still meet a body."""
 FAR = 1e7
 """m: taken for the distance of a source whose range is not known."""
+RISING = 0.15
+"""Sine of the elevation above which no direct sound comes from the bottom below: a ray that turned above the array,
+where sound is faster by 1 %, comes from sqrt(0.02) at most."""
 QUIET = 2.0
 """The mean power while a pulse passes over the array must exceed that of the quiet by this factor."""
 
@@ -107,10 +118,19 @@ class Candidates:
         row = candidate.row
         if row.reason not in (ACCEPTED, RANGE):
             return refused(row.reason)
+        if row.reason == RANGE and self._mirrored(row):
+            return refused(OUTSIDE)
         earlier = [cause for cause in self.found if cause.centre < candidate.centre]
         if not any(self._may_cause(cause, candidate) for cause in earlier):
             return row
         return refused(ECHO)
+
+    def _mirrored(self, row: SourceFix) -> bool:
+        """Whether a pulse of unknown range comes from beyond the horizon of the bottom that sources are known to be on:
+        it is the image of one in the surface."""
+        pose, error = self.known.pose, SIGMAS * float(np.hypot(*row.angle_error))
+        away = np.sign(self.known.bottom_depth + pose.position[2]) * float(pose.rotation[2] @ row.chord)
+        return self.known.on_bottom and bool(away > RISING + error)
 
     def _may_cause(self, cause: Candidate, candidate: Candidate) -> bool:
         row, fix = candidate.row, cause.row
