@@ -46,13 +46,15 @@ def size_of(*values: object) -> int:
 class ByteBoundedCache(Generic[P, R]):
     """A function that keeps its results: at most `most`, and the last `LEAST` or no more than `MOST_BYTES` together.
 
-    Sizes are taken anew whenever a result is added, for meshes grow with what is asked of them. Safe in threads; two
-    that ask for the same at once may both make it.
+    The size of a result is taken when it is added and when the next is, for meshes grow with what is asked of them; of
+    all results, what they share counted once, where these sizes come to too much. Safe in threads; two that ask for the
+    same at once may both make it.
     """
 
     def __init__(self, function: Callable[P, R], limit: int) -> None:
         self._function, self._most = function, limit
         self._results: OrderedDict[Hashable, tuple[Any, R]] = OrderedDict()
+        self._sizes: dict[Hashable, int] = {}
         self._lock = Lock()
         update_wrapper(self, function)
 
@@ -67,11 +69,15 @@ class ByteBoundedCache(Generic[P, R]):
         with self._lock:
             self._results[key] = (key, result)
             self._results.move_to_end(key)
-            while len(self._results) > self._most or (
-                len(self._results) > LEAST and size_of(*self._results.values()) > MOST_BYTES
-            ):
-                self._results.popitem(last=False)
+            for recent in (*list(self._sizes)[-1:], key):
+                self._sizes[recent] = size_of(self._results[recent])
+            while len(self._results) > self._most or self._too_large:
+                del self._sizes[self._results.popitem(last=False)[0]]
         return result
+
+    @property
+    def _too_large(self) -> bool:
+        return len(self._results) > LEAST and sum(self._sizes.values()) > MOST_BYTES and self.nbytes > MOST_BYTES
 
     @property
     def nbytes(self) -> int:
@@ -85,6 +91,7 @@ class ByteBoundedCache(Generic[P, R]):
         """Forget all results."""
         with self._lock:
             self._results.clear()
+            self._sizes.clear()
 
 
 def byte_bounded_cache(limit: int) -> Callable[[Callable[P, R]], ByteBoundedCache[P, R]]:
