@@ -27,7 +27,10 @@ MAX_BEAMS = 16384
 """No more beams are ranged, the loudest of them: a bound on memory where a whole image is loud."""
 BEAMS_AT_ONCE = 512
 OVERSAMPLING = 4
-"""Delays of a profile for each that its bandwidth needs."""
+"""Delays of a profile for each that its bandwidth needs: two of a transform, and one more after each."""
+HALFWAY = np.array([0.605571, -0.133738, 0.032692, -0.004536], np.float32)
+"""Taps that make these: by least squares over a band that is tapered as profiles are, of which they err by 3.5e-5 rms.
+The transform of all of them takes two thirds longer."""
 WHITENING = 0.03
 """Share of the pulse's largest power density below which the spectrum is no more flattened (-15 dB)."""
 RESIDUE = 1e-6
@@ -58,7 +61,7 @@ class EchoFilter:
     @property
     def step(self) -> float:
         """Step (s) of delays."""
-        return 1.0 / (self.length * self.received.beams.snapshots.spacing)
+        return 0.5 / (self.length * self.received.beams.snapshots.spacing)
 
     def profiles(self, u: Floats) -> tuple[npt.NDArray[np.complex64], npt.NDArray[np.float32]]:
         """Spectra (beam, bin) of the profiles of beams (beam, xyz), and these: powers (beam, delay)."""
@@ -71,7 +74,7 @@ class EchoFilter:
             steered, bins = self.received.beams.spectra(u[block]), (window.frequency[0], window.spacing)
             across, up = sine[block, 1], sine[block, 2]
             ranging_kernels.match(steered, across, up, *bins, self.share, self.matched, spectra[block])
-            ranging_kernels.powers(ifft(spectra[block], self.length, axis=1), power[block])
+            ranging_kernels.powers(ifft(spectra[block], self.length, axis=1), HALFWAY, power[block])
         return spectra, power
 
 
@@ -168,11 +171,11 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
     matched = wave.conj() * taper / (density + WHITENING * density.max()) if density.max() > 0 else 0 * wave
     share = np.abs(wave * matched) + np.finfo(float).tiny
     share /= share.sum()
-    length = next_fast_len(OVERSAMPLING * len(f))
-    step = 1 / (length * spacing)
+    length = next_fast_len(OVERSAMPLING // 2 * len(f))
+    step = 0.5 / (length * spacing)
     row, column = beams
     u = direction(received.image.azimuth[column], received.image.elevation[row])
-    echoes = EchoFilter(received, share, matched, length, min(int(window.duration / step) + 1, length))
+    echoes = EchoFilter(received, share, matched, length, min(int(window.duration / step) + 1, 2 * length))
     spectra, power = echoes.profiles(u)
     spread = np.sum(taper**2)
     centre = f @ taper**2 / spread

@@ -47,11 +47,34 @@ def peak(pressure: Any) -> float:
 
 
 @compiled
-def powers(waves: Any, power: Any) -> None:
-    """Write |.|^2 of the first samples of complex waves (beam, sample) into power (beam, sample), as many as it has."""
-    for b in range(power.shape[0]):
-        for t in range(power.shape[1]):
-            power[b, t] = waves[b, t].real * waves[b, t].real + waves[b, t].imag * waves[b, t].imag
+def powers(waves: Any, taps: Any, power: Any) -> None:
+    """Write |.|^2 of complex waves (beam, sample), and of what they are halfway between samples, into power (beam, two
+    for a sample), as many as it has.
+
+    Waves have frequencies from 0 to half their rate and go on where they end as they begin. Halfway between samples
+    they are the sum over k of taps (4,) times samples k + 1/2 before and after, turned by their middle frequency.
+    """
+    samples, count = waves.shape[1], power.shape[1]
+    re, im = np.empty(samples + 8, np.float32), np.empty(samples + 8, np.float32)  # from 3 samples before the first on
+    between = np.empty((count + 1) // 2, np.float32)
+    a, b, c, d = taps
+    for n in range(len(waves)):
+        for i in range(samples):
+            re[i + 3], im[i + 3] = waves[n, i].real, waves[n, i].imag
+        for i in (-3, -2, -1, samples, samples + 1, samples + 2, samples + 3, samples + 4):
+            re[i + 3], im[i + 3] = waves[n, i % samples].real, waves[n, i % samples].imag
+        for i in range(len(between)):
+            x = a * (re[i + 3] + im[i + 4]) - b * (im[i + 2] + re[i + 5])
+            y = a * (im[i + 3] - re[i + 4]) + b * (re[i + 2] - im[i + 5])
+            x += d * (im[i] + re[i + 7]) - c * (re[i + 1] + im[i + 6])
+            y -= d * (re[i] - im[i + 7]) + c * (im[i + 1] - re[i + 6])
+            between[i] = x * x + y * y
+        for i in range(count // 2):
+            power[n, 2 * i] = re[i + 3] * re[i + 3] + im[i + 3] * im[i + 3]
+            power[n, 2 * i + 1] = between[i]
+        if count % 2 > 0:
+            last = len(between) + 2
+            power[n, count - 1] = re[last] * re[last] + im[last] * im[last]
 
 
 @compiled

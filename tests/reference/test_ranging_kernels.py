@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.fft import ifft, next_fast_len
 
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import element_directivity, focus_delay
@@ -11,7 +12,7 @@ from sonarsynth.equations.arrays.beams import beam_spectra
 from sonarsynth.imaging.delay_and_sum.lattice_beams import LatticeBeams
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location.pulse_times import in_band
-from sonarsynth.ranging.range_profiles import template_spectrum
+from sonarsynth.ranging.range_profiles import HALFWAY, template_spectrum
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, Romanis, elements
 from tests.axial import axial_energies
 
@@ -169,3 +170,14 @@ def test_a_band_between_two_bins_has_the_nearest():
     assert in_band(frequency, Band(low=9e3, high=15e3)) == slice(3, 6)
     assert in_band(frequency, Band(low=9.1e3, high=11e3)) == slice(3, 4)
     assert in_band(frequency, Band(low=70e3, high=71e3)) == slice(19, 20)
+
+
+@pytest.mark.parametrize(("bins", "cut"), [(1, 0), (2, 1), (3, 0), (50, 3), (347, 100)])
+def test_powers_between_delays_are_those_of_a_transform_to_all_of_them(bins, cut):
+    """Of spectra that are tapered as profiles are, few bins within 1 %; an even or odd number of delays."""
+    spectra = random_spectra(4, bins) * np.sin(np.pi * (np.arange(bins) + 0.5) / bins) ** 2
+    length = next_fast_len(2 * bins)
+    exact = np.abs(ifft(spectra.astype(complex), 2 * length, axis=1))[:, : 2 * length - cut] * 2
+    found = np.empty(exact.shape, np.float32)
+    ranging_kernels.powers(ifft(spectra.astype(np.complex64), length, axis=1), HALFWAY, found)
+    np.testing.assert_allclose(np.sqrt(found), exact, atol=(1e-2 if bins < 16 else 1e-4) * exact.max())
