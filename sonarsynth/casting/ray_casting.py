@@ -8,7 +8,7 @@ rays that pass a silhouette closer than 1e-6 of the body's size may go either wa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -80,6 +80,12 @@ class CastingMesh:
         see `horizons`."""
         return np.full(len(self.faces), np.nan)
 
+    def times(self, factor: float) -> CastingMesh:
+        """That of a copy so many times as large: what is known of the mesh in units of its size serves both."""
+        copy = replace(self, centre=self.centre * factor, size=self.size * factor)
+        vars(copy).update(around=self.around, tree=self.tree, horizon=self.horizon)
+        return copy
+
     def cast(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
         """Facet (ray,) and distance of the nearest hit for rays in this mesh's frame and unit; -1 and NaN for none."""
         facet, distance = np.full(len(origin), NO_TARGET), np.full(len(origin), np.nan)
@@ -130,10 +136,16 @@ def _through_unit_sphere(origin: Floats, direction: Floats, far: Floats) -> tupl
 
 @dataclass(frozen=True)
 class _ByContent:
-    """A mesh as the key of a cache: two meshes of one content are one."""
+    """A mesh as the key of a cache: two meshes of one content are one, and so are two copies of one original."""
 
     digest: str
     mesh: Mesh
+
+    @staticmethod
+    def of(mesh: Mesh) -> _ByContent:
+        """The key of a mesh."""
+        original = mesh.original
+        return _ByContent(mesh.digest if original is None else f"{original[0].digest} {original[1]!r}", mesh)
 
     def __hash__(self) -> int:
         return hash(self.digest)
@@ -142,9 +154,12 @@ class _ByContent:
         return isinstance(other, _ByContent) and self.digest == other.digest
 
 
-@byte_bounded_cache(16)
+@byte_bounded_cache(32)
 def _casting_mesh(key: _ByContent) -> CastingMesh:
     mesh = key.mesh
+    if mesh.original is not None:
+        original, factor = mesh.original
+        return casting_mesh(original).times(factor)
     if not np.isfinite(mesh.vertices).all():
         raise ValueError("a mesh with vertices that are not finite cannot be cast at")
     if len(mesh.faces) and not (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices)):
@@ -162,8 +177,8 @@ def _casting_mesh(key: _ByContent) -> CastingMesh:
 
 
 def casting_mesh(mesh: Mesh) -> CastingMesh:
-    """The mesh made ready for casting, kept by content for the last 16. Raises ValueError for a corrupt mesh."""
-    return _casting_mesh(_ByContent(mesh.digest, mesh))
+    """The mesh made ready for casting, kept by content for the last 32. Raises ValueError for a corrupt mesh."""
+    return _casting_mesh(_ByContent.of(mesh))
 
 
 def enclosing(body: PlacedTarget) -> tuple[Floats, float]:

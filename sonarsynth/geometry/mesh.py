@@ -22,6 +22,9 @@ class Mesh:
     faces: npt.NDArray[np.int32]  # (facet, 3)
     notes: tuple[str, ...] = ()  # what was repaired on reading, or how fine the surface is; one line each
     flat: Bools | None = None  # (facet,) known to be flat in the body itself, so that no finer mesh is nearer to it
+    original: tuple[Mesh, float] | None = (
+        None  # the mesh that it is a larger or smaller copy of, so many times as large
+    )
 
     @property
     def corners(self) -> Floats:
@@ -91,7 +94,9 @@ class Mesh:
 
     def scaled(self, factor: float) -> Mesh:
         """The same body so many times as large, about its origin."""
-        return self if factor == 1.0 else Mesh(read_only(self.vertices * factor), self.faces, self.notes, self.flat)
+        if factor == 1.0:
+            return self
+        return Mesh(read_only(self.vertices * factor), self.faces, self.notes, self.flat, (self, factor))
 
     @cached_property
     def digest(self) -> str:

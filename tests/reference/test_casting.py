@@ -21,6 +21,7 @@ def mesh_from(shape: trimesh.Trimesh, scale: float = 1.0) -> Mesh:
 
 SPHERE = mesh_from(trimesh.creation.icosphere(subdivisions=3), 0.5)
 RING = mesh_from(trimesh.creation.torus(0.8, 0.3))  # concave
+COPY = Mesh(RING.vertices + [0.1, 0.0, -0.2], RING.faces).scaled(0.37)
 
 
 def search(mesh: Mesh, origin: Floats, direction: Floats) -> tuple[np.ndarray, Floats]:
@@ -48,7 +49,7 @@ def rays_at(size: float, away: float, count: int, seed: int) -> tuple[Floats, Fl
     return origin, unit(aim - origin)
 
 
-@pytest.mark.parametrize("mesh", [SPHERE, RING])
+@pytest.mark.parametrize("mesh", [SPHERE, RING, COPY])
 @pytest.mark.parametrize("away", [0.1, 1.5, 20.0, 1000.0])
 def test_the_first_facet_and_its_distance(mesh: Mesh, away: float) -> None:
     origin, direction = rays_at(mesh.radius, away, 400, 0)
@@ -168,6 +169,13 @@ def test_what_cannot_be_cast_at_is_refused() -> None:
 def test_a_mesh_is_made_ready_for_casting_once() -> None:
     again = Mesh(SPHERE.vertices.copy(), SPHERE.faces.copy())
     assert ray_casting.casting_mesh(SPHERE) is ray_casting.casting_mesh(again)
+
+
+def test_copies_of_other_sizes_share_what_is_known_of_their_original() -> None:
+    twice, half = (ray_casting.casting_mesh(SPHERE.scaled(factor)) for factor in (2.0, 0.5))
+    assert twice.size == pytest.approx(4.0 * half.size)
+    assert twice.caster is half.caster and twice.horizon is half.horizon
+    assert twice is ray_casting.casting_mesh(SPHERE.scaled(2.0))
 
 
 def test_a_wrong_proposal_is_passed_over() -> None:
