@@ -20,9 +20,10 @@ SHARD_COPIES: Final = 3
 """Times the bytes of a shard that a process takes to keep its frames and to write them; measured 2.3 to 2.9."""
 
 
-def frame_bytes(facets: int, samples: int) -> float:
-    """Bytes of memory of a process that makes frames of so many facets, and samples of all hydrophones together."""
-    return PROCESS_BYTES + BYTES * facets + SAMPLE_BYTES * samples
+def frame_bytes(facets: int, samples: int, parts: int = 0) -> float:
+    """Bytes of memory of a process that makes frames of so many facets, and samples of all hydrophones together; parts:
+    of the sound that are kept beside the whole."""
+    return PROCESS_BYTES + BYTES * facets + (SAMPLE_BYTES + 4 * parts) * samples
 
 
 def max_facets() -> int:

@@ -38,7 +38,7 @@ from sonarsynth.pipeline.stored_values import (
     truth_values,
     which_values,
 )
-from sonarsynth.pipeline.synthesis import Hearing, digitise, frame_signals, keep_nothing, known_elements, known_signals
+from sonarsynth.pipeline.synthesis import NOBODY, Hearing, digitise, frame_signals, known_elements, known_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, frame_tree, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
@@ -174,10 +174,10 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
     return BeamformedFrame(signals, estimates, image, imaged, beams)
 
 
-def synthesise(plan: Plan, traced: TracedFrame, hearing: Hearing = keep_nothing) -> Signals:
+def synthesise(plan: Plan, traced: TracedFrame, hearing: Hearing = NOBODY) -> Signals:
     """Pressure at each hydrophone: echoes and direct snap, reverberation, chorus, ambient noise, converter."""
     plan = plan.at(traced.frame.index)
-    signals = frame_signals(plan, traced.frame, traced.arrivals)
+    signals = frame_signals(plan, traced.frame, traced.arrivals, hearing)
     hearing("paths", signals)
     signals = with_reverberation(plan, traced.frame, signals, traced.reverberation)
     hearing("reverberation", signals)

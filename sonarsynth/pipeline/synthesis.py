@@ -3,19 +3,19 @@ what the sonar makes of that: noise, errors of sensors and channels, converter."
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
-from sonarsynth.conventions import Floats, depth
+from sonarsynth.conventions import NO_TARGET, Floats, depth
 from sonarsynth.geometry.motion import pose, velocity
 from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.planning import Plan, arrivals_of, behind_baffle, context_of, frame_start
 from sonarsynth.planning.noise_rows import ELECTRONICS, SENSORS, part_names
-from sonarsynth.products import Arrivals, Signals
+from sonarsynth.products import Arrivals, Kind, Signals
 from sonarsynth.randomness import stream
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.sensor_errors import DrawnErrors, SensorState, drawn_errors
@@ -29,27 +29,70 @@ from sonarsynth.sources.snap_models import Ricker
 from sonarsynth.sources.sound_source import Emission
 from sonarsynth.tracing.arrivals import trace
 
+SCATTERERS: Final = -2
+"""Stands for the scatterers of reverberation, where targets have numbers."""
+Pressure = npt.NDArray[np.float32]
+"""(sensor, sample) Pa."""
 
-def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
+
+class Hearing:
+    """Is told what there is of the sound of a frame, part by part. This one keeps nothing."""
+
+    def __call__(self, part: str, signals: Signals) -> None:
+        """All that is heard once a part, by name, has come to it."""
+
+    def echo(self, target: int, pressure: Pressure) -> None:
+        """What a target, `SCATTERERS` or, as `NO_TARGET`, all else brings, where the scene has more than echoes."""
+
+
+NOBODY: Final = Hearing()
+
+
+def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals, hearing: Hearing = NOBODY) -> Signals:
     """Pressure at each hydrophone where it is, without noise and converter; arrivals: those of the frame at the whole
     array.
 
-    Where the array is cut into parts, paths are traced again to each of them. `outside` is that of the part that loses
-    most. Raises ValueError for anything outside the water.
+    Where the scene has more than echoes, what each target brings is made by itself, for its signal to noise, and added
+    up. Where the array is cut into parts, paths are traced again to each of them. `outside` is that of the part that
+    loses most. Raises ValueError for anything outside the water.
     """
-    start, samples, sensors = frame_start(plan, frame), plan.windows.samples, true_elements(plan, frame)
+    sensors = true_elements(plan, frame)
     if plan.choices.subarrays == 1:
-        return array_signals(plan, frame, arrivals, sensors)
-    pressure, outside = np.zeros((sensors.count, samples), np.float32), 0
-    for part in subarrays(sensors, plan.choices.subarrays):
-        signals_of_part = subarray_signals(plan, frame, part)
-        pressure[part.sensor], outside = signals_of_part.pressure, max(outside, signals_of_part.outside)
-    return Signals(pressure, start, plan.scene.sonar.sampling_frequency, 0.0, 0, outside)
+        heard, outside = _by_target(plan, frame, arrivals, sensors)
+    else:
+        heard, outside = dict[int, Pressure](), 0
+        for part in subarrays(sensors, plan.choices.subarrays):
+            of_part, lost = subarray_signals(plan, frame, part)
+            for target, pressure in of_part.items():
+                silence = np.zeros((sensors.count, plan.windows.samples), np.float32)
+                heard.setdefault(target, silence)[part.sensor] = pressure
+            outside = max(outside, lost)
+    for target, pressure in heard.items():
+        hearing.echo(target, pressure)
+    first, *others = heard.values()
+    total = first.copy() if others else first
+    for pressure in others:
+        total += pressure
+    return Signals(total, frame_start(plan, frame), plan.scene.sonar.sampling_frequency, 0.0, 0, outside)
 
 
-def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> Signals:
-    """What a part of the array hears, of paths that are traced to it."""
-    return array_signals(plan, frame, arrivals_of(plan, frame, part), part.elements)
+def _by_target(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> tuple[dict[int, Pressure], int]:
+    """What hydrophones hear of arrivals, as `Hearing.echo` is told, all in one where there is nothing but echoes; and
+    how many arrivals the window cuts."""
+    if not plan.scene.sound_parts:
+        signals = array_signals(plan, frame, arrivals, sensors)
+        return {NO_TARGET: signals.pressure}, signals.outside
+    owner = np.where(arrivals.kind == Kind.REVERBERATION, SCATTERERS, arrivals.target)
+    heard = {
+        number: array_signals(plan, frame, arrivals.select(np.flatnonzero(owner == number)), sensors)
+        for number in np.union1d(owner, NO_TARGET).tolist()
+    }
+    return {n: signals.pressure for n, signals in heard.items()}, sum(signals.outside for signals in heard.values())
+
+
+def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> tuple[dict[int, Pressure], int]:
+    """As `_by_target`, what a part of the array hears, of paths that are traced to it."""
+    return _by_target(plan, frame, arrivals_of(plan, frame, part), part.elements)
 
 
 def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> Signals:
@@ -80,15 +123,7 @@ def _moved(elements: Elements, drawn: DrawnErrors) -> Elements:
     return replace(elements, position=elements.position + drawn.position * [0.0, 1.0, 1.0])
 
 
-Hearing = Callable[[str, Signals], object]
-"""Is told what there is of the sound of a frame after each part of it, by name."""
-
-
-def keep_nothing(part: str, signals: Signals) -> None:
-    """A `Hearing` that keeps nothing."""
-
-
-def digitise(plan: Plan, frame: Frame, signals: Signals, hearing: Hearing = keep_nothing) -> Signals:
+def digitise(plan: Plan, frame: Frame, signals: Signals, hearing: Hearing = NOBODY) -> Signals:
     """Signals as the sonar has them: ambient noise, errors of the channels, electronics, converter; `plan` is that of
     the sequence. Each part has a stream of its own."""
     mark_stage("synthesise")

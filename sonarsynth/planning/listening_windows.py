@@ -274,7 +274,7 @@ def check_windows(scene: Scene, windows: Windows) -> None:
     if length < period:
         raise FieldError(path, f"is {length:.3g} s long, less than a period of the highest frequency, {period:.3g} s")
     sensors, facets = elements(scene.sonar.array).count, sum(len(mesh.faces) for mesh in scene.meshes)
-    needed, free = frame_bytes(facets, sensors * windows.samples), free_bytes()
+    needed, free = frame_bytes(facets, sensors * windows.samples, scene.parts_kept), free_bytes()
     if needed > max(free, frame_bytes(facets, 0)):  # meshes are checked by themselves
         seconds = windows.samples / scene.sonar.sampling_frequency
         raise FieldError(

@@ -197,7 +197,8 @@ class Plan:
         """Bytes of memory that a process takes to make its largest frame and to write a shard."""
         facets = sum(len(mesh.faces) for mesh in self.scene.meshes)
         shard = min(self.shard_frames, self.recipe.frames) * sum(stage.bytes for stage in self.stages)
-        return frame_bytes(facets, self.sizes["sensor"] * self.sizes["sample"]) + SHARD_COPIES * shard
+        samples = self.sizes["sensor"] * self.sizes["sample"]
+        return frame_bytes(facets, samples, self.scene.parts_kept) + SHARD_COPIES * shard
 
     @property
     def predicted_bytes(self) -> int:

@@ -219,6 +219,11 @@ class Scene:
         }
         return tuple(name for name, is_present in present.items() if is_present)
 
+    @property
+    def parts_kept(self) -> int:
+        """Parts of the sound of a frame that its signal to noise is taken of, echoes of each target by themselves."""
+        return len(self.sound_parts) + len(self.world.targets) if self.sound_parts else 0
+
     def mesh_of(self, target: int) -> Mesh:
         """What a target is traced with. Raises ValueError, or OSError, where it has no mesh."""
         return self.world.targets[target].mesh(self.laws[target], self.sonar.shortest_wavelength)
