@@ -8,6 +8,11 @@ import numpy as np
 
 from sonarsynth.compiling import compiled
 
+TURNS = 64
+"""Bins that sines and cosines are turned to from one."""
+TINY = 1e-100
+"""s: angles over frequency whose sine is themselves, and whose products with others are numbers."""
+
 
 @compiled
 def _row(pressure: Any, rows: Any, number: int, silent: Any) -> Any:
@@ -118,19 +123,24 @@ def turned(spectrum: Any, delay: Any, first: float, spacing: float) -> Any:
     return shifted
 
 
-@compiled
-def _face_response(across: float, up: float, first: float, spacing: float, response: Any) -> None:
-    """Fill response (bin,) of one direction, as of `face_responses`."""
+@compiled(fastmath=True, forceinline=True)
+def _face_response(across: float, up: float, first: float, spacing: float, turns: Any, response: Any) -> None:
+    """Fill response (bin,) of one direction, as of `face_responses`; turns (4, bin): room for some bins at a time."""
     y, z = np.pi * across, np.pi * up
-    sy, cy, sz, cz = np.sin(first * y), np.cos(first * y), np.sin(first * z), np.cos(first * z)
-    step_y, turn_y = np.sin(spacing * y), np.cos(spacing * y)
-    step_z, turn_z = np.sin(spacing * z), np.cos(spacing * z)
-    for k in range(len(response)):
-        f = first + k * spacing
-        x, w = f * y, f * z
-        response[k] = (sy / x if x != 0.0 else 1.0) * (sz / w if w != 0.0 else 1.0)
-        sy, cy = sy * turn_y + cy * step_y, cy * turn_y - sy * step_y
-        sz, cz = sz * turn_z + cz * step_z, cz * turn_z - sz * step_z
+    y, z = y if abs(y) > TINY else 0.0, z if abs(z) > TINY else 0.0
+    for axis, angle in ((0, spacing * y), (2, spacing * z)):
+        sine, cosine, turn_sine, turn_cosine = 0.0, 1.0, np.sin(angle), np.cos(angle)
+        for k in range(turns.shape[1]):
+            turns[axis, k], turns[axis + 1, k] = sine, cosine
+            sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
+    for low in range(0, len(response), turns.shape[1]):
+        f = first + low * spacing
+        sy, cy, sz, cz = np.sin(f * y), np.cos(f * y), np.sin(f * z), np.cos(f * z)
+        for k in range(min(turns.shape[1], len(response) - low)):
+            x, w = (f + k * spacing) * y, (f + k * spacing) * z
+            over_y = sy * turns[1, k] + cy * turns[0, k] if x != 0.0 else 1.0
+            over_z = sz * turns[3, k] + cz * turns[2, k] if w != 0.0 else 1.0
+            response[low + k] = over_y * over_z / ((x if x != 0.0 else 1.0) * (w if w != 0.0 else 1.0))
 
 
 @compiled
@@ -140,24 +150,30 @@ def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int
     `apertures.element_directivity` of many directions at evenly spaced frequencies. The sines follow by turning,
     which keeps the relative precision of a small one.
     """
-    response = np.empty((len(across), bins))
+    response, turns = np.empty((len(across), bins)), np.empty((4, TURNS))
     for i in range(len(across)):
-        _face_response(across[i], up[i], first, spacing, response[i])
+        _face_response(across[i], up[i], first, spacing, turns, response[i])
     return response
+
+
+@compiled(fastmath=True, forceinline=True)
+def _mean_square(values: Any, share: Any) -> Any:
+    total = 0.0
+    for k in range(len(values)):
+        total += share[k] * values[k] * values[k]
+    return total
 
 
 @compiled
 def match(beams: Any, across: Any, up: Any, first: float, spacing: float, share: Any, matched: Any, out: Any) -> None:
     """Write beams (beam, bin) times `face_responses`, over their root mean square by share (bin,), and times matched
     (bin,), into out (beam, bin)."""
-    face = np.empty(beams.shape[1])
+    face, turns = np.empty(beams.shape[1]), np.empty((4, TURNS))
     for b in range(beams.shape[0]):
-        _face_response(across[b], up[b], first, spacing, face)
-        power = 0.0
+        _face_response(across[b], up[b], first, spacing, turns, face)
+        scale = 1.0 / np.sqrt(_mean_square(face, share))
         for k in range(beams.shape[1]):
-            power += share[k] * face[k] * face[k]
-        for k in range(beams.shape[1]):
-            out[b, k] = beams[b, k] * (face[k] / np.sqrt(power) * matched[k])
+            out[b, k] = beams[b, k] * (face[k] * scale * matched[k])
 
 
 @compiled
