@@ -13,7 +13,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints, evenly
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
-from sonarsynth.planning.choosing import pressures
+from sonarsynth.planning.measured.sampled_arrivals import pressures
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import DirectSum, GriddedSynthesis

@@ -14,7 +14,7 @@ from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.pipeline import BeamformedFrame, cloud_of, digitise, locate_and_image
 from sonarsynth.planning import frame_start, receiver_of, survey_of
-from sonarsynth.planning.choosing import pressures
+from sonarsynth.planning.measured.sampled_arrivals import pressures
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import Signals
 from sonarsynth.validation.run_time import timed

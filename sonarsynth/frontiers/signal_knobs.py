@@ -18,7 +18,7 @@ from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.pipeline.frame_reverberation import frame_reverberation, with_reverberation
 from sonarsynth.planning import Plan, frame_start
-from sonarsynth.planning.choosing import pressures
+from sonarsynth.planning.measured.sampled_arrivals import pressures
 from sonarsynth.products import Signals
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe.scene import Frame

@@ -26,7 +26,7 @@ from sonarsynth.frontiers.exact_frame import (
 )
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.planning import Plan, arrivals_of, frame_start
-from sonarsynth.planning.choosing import pressures
+from sonarsynth.planning.measured.sampled_arrivals import pressures
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Straight
 from sonarsynth.receiver.subarrays import Subarray, subarrays

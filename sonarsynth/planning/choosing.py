@@ -17,13 +17,11 @@ from sonarsynth.conventions import Floats, Ints, evenly
 from sonarsynth.description.method import Demand
 from sonarsynth.planning import kept_choices
 from sonarsynth.planning.choices import OF_BEAMS, OWN_VIEW, Choices
-from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.image_errors import beamformer
 from sonarsynth.planning.measured.ray_bending import ranging_error
-from sonarsynth.planning.measured.sampled_arrivals import sampled_arrivals
+from sonarsynth.planning.measured.sampled_arrivals import pressures, sampled_arrivals
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Errors, Plan
-from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.subarrays import subarray, subarrays
 from sonarsynth.recipe import Accuracy
@@ -36,6 +34,8 @@ FAINT, SYNTHESIS, EXPANSION = 0.1, 0.4, 0.5
 """Shares of the square of the error allowed to signals: of paths left out, of the synthesis, of expansions."""
 HEARD_AT = 6
 """Hydrophones that are traced by themselves to measure what expansions err by."""
+SEEN_AT = 64
+"""Hydrophones, at most, whose views of the targets are compared with that of the middle of the array."""
 MEASURED = 3
 """Frames of a dataset that expansions are measured in."""
 SAFETY = 1.25
@@ -166,6 +166,8 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
     first = min(physics.subarrays, count) if physics.subarrays != "auto" else 1
     enough = np.inf if fixed else allowed
     undivided = error = _worst(measures, first, seeing, enough)
+    if seeing == "centre" and physics.occlusion == "auto" and first == 1 and error <= allowed:
+        undivided = error = max(error, *(measure.own_views() for measure in measures))
     unseen = plan.recipe.sequences > len(measures)  # in which another body may stand in the way
     if seeing == "centre" and physics.occlusion == "auto" and (error > allowed or unseen):
         better = _worst(measures, first, "sensors", enough)
@@ -267,28 +269,27 @@ class PerSensorReference:
         errors = [float(np.linalg.norm(a - b)) for a, b in zip(received, self.exact, strict=True)]
         return max((e / size for e, size in zip(errors, sizes, strict=True) if size > 0.0), default=0.0)
 
+    def own_views(self) -> float:
+        """Error of signals, relative, where the middle of the array sees targets for all hydrophones: at `SEEN_AT` of
+        them, since the shadow of a limb may cross a part of the array alone."""
+        plan = replace(self.plan, choices=replace(self.plan.choices, occlusion="sensors"))
+        rows = heard_at(plan.elements, SEEN_AT)
+        seen = sampled_arrivals(plan, self.frame).for_sensors(rows, plan.elements.count)
+        if not seen.occluded.any():
+            return 0.0
+        few = plan.elements.select(rows)
+        own, middle = (pressures(plan, self.frame, a, few, _measuring(plan)) for a in (seen, seen.seen_from_centre))
+        sizes = [(float(np.linalg.norm(a - b)), float(np.linalg.norm(a))) for a, b in zip(own, middle, strict=True)]
+        return max((error / size for error, size in sizes if size > 0.0), default=0.0)
 
-def heard_at(elements: Elements) -> Ints:
+
+def heard_at(elements: Elements, most: int = HEARD_AT) -> Ints:
     """Live hydrophones spread through an array, by golden ratio, ascending."""
     live = np.flatnonzero(elements.gain)
-    count = min(HEARD_AT, len(live))
+    count = min(most, len(live))
     return np.unique(live[np.floor(np.mod((np.arange(count) + 0.5) * 0.6180339887498949, 1.0) * len(live)).astype(int)])
 
 
 def _measuring(plan: Plan) -> Synthesis:
     """The synthesis that measures."""
     return deposit_for(DEGREE_TOLERANCE * plan.recipe.accuracy.cheap)
-
-
-def pressures(
-    plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: Synthesis
-) -> tuple[Floats, Floats]:
-    """Echoes and direct arrivals (sensor, sample) in Pa, each by itself, of given arrivals."""
-    start, samples = frame_start(plan, frame), plan.windows.samples
-    sonar, snaps = plan.scene.sonar, frame.moment.snaps
-    received = []
-    for mask in (~arrivals.direct, arrivals.direct):
-        arguments = arrivals.select(mask), snaps, elements, sonar, plan.absorption, start, samples
-        unrounded = getattr(method, "pressure", None)
-        received.append(unrounded(*arguments)[0] if unrounded is not None else method.signals(*arguments).pressure)
-    return np.asarray(received[0], float), np.asarray(received[1], float)

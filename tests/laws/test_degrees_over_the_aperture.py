@@ -87,6 +87,9 @@ def test_fainter_echoes_are_kept_before_the_array_is_cut(monkeypatch: pytest.Mon
         def error(self, parts: int, occlusion: str = "centre", faint: float = 1.0) -> float:
             return float(np.hypot(7e-4 * np.sqrt(faint), 1e-4 / parts**2))
 
+        def own_views(self) -> float:
+            return 0.0
+
     monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index: Measured()))
     plan = planning.plan(reading.recipe_of(reading.read(TANK, ["accuracy.signal=1e-3"])), products=())
     cut = choosing._subarrays(plan, [0])
@@ -102,6 +105,9 @@ def test_occlusion_that_matters_where_it_was_measured_is_followed_where_it_was_n
     class Measured:
         def error(self, parts: int, occlusion: str = "centre", faint: float = 1.0) -> float:
             return {"centre": 6e-4, "sensors": 3e-4}[occlusion]
+
+        def own_views(self) -> float:
+            return 0.0
 
     monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index: Measured()))
     plan = planning.plan(reading.recipe_of(reading.read(TANK, [f"repeats={sequences}"])), products=())

@@ -1,4 +1,4 @@
-"""The arrivals of a frame by the methods of its plan, at the whole array or at a part of it."""
+"""The arrivals of a frame by the methods of its plan, at the whole array or a part of it; and what is heard there."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
+from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Arrivals
 from sonarsynth.randomness import stream
-from sonarsynth.receiver import Sonar
+from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.receiver.subarrays import Subarray
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals import Synthesis
 from sonarsynth.state import FrameContext, Receiver, Survey, Tolerances
 from sonarsynth.tracing.arrivals import trace
 
@@ -94,3 +97,17 @@ def survey_of(plan: Plan, frame: Frame) -> Survey:
 def subarray_pose(pose: Pose, subarray: Subarray) -> Pose:
     """The pose of a part of an array that has a pose."""
     return Pose(pose.to_world(subarray.centre[None, :])[0], pose.orientation)
+
+
+def pressures(
+    plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: Synthesis
+) -> tuple[Floats, Floats]:
+    """Echoes and direct arrivals (sensor, sample) in Pa, each by itself, of given arrivals."""
+    start, samples = frame_start(plan, frame), plan.windows.samples
+    sonar, snaps = plan.scene.sonar, frame.moment.snaps
+    received = []
+    for mask in (~arrivals.direct, arrivals.direct):
+        arguments = arrivals.select(mask), snaps, elements, sonar, plan.absorption, start, samples
+        unrounded = getattr(method, "pressure", None)
+        received.append(unrounded(*arguments)[0] if unrounded is not None else method.signals(*arguments).pressure)
+    return np.asarray(received[0], float), np.asarray(received[1], float)
