@@ -207,6 +207,27 @@ def test_many_echoes_of_one_sign_keep_the_error_of_each(seed: int) -> None:
     assert np.abs(fast - exact).max() < deposit_error(method) * np.abs(exact).max()
 
 
+@pytest.mark.parametrize(("seed", "tolerance"), [(59, 1e-3), (35, 7e-4), (59, 3e-4)])
+def test_paths_of_one_sign_at_few_hydrophones_keep_the_bound(seed: int, tolerance: float) -> None:
+    """Errors of paths do not come at random there, and add up: of 60 such sets these err most."""
+    rng = np.random.default_rng(seed)
+    count, pitch, columns, rows = rng.integers(50, 900), rng.uniform(0.02, 0.08), rng.integers(3, 8), rng.integers(3, 6)
+    place = pitch * (np.mgrid[0:columns, 0:rows].reshape(2, -1).T - 0.5 * (np.array([columns, rows]) - 1))
+    array = elements(PositionTable(positions=tuple((0.0, *p) for p in place.tolist()), face=min(0.05, pitch)))
+    ahead, size = rng.uniform(3, 12), rng.uniform(0.1, 0.5, 3)
+    points = np.array([ahead, *(ahead * rng.uniform(-0.3, 0.3, 2))]) + rng.uniform(-0.5, 0.5, (count, 3)) * size
+    source = np.array([rng.uniform(1, ahead), rng.uniform(-4, 4), -3.0])
+    radius, out = np.linalg.norm(points, axis=1), np.linalg.norm(points - source, axis=1)
+    delay = (radius + out) / C
+    found = arrivals(delay, points, radius, 1.0 / (radius * out))
+    found = replace(found, expansion=ArrayExpansion.none(count, array.aperture))
+    start, samples = delay.min() - 0.4 / C, int((np.ptp(delay) + 0.8 / C) * 196e3) + 200
+    method = GriddedSynthesis(width=8, tolerance=tolerance)
+    exact, _ = exact_signals(found, SNAPS, array, SONAR, None, start, samples)
+    fast, _ = method.pressure(found, SNAPS, array, SONAR, None, start, samples)
+    assert np.abs(fast - exact).max() < deposit_error(method) * np.abs(exact).max()
+
+
 @pytest.mark.parametrize(("low", "width", "transition"), [(1e3, 100.0, 5e3), (5e3, 200.0, 1e3), (60e3, 500.0, 5e3)])
 @pytest.mark.parametrize("count", [1, 100])
 def test_what_a_narrow_filter_leaks_is_heard(low: float, width: float, transition: float, count: int) -> None:
