@@ -22,9 +22,7 @@ class Mesh:
     faces: npt.NDArray[np.int32]  # (facet, 3)
     notes: tuple[str, ...] = ()  # what was repaired on reading, or how fine the surface is; one line each
     flat: Bools | None = None  # (facet,) known to be flat in the body itself, so that no finer mesh is nearer to it
-    original: tuple[Mesh, float] | None = (
-        None  # the mesh that it is a larger or smaller copy of, so many times as large
-    )
+    original: tuple[Mesh, float] | None = None  # the mesh that it is a copy of, and how many times as large it is
 
     @property
     def corners(self) -> Floats:

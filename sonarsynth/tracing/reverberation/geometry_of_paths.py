@@ -113,8 +113,12 @@ def _reflected(medium: Medium, path: UnfoldedPaths, sine: Floats, frequency: flo
 def _with_own_image(
     medium: Medium, own: str, sine: Floats, frequency: float, sent: Floats | float, mirrored: Floats | float
 ) -> Floats:
-    """Root of the energy (point,) that a source on a boundary and its image at the same place send: sent and V times
-    what it sends the mirrored way, in phase as far as roughness leaves the reflection so."""
+    """Root of the energy (point,) that a source on a boundary, `own`, and its image at the same place send to points.
+
+    sent, mirrored (point,): amplitude of the source that way, and the other way up, which the boundary reflects by V at
+    the sine of the grazing angle (point,) and frequency (Hz). Both are in phase as far as roughness leaves the
+    reflection so: sent^2 + |V mirrored|^2 + 2 sent Re(V mirrored) exp(-(2 pi f delay_std)^2/2), Eckart (1953).
+    """
     boundary: SeaSurface | SeaBottom = getattr(medium.environment, own)
     grazing = np.arcsin(np.minimum(sine, 1.0))
     image = coefficient(boundary, grazing, frequency) * mirrored

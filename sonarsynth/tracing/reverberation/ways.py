@@ -61,8 +61,8 @@ def ways(
     above, between, below = mean(np.zeros(end.shape), top), mean(top, low), mean(low, bottom)
     for image in images(begin, end, bottom_depth, bounces):
         falls = image.climb * image.turns < 0.0
-        outwards = image.climb > 0.0 if own == "surface" else image.climb < 0.0
-        if own and outwards.any():
+        into_it = image.climb > 0.0 if own == "surface" else image.climb < 0.0
+        if own and into_it.any():
             continue
         both = own if image.surface + image.bottom < bounces else ""
         if (owner == "bottom" and not falls.all()) or (owner == "surface" and (falls | (image.climb == 0.0)).any()):
