@@ -15,73 +15,20 @@ Recipes are written in YAML or with the classes below; these are looked up when 
 from __future__ import annotations
 
 import importlib
+import re
 from typing import Any
 
-_HOMES = {
-    "export": "points",
-    "description": "FieldError",
-    "detection": "CellAveraging Detections ImagePeaks detect",
-    "environment.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBottom SeaSurface Sediment",
-    "environment.noise": "FlatNoise KnudsenNoise RainNoise TabulatedNoise ThermalNoise WenzNoise WindNoise",
-    "environment.noise.recorded_noise": "RecordedNoise",
-    "environment.noise.directions": (
-        "BottomDirections IsotropicDirections OneDirection RingDirections SurfaceDirections"
-    ),
-    "environment.sea": (
-        "Absorption Cast Catenary Environment Isovelocity Linear Munk Tabulated TemperatureSalinity Thermocline"
-    ),
-    "evaluation": "DetectorReport evaluate",
-    "geometry.hovering": "Hover",
-    "geometry.motion": "Circle ConstantVelocity Line RecordedTrack Still Waypoint Waypoints",
-    "imaging": "DenseDelayAndSum FocusedDelayAndSum",
-    "loading.moved_sources": "with_sources",
-    "pictures": "show",
-    "pictures.preview_figures.preview_pictures": "preview",
-    "pictures.ray_pictures": "rays",
-    "pictures.snap_pictures": "snap",
-    "pictures.soundscape_figures.soundscape_pictures": "soundscape",
-    "pipeline": "render",
-    "planning": "Plan plan",
-    "propagation": "AutoTracing Refracted Straight",
-    "propagation.eigenrays": "RayArrivals eigenrays eigenrays_between",
-    "propagation.ray_request": "EigenrayRequest RayRequest",
-    "ranging": (
-        "AutoPlacing BeamAxis FirstEcho IsovelocityPlacing Peaks RefractedPlacing SensorDelays WavefrontCancelling"
-    ),
-    "receiver": (
-        "Band BandPass BeamGrid Converter Electronics LowPass Overload PlanarLattice PositionTable Romanis "
-        "SensorErrors Sonar"
-    ),
-    "recipe": "Accuracy Axis Choice Integers LogUniform Normal Recipe Sobol Splits Zip Uniform",
-    "recipe.populations.drawn_tracks": "AnyOrientation AtRest Hovering StraightAhead Upright Wandering",
-    "recipe.populations.population": "BodyModel Population",
-    "recipe.populations.regions": "Annulus BoxRegion FieldOfView PolygonRegion",
-    "recipe.variation.random_variations": "Condition",
-    "recipe.reading": "RecipeError dump load loads schema",
-    "recipe.scene": "EchoWindow Physics Processing Scene Trajectory World",
-    "scattering": "Isotropic Kirchhoff MirrorLobe PartlyReflecting",
-    "schedule": "BuildReport build",
-    "schedule.repairing": "RepairReport repair",
-    "signals": "AutoSynthesis DirectSum GriddedSynthesis",
-    "sources.noise_source": "NoiseRecording NoiseSource",
-    "sources.shrimp": "LogarithmicBubble SnappingShrimp",
-    "sources.snap_models": "Gabor KellerMiksis RecordedSnap Ricker SnapVariation",
-    "store": "verify",
-    "targets.relief": "Relief",
-    "targets.shapes": "Box Cylinder Knots LShape MeshFile Myring Remus100 School Sphere",
-    "targets.target": "Target",
-    "targets.target_strength": "target_strength",
-}
-_HOME = {name: (home, name) for home, names in _HOMES.items() for name in names.split()}
-_HOME |= {"accuracy": ("frontiers", "measure"), "card": ("store.cards", "write"), "open": ("loading", "open")}
+with open(f"{__file__}i", encoding="utf-8") as _stub:  # which names the home of each export for type checkers too
+    _IMPORTS = re.findall(r"^from sonarsynth\.(\S+) import (\([^)]*\)|.*)", _stub.read(), re.MULTILINE)
+_HOMES = {exported: (home, name) for home, names in _IMPORTS for name, exported in re.findall(r"(\w+) as (\w+)", names)}
 
-__all__ = sorted(_HOME)  # noqa: PLE0605  the stub beside this file has the names for type checkers
+__all__ = sorted(_HOMES)  # noqa: PLE0605
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
+    if name not in _HOMES:
         raise AttributeError(f"module 'sonarsynth' has no attribute '{name}'")
-    home, attribute = _HOME[name]
+    home, attribute = _HOMES[name]
     return globals().setdefault(name, getattr(importlib.import_module(f"sonarsynth.{home}"), attribute))
 
 
