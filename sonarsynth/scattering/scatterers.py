@@ -80,6 +80,13 @@ class Scatterers:
         return np.asarray(0.5 * (self.position.min(axis=0) + self.position.max(axis=0)))
 
     @property
+    def radius(self) -> float:
+        """m: of a body, as of its mesh; else from the middle to the farthest element."""
+        if self.mesh is not None:
+            return self.mesh.radius
+        return float(np.linalg.norm(self.position - self.middle, axis=1).max(initial=0.0))
+
+    @property
     def offset(self) -> float:
         """m: size of the body that they lie on; 0 of those that hide nothing."""
         return 0.0 if self.mesh is None else self.mesh.radius

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET, depth
-from sonarsynth.geometry.motion import Track
+from sonarsynth.conventions import NO_TARGET
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Emission, FrameContext
@@ -19,7 +18,7 @@ from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.expansion.amplitude_polynomials import fitted
 from sonarsynth.tracing.expansion.aperture_paths import aperture_paths
 from sonarsynth.tracing.facet_paths import FacetPaths, facet_paths, facet_paths_at_rest
-from sonarsynth.tracing.meetings import hearing_times, occasions
+from sonarsynth.tracing.meetings import meetings, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
 from sonarsynth.tracing.path_absorption import path_loss
 from sonarsynth.tracing.receive_paths import Starts, rays_to_centre
@@ -57,15 +56,20 @@ def trace_each(
     else:
         found = [[] for _ in own]
         begun = set[int]()
-        for group in occasions(context, moving, propagation.bounces):
+        times = meetings(context, moving, propagation.bounces)
+        for group in occasions(context, times):
             moved = replace(context, bodies=group.bodies, receiver=replace(receiver, pose=group.meeting.sonar.pose))
-            lights = tuple(snaps[index] for index in group.snaps) if group.direct else None
-            array = facet_paths(moved, propagation.reflected(group.bounces), group.owners, lights)
-            array = replace(array, propagation=propagation, meeting=group.meeting, ways=group.ways)
+            lights = None if group.reflected else tuple(snaps[index] for index in group.snaps)
+            array = facet_paths(moved, propagation.reflected(group.bounces), group.owners, lights, group.ways)
+            array = replace(array, propagation=propagation, meeting=group.meeting)
             for of, own_blocks in zip(own, found, strict=True):
                 together = [index for index in group.snaps if index in of]
                 new = [index for index in together if group.direct and index not in begun]
-                own_blocks.extend(_direct(_hearing(array, snaps[index], moving), index) for index in new)
+                own_blocks.extend(
+                    _direct(_hearing(array, meeting), index, ways)
+                    for index in new
+                    for ways, meeting in times.heard(index)
+                )
                 own_blocks.extend(_echoes(array, together))
             begun |= set(group.snaps if group.direct else ())
     speed = receiver.speed(context.medium)
@@ -73,13 +77,10 @@ def trace_each(
     return [of.but(snap=of.snap - first) for of, first in zip(every, last, strict=False)]
 
 
-def _hearing(array: FacetPaths, snap: Emission, sonar: Track) -> FacetPaths:
+def _hearing(array: FacetPaths, meeting: Meeting) -> FacetPaths:
     """The array where it hears a snap itself."""
-    speed = float(array.context.medium.profile.at(depth(sonar.pose.position)))
-    arrival_time = float(hearing_times(snap.position, np.asarray(snap.time), sonar, speed))
-    track = sonar.later(arrival_time)
-    context = replace(array.context, receiver=replace(array.context.receiver, pose=track.pose))
-    return replace(array, context=context, meeting=Meeting(np.zeros(0), arrival_time, track))
+    context = replace(array.context, receiver=replace(array.context.receiver, pose=meeting.sonar.pose))
+    return replace(array, context=context, meeting=meeting)
 
 
 def _echoes(array: FacetPaths, snaps: Iterable[int]) -> list[Arrivals]:
@@ -95,11 +96,12 @@ def _echoes(array: FacetPaths, snaps: Iterable[int]) -> list[Arrivals]:
     return blocks
 
 
-def _direct(array: FacetPaths, index: int) -> Arrivals:
-    """Emission `index` to array, where no body stands in between that sound does not pass."""
+def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) -> Arrivals:
+    """Emission `index` to array, by some families (None: all), where no body stands in between that sound does not
+    pass."""
     context, meeting = array.context, array.meeting
     medium, receiver, snap = context.medium, context.receiver, context.snaps[index]
-    legs = rays_to_centre(medium, snap.position[None, :], receiver, array.propagation)
+    legs = rays_to_centre(medium, snap.position[None, :], receiver, array.propagation).by(ways)
     legs = legs.select(np.flatnonzero(directed(snap, legs.departure)[0] * legs.spreading))
     view = array.view(blocking_bodies(context, snap.position))
     legs = view.visible(legs, Starts(legs.point))

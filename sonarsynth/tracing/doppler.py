@@ -41,6 +41,9 @@ from sonarsynth.tracing.expansion.probe_sensors import probes, sphere
 from sonarsynth.tracing.receive_paths import ReceivePaths
 from sonarsynth.tracing.transmit_paths import TransmitPaths
 
+Ways = tuple[tuple[int, int], ...]
+"""Families (`images.family`) by which sound comes to what scatters, each with one by which it goes on to the array."""
+
 
 @dataclass(frozen=True, eq=False)
 class Meeting:

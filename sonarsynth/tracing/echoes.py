@@ -14,7 +14,6 @@ from sonarsynth.equations.kernels.unit_vectors import to_moved_images
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind
-from sonarsynth.propagation.images import family
 from sonarsynth.propagation.reflections import reflections
 from sonarsynth.scattering import Component
 from sonarsynth.scattering.facet_geometry import PulseResponse
@@ -186,6 +185,11 @@ def _found(array: FacetPaths, snap: Emission, components: tuple[tuple[Component,
     """All echoes of a snap from the facets of the legs."""
     out, fronts = _ways(array, snap), array.fronts
     way, leg = path_pairs(out, array.legs, len(array.facets.facet), array.propagation.bounces)
+    if array.ways is not None:
+        wanted = np.zeros((2 * array.propagation.bounces + 1,) * 2, bool)
+        wanted[tuple(np.transpose(array.ways))] = True
+        some = np.flatnonzero(wanted[out.family[way], array.legs.family[leg]])
+        way, leg = np.arange(len(out.facet))[way][some], leg[some]
     out, carried = out.select(way), None
     if array.meeting is not None:
         out, carried = _carried(array, snap, out, leg)
@@ -237,7 +241,7 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     out = TransmitPaths.of(paths, bounced, row[paths.pair], snap, float(medium.profile.at(depth(snap.position))))
     out = out.select(picked(out.spreading != 0.0)).merged()
     if array.ways is not None:
-        out = out.select(np.isin(family(out.surface, out.bottom, out.arrival[:, 2] < 0.0), array.ways))
+        out = out.select(np.isin(out.family, [way for way, _ in array.ways]))
     own = facets.clear_of_own(bodies, out.facet, -out.arrival)
     out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet), own)))
     for number, before in overlapping(bodies):

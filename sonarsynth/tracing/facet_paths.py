@@ -17,7 +17,7 @@ from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Kind
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
-from sonarsynth.tracing.doppler import Meeting
+from sonarsynth.tracing.doppler import Meeting, Ways
 from sonarsynth.tracing.expansion.aperture_paths import AperturePaths, ExpansionSource, expansion_source
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion
 from sonarsynth.tracing.receive_paths import (
@@ -49,7 +49,7 @@ class FacetPaths:
     first: int = 0  # of the legs, in the wavefronts
     owners: tuple[int, ...] | None = None  # of the facets; None: all
     meeting: Meeting | None = None  # when bodies and array are where they are here; None: nothing moves
-    ways: tuple[int, ...] | None = None  # families, as of `images.family`, by which snaps light them; None: all
+    ways: Ways | None = None  # by which snaps light them and they are heard; None: all
 
     @property
     def fronts(self) -> AperturePaths:
@@ -140,9 +140,11 @@ def facet_paths(
     propagation: Propagation,
     owners: tuple[int, ...] | None = None,
     snaps: tuple[Emission, ...] | None = None,
+    ways: Ways | None = None,
 ) -> FacetPaths:
     """Facet to array, for every surface element, or those of some owners, that leaves a ray for the array that no body
-    hides. Of no others than some `snaps` may light (None: any), where that is known of straight, unreflected rays.
+    hides, by some ways or all. Of no others than some `snaps` may light (None: any), where that is known of straight,
+    unreflected rays.
 
     Raises ValueError for a body or an array that reaches out of the water.
     """
@@ -154,6 +156,7 @@ def facet_paths(
     columns: tuple[list[ReceivePaths], list[Facets]] = [], []
     count = 0
     straight = propagation.layered and not propagation.bounces and medium.profile.uniform
+    families = None if ways is None else {on for _, on in ways}
     lights = [snap.position for snap in (context.snaps if snaps is None else snaps) if snap.illuminates]
 
     def chosen(number: int, rows: Ints) -> Ints:
@@ -171,7 +174,7 @@ def facet_paths(
         if propagation.layered and not straight:
             facing = may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack)
             every = every.select(picked(facing))
-        leaving = receive_paths(every, medium, receiver, propagation, slack)
+        leaving = receive_paths(every, medium, receiver, propagation, slack).by(families)
         leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
         first = np.diff(leaving.row, prepend=-1) > 0
         reached = leaving.row[first]
@@ -180,7 +183,7 @@ def facet_paths(
         count += len(reached)
     legs, facets = concatenate(columns[0]), concatenate(columns[1])
     over = expansion_source(legs, facets.owner[legs.row], bent, receiver, propagation)
-    return FacetPaths(legs, over, facets, context, propagation, owners=owners)
+    return FacetPaths(legs, over, facets, context, propagation, owners=owners, ways=ways)
 
 
 def bending(medium: Medium, propagation: Propagation, receiver: Receiver) -> Medium:

@@ -2,15 +2,16 @@
 
 A body that moves is met elsewhere by each snap, and an array that moves hears the echoes of each body elsewhere. Snaps
 and bodies for which that is nearly the same are traced together; by what is left paths are carried (`tracing.doppler`).
-A body that turns shows another side to what comes later by surface and bottom: these families are traced with it as it
-has turned by then.
+A body that turns shows another side to what comes later by surface and bottom, and an array that turns hears that as it
+stands by then: these families are traced with both as they have turned.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation.images import lengths
 from sonarsynth.state import Emission, FrameContext, meeting_times, positions
-from sonarsynth.tracing.doppler import Meeting
+from sonarsynth.tracing.doppler import Meeting, Ways
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,15 +31,20 @@ class TracingGroup:
 
     snaps: tuple[int, ...]
     owners: tuple[int, ...]  # index into `FrameContext.scattering`
-    ways: tuple[int, ...] | None  # families (`images.family`) by which sound comes to them; None: all
+    ways: Ways | None  # None: all
     bounces: int  # reflections, at most, of what goes on from there
     bodies: tuple[PlacedTarget, ...]  # all of them, where the sound meets them
     meeting: Meeting
 
     @property
     def direct(self) -> bool:
-        """Whether the family without reflections is among the ways."""
-        return self.ways is None or 0 in self.ways
+        """Whether what is not reflected is among the ways."""
+        return self.ways is None or (0, 0) in self.ways
+
+    @property
+    def reflected(self) -> bool:
+        """Whether sound comes to them by reflections: families are picked, and others than the direct one."""
+        return self.ways is not None and any(out for out, _ in self.ways)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,45 +54,68 @@ class MeetingTimes:
     bodies: tuple[PlacedTarget, ...]
     sonar: Track
     met: Floats  # (family, snap, owner) s
-    arrival_time: Floats  # (family, snap, owner) s
+    arrival_time: Floats  # (family, family on, snap, owner) s
+    direct_time: Floats  # (family, snap) s: when the array hears the snap itself
+    bounces: int  # of a path, at most
     shared: float
     wavenumber: float  # rad/m at the highest frequency
     aperture: float  # m
 
-    def classes(self, snap: int) -> list[tuple[tuple[int, ...], tuple[int, ...] | None]]:
+    def classes(self, snap: int) -> list[tuple[tuple[int, ...], Ways | None]]:
         """Owners, ascending, whose echoes of a snap the array hears at about one place, and the ways by which its sound
-        meets them in about one attitude."""
-        ways, groups = [self._ways(snap, owner) for owner in range(self.met.shape[2])], []
+        meets them, and they the array, in about one attitude."""
+        ways, found = [self._ways(snap, owner) for owner in range(self.met.shape[2])], []
         for alike in dict.fromkeys(ways):
             for families in alike:
                 arrival_time = self.when(snap, families)[1]
+
+                def near(first: int, n: int, times: Floats = arrival_time) -> bool:
+                    return self._array_near(self.sonar.later(float(times[first])), float(times[n] - times[first]))
+
                 waiting = [n for n in np.argsort(arrival_time, kind="stable").tolist() if ways[n] == alike]
-                while waiting:
-                    first = float(arrival_time[waiting[0]])
-                    track = self.sonar.later(first)
-                    near = [n for n in waiting if self._array_near(track, float(arrival_time[n]) - first)]
-                    groups.append((tuple(sorted(near)), families))
-                    waiting = [n for n in waiting if n not in near]
-        return groups or [((), None)]
+                found += [(tuple(sorted(of)), families) for of in groups(waiting, near)]
+        return found or [((), None)]
 
-    def _ways(self, snap: int, owner: int) -> tuple[tuple[int, ...] | None, ...]:
-        """Families by which the sound of a snap meets an owner, those together that meet it in about one attitude."""
-        if owner >= len(self.bodies) or (body := self.bodies[owner]).track.straight:
+    def _ways(self, snap: int, owner: int) -> tuple[Ways | None, ...]:
+        """Ways by which the sound of a snap meets an owner, and that the array, those together that meet both in about
+        one attitude."""
+        body = self.bodies[owner] if owner < len(self.bodies) else None
+        if self.sonar.straight and (body is None or body.track.straight):
             return (None,)
-        met, groups = self.met[:, snap, owner], []
-        waiting = np.argsort(met, kind="stable").tolist()
-        while waiting:
-            first = float(met[waiting[0]])
-            track = body.track.later(first)
-            near = [n for n in waiting if self._goes_on(track, float(met[n]) - first, body.mesh.radius)]
-            groups.append(tuple(sorted(near)))
-            waiting = [n for n in waiting if n not in near]
-        return tuple(groups) if len(groups) > 1 else (None,)
+        met, arrival_time = self.met[:, snap, owner], self.arrival_time[:, :, snap, owner]
 
-    def when(self, snap: int, ways: tuple[int, ...] | None) -> tuple[Floats, Floats]:
+        def near(first: tuple[int, int], pair: tuple[int, int]) -> bool:
+            heard = self._alike(self.sonar, float(arrival_time[first]), float(arrival_time[pair]), self.aperture)
+            times = float(met[first[0]]), float(met[pair[0]])
+            return heard and (body is None or self._alike(body.track, *times, body.mesh.radius))
+
+        order = [divmod(n, len(met)) for n in np.argsort(arrival_time, axis=None, kind="stable").tolist()]
+        found = [tuple(sorted(of)) for of in groups(order, near) if not self.every.isdisjoint(of)]
+        return tuple(found) if len(found) > 1 else (None,)
+
+    @property
+    def every(self) -> frozenset[tuple[int, int]]:
+        """The ways of no more reflections than a path may have."""
+        number = range(len(self.met))
+        pairs = [(out, on) for out in number for on in number if (out + 1) // 2 + (on + 1) // 2 <= self.bounces]
+        return frozenset(pairs)
+
+    def heard(self, snap: int) -> list[tuple[tuple[int, ...] | None, Meeting]]:
+        """Families by which the array hears a snap itself in about one attitude, None for all of them, and where."""
+        times = self.direct_time[:, snap].tolist()
+        order = np.argsort(times, kind="stable").tolist()
+        found = list(groups(order, lambda first, n: self._alike(self.sonar, times[first], times[n], self.aperture)))
+        at = [Meeting(np.zeros(0), times[of[0]], self.sonar.later(times[of[0]])) for of in found]
+        return [(tuple(of) if len(found) > 1 else None, meeting) for of, meeting in zip(found, at, strict=True)]
+
+    def _alike(self, track: Track, first: float, time: float, size: float) -> bool:
+        """Whether what is `size` m large is, at a time (s), where its velocity and spin at the first bring it."""
+        return track.straight or self._goes_on(track.later(first), time - first, size)
+
+    def when(self, snap: int, ways: Ways | None) -> tuple[Floats, Floats]:
         """When the first sound of a snap by some ways meets each owner (owner,), and when the array hears that (s)."""
-        some = [0] if ways is None else list(ways)
-        return self.met[some, snap].min(axis=0), self.arrival_time[some, snap].min(axis=0)
+        out, on = zip(*(((0, 0),) if ways is None else ways), strict=True)
+        return self.met[out, snap].min(axis=0), self.arrival_time[out, on, snap].min(axis=0)
 
     def serves(self, occasion: TracingGroup, snap: int) -> bool:
         """Whether what is traced on an occasion serves another snap as well."""
@@ -122,6 +153,14 @@ class MeetingTimes:
         return float((off + size * np.linalg.norm(then.rotation.T - turned)) * self.wavenumber)
 
 
+def groups(waiting: list[T], near: Callable[[T, T], bool]) -> Iterator[list[T]]:
+    """All that wait, in their order: the first with what is near to it, then the first of the others."""
+    while waiting:
+        found = [n for n in waiting if n == waiting[0] or near(waiting[0], n)]
+        yield found
+        waiting = [n for n in waiting if n not in found]
+
+
 def family_times(
     tracks: Sequence[Track], snaps: tuple[Emission, ...], bottom_depth: float, bounces: int, speed: float
 ) -> Floats:
@@ -135,43 +174,56 @@ def family_times(
     return np.array([meeting_times(tracks, snaps, family) for family in families])
 
 
-def meetings(context: FrameContext, sonar: Track, bounces: int) -> MeetingTimes:
-    """By straight lines and, of up to so many reflections, their images; sonar: the track of the array."""
-    receiver, bottom_depth = context.receiver, context.medium.depth
+def meetings(context: FrameContext, sonar: Track, bounces: int, every: bool = False) -> MeetingTimes:
+    """By straight lines and, where anything turns or for `every` family of up to so many reflections, their images;
+    sonar: the track of the array."""
+    receiver, bottom_depth, snaps = context.receiver, context.medium.depth, context.snaps
     speed = float(context.medium.profile.at(depth(sonar.pose.position)))
     tracks = [surface.track.part(surface.middle) for surface in context.scattering]
-    met = family_times(tracks, context.snaps, bottom_depth, bounces, speed)
-    arrival_time = np.array([hearing_times(positions(tracks, of), of, sonar, speed) for of in met])
-    wavenumber = 2.0 * np.pi * receiver.band[1] / speed
-    return MeetingTimes(
-        context.bodies, sonar, met, arrival_time, context.tolerances.shared, wavenumber, receiver.elements.aperture
-    )
+    turns = not sonar.straight or any(not body.track.straight for body in context.bodies)
+    reflections = bounces if turns or every else 0
+
+    def heard(position: Floats, sent: Floats) -> Floats:
+        return hearing_times(position, sent, sonar, bottom_depth, reflections, speed)
+
+    met = family_times(tracks, snaps, bottom_depth, reflections, speed)
+    arrival_time = np.array([heard(positions(tracks, of), of) for of in met])
+    direct = heard(np.array([snap.position for snap in snaps]), np.array([snap.time for snap in snaps]))
+    wavenumber, aperture = 2.0 * np.pi * receiver.band[1] / speed, receiver.elements.aperture
+    shared = context.tolerances.shared
+    return MeetingTimes(context.bodies, sonar, met, arrival_time, direct, bounces, shared, wavenumber, aperture)
 
 
-def occasions(context: FrameContext, sonar: Track, bounces: int) -> list[TracingGroup]:
-    """Poses to trace the echoes of each snap from each body between; arguments as of `meetings`."""
-    bodies, turns = context.bodies, any(not body.track.straight for body in context.bodies)
-    times = meetings(context, sonar, bounces if turns else 0)
-    groups: list[TracingGroup] = []
+def occasions(context: FrameContext, times: MeetingTimes) -> list[TracingGroup]:
+    """Poses to trace the echoes of each snap from each body between."""
+    found: list[TracingGroup] = []
     for snap in range(len(context.snaps)):
         for owners, ways in times.classes(snap):
-            for number, group in enumerate(groups):
+            for number, group in enumerate(found):
                 if (group.owners, group.ways) == (owners, ways) and times.serves(group, snap):
-                    groups[number] = replace(group, snaps=(*group.snaps, snap))
+                    found[number] = replace(group, snaps=(*group.snaps, snap))
                     break
             else:
                 when, heard = times.when(snap, ways)
-                placed = tuple(body.later(late) for body, late in zip(bodies, when.tolist(), strict=False))
+                placed = tuple(body.later(late) for body, late in zip(context.bodies, when.tolist(), strict=False))
                 late = float(heard[list(owners)].mean()) if owners else 0.0
-                left = bounces - (min(ways) + 1) // 2 if ways else bounces
-                meeting = Meeting(when, late, sonar.later(late))
-                groups.append(TracingGroup((snap,), owners, ways, left, placed, meeting))
-    return groups
+                left = [(on + 1) // 2 for _, on in times.every.intersection(ways or ())]
+                meeting = Meeting(when, late, times.sonar.later(late))
+                found.append(TracingGroup((snap,), owners, ways, max(left, default=times.bounces), placed, meeting))
+    return found
 
 
-def hearing_times(position: Floats, sent: Floats, sonar: Track, speed: float) -> Floats:
-    """When an array on a track hears what was sent from places (..., xyz) m at times (...) s, by straight lines."""
-    arrival_time = sent
-    for _ in range(1 if sonar.still else 6):
-        arrival_time = sent + np.linalg.norm(sonar.positions(arrival_time) - position, axis=-1) / speed
-    return np.asarray(arrival_time)
+def hearing_times(
+    position: Floats, sent: Floats, sonar: Track, bottom_depth: float, bounces: int, speed: float
+) -> Floats:
+    """When an array on a track hears what was sent from places (..., xyz) m at times (...) s, by each family of up to
+    so many reflections (family, ...): by straight lines and their images, at one speed (m/s)."""
+    families, begin = [], position.reshape(-1, 3)
+    for number in range(2 * bounces + 1):
+        arrival_time = sent
+        for _ in range(1 if sonar.still else 6):
+            end = sonar.positions(arrival_time).reshape(-1, 3)
+            gone = lengths(begin, end, bottom_depth, bounces)[number] / speed
+            arrival_time = sent + gone.reshape(sent.shape)
+        families.append(arrival_time)
+    return np.array(families)

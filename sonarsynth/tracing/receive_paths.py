@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
@@ -18,6 +18,7 @@ from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Paths
+from sonarsynth.propagation.images import family
 from sonarsynth.propagation.reflections import Reflections, reflections
 from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Medium, Receiver
@@ -66,6 +67,15 @@ class ReceivePaths(Columns):
     def bounces(self) -> Ints:
         """(leg,) reflections from surface and bottom."""
         return np.asarray(self.surface + self.bottom)
+
+    @property
+    def family(self) -> Ints:
+        """(leg,) as `images.family`."""
+        return family(self.surface, self.bottom, self.departure[:, 2] < 0.0)
+
+    def by(self, families: Iterable[int] | None) -> ReceivePaths:
+        """The legs by some families (None: all)."""
+        return self if families is None else self.select(np.flatnonzero(np.isin(self.family, list(families))))
 
     def swerve(self, medium: Medium, receiver: Receiver, spread: Floats | float) -> Floats:
         """As `swerve`."""

@@ -11,6 +11,7 @@ from sonarsynth.columns import Columns, alike, picked
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind, Paths
 from sonarsynth.products.array_expansion import stacked
+from sonarsynth.propagation.images import family
 from sonarsynth.propagation.reflections import Reflections, as_sign
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Emission
@@ -73,6 +74,11 @@ class TransmitPaths(Columns):
     def bounces(self) -> Ints:
         """(way,) reflections from surface and bottom."""
         return np.asarray(self.surface + self.bottom)
+
+    @property
+    def family(self) -> Ints:
+        """(way,) as `images.family`."""
+        return family(self.surface, self.bottom, self.arrival[:, 2] < 0.0)
 
     @property
     def counted(self) -> Ints:

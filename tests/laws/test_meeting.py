@@ -121,20 +121,33 @@ def test_a_target_that_sound_would_meet_out_of_the_water_is_refused() -> None:
             check_frame(scene, frame)
 
 
-def reflected(motion):
+def reflected(motion, own=None):
     """A vehicle on a motion in 60 m of water, heard by four hydrophones with up to two reflections."""
     scene = moved(motion).scene
     environment = replace(scene.world.environment, depth=60.0)
     (shrimp,) = scene.world.sources
     world = replace(scene.world, environment=environment, sources=(replace(shrimp, position=(14.0, -5.0, -8.0)),))
     sonar = replace(scene.sonar, array=PlanarLattice(columns=2, rows=2, pitch=0.01))
-    return Recipe(scene=replace(scene, world=world, sonar=sonar, physics=Physics(tracing=AutoTracing(bounces=2))))
+    way = scene.trajectory if own is None else replace(scene.trajectory, sonar=own)
+    physics = Physics(tracing=AutoTracing(bounces=2))
+    return Recipe(scene=replace(scene, world=world, sonar=sonar, trajectory=way, physics=physics))
 
 
-@pytest.mark.parametrize("speed", [0.6, 1.4])
-def test_a_plan_says_by_how_much_signals_err_where_bodies_turn(speed: float) -> None:
+STAYS = Still(position=(20.0, 0.0, -4.5))
+
+
+@pytest.mark.parametrize(
+    ("body", "own"),
+    [
+        (Circle(centre=(20.0, 0.0, -4.5), radius=4.0, speed=0.6), None),
+        (Circle(centre=(20.0, 0.0, -4.5), radius=4.0, speed=1.4), None),
+        (STAYS, Circle(centre=(2.0, 0.0, -5.0), radius=2.0, speed=0.6, bearing=1.5 * np.pi)),
+        (STAYS, Hover(position=(0.0, 0.0, -5.0), heading=0.5 * np.pi, surge=0.5, phase=3.0)),
+    ],
+)
+def test_a_plan_says_by_how_much_signals_err_where_bodies_or_sonar_turn(body, own) -> None:
     """Beside each family traced for itself: no less than that, and no more than ten times as much."""
-    recipe = reflected(Circle(centre=(20.0, 0.0, -4.5), radius=4.0, speed=speed))
+    recipe = reflected(body, own)
     made = plan(recipe, ("signals",), Choices(negligible=1e-11))
     frame = made.recipe.frame(0)[1]
     context, heard = context_of(made, frame), []

@@ -112,6 +112,7 @@ def test_an_echo_is_that_of_the_target_at_rest_where_the_sound_meets_each_facet(
 
 
 CIRCLE = Circle(centre=(18.0, 0.0, -5.0), radius=4.0, speed=6.0, bearing=4.5)
+TURNING = Circle(centre=(0.0, 3.0, -5.0), radius=3.0, speed=1.5, bearing=np.pi)
 CORNER = Waypoints(
     points=(
         Waypoint(time=-1.0, position=(15.0, 5.0, -6.0), heading=3.0),
@@ -184,15 +185,19 @@ def test_snaps_together_are_heard_as_each_alone(bounces: int) -> None:
         np.testing.assert_allclose(mine.amplitude, alone.amplitude, rtol=1e-5)
 
 
+@pytest.mark.parametrize("turns", [False, True])
 @pytest.mark.parametrize("bottom", [False, True])
-def test_families_that_are_traced_apart_are_all_of_those_together_and_each_once(bottom: bool) -> None:
-    """Of what hardly turns, each family for itself, through bent water: no path is lost, and none is heard twice. Sound
-    of a snap on the bottom, and of its image there, is one."""
+def test_families_that_are_traced_apart_are_all_of_those_together_and_each_once(bottom: bool, turns: bool) -> None:
+    """Of what hardly turns, bodies or also the sonar, each family for itself, through bent water: no path is lost, and
+    none is heard twice. Sound of a snap on the bottom, and of its image there, is one."""
     slow = replace(CIRCLE, speed=1e-7)
     lit = replace(snap(), position=np.array([4.0, -7.0, -BOTTOM_DEPTH])) if bottom else snap()
     bodies, track = (on(slow), ball((19.0, -3.0, -5.0))), Track(SONAR, np.array([0.5, 0.0, 0.0]))
+    if turns:
+        own = replace(TURNING, speed=1e-7)
+        track = Track(pose(own, 0.0), velocity(own, 0.0), own)
     water, laws = Medium(RIGID, THERMOCLINE), (Isotropic(strength=1.0),) * 2
-    context = FrameContext(0.0, bodies, (lit,), water, Receiver(SONAR, ONE, track=track), laws)
+    context = FrameContext(0.0, bodies, (lit,), water, Receiver(track.pose, ONE, track=track), laws)
     together, apart = (
         trace(replace(context, tolerances=replace(context.tolerances, shared=shared)), AutoTracing(bounces=3))
         for shared in (1e3, 0.0)
@@ -203,9 +208,6 @@ def test_families_that_are_traced_apart_are_all_of_those_together_and_each_once(
         assert np.array_equal(getattr(together, name)[order[0]], getattr(apart, name)[order[1]]), name
     for name in ("delay", "amplitude"):
         np.testing.assert_allclose(getattr(apart, name)[order[1]], getattr(together, name)[order[0]], rtol=1e-5)
-
-
-TURNING = Circle(centre=(0.0, 3.0, -5.0), radius=3.0, speed=1.5, bearing=np.pi)
 
 
 @pytest.mark.parametrize("u", [(0.5, 0.0, 0.0), (1.5, -0.5, 0.2), (0.0, 10.0, 0.0), (10.0, 0.0, 0.0), TURNING], ids=str)

@@ -9,6 +9,7 @@ import pytest
 
 from sonarsynth.environment.sea import Environment, Isovelocity
 from sonarsynth.equations.rays import ray_solutions
+from sonarsynth.geometry.hovering import Hover
 from sonarsynth.geometry.motion import Circle, ConstantVelocity, Motion, Still
 from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start, plan
@@ -97,13 +98,28 @@ def test_what_moves_is_heard_where_the_sound_met_it(speed: float, sonar: float) 
     assert max(away(made, [0, 47])) < ALLOWED
 
 
+STATION = Still(position=(0.0, 0.0, -30.0), heading=0.5 * np.pi)
+
+
 @pytest.mark.parametrize(("bounces", "times"), [(0, (-0.1, 0.0, 0.1)), (3, (0.0,))])
 def test_what_turns_is_heard_as_it_stood_when_the_sound_met_it(bounces: int, times: tuple[float, ...]) -> None:
     """A crate on a circle at 20 degrees a second, which has turned on by 3 degrees when sound comes to it by surface
     and bottom."""
     circle = Circle(centre=(22.0, 3.0, -29.0), radius=4.0, speed=1.4, bearing=0.3)
-    ours = Still(position=(0.0, 0.0, -30.0), heading=0.5 * np.pi)
-    assert away(crossing(circle, ours, 0.35, bounces, times), [29])[0] < ALLOWED
+    assert away(crossing(circle, STATION, 0.35, bounces, times), [29])[0] < ALLOWED
+
+
+@pytest.mark.parametrize(
+    "sonar",
+    [
+        Circle(centre=(0.0, 2.0, -30.0), radius=2.0, speed=-3.1, bearing=np.pi - 1.55),  # at 90 degrees a second
+        Hover(position=(0.0, 0.0, -30.0), heading=0.5 * np.pi, heave=0.5, yaw=0.35, period=3.0, phase=1.0),
+    ],
+)
+def test_a_sonar_that_turns_hears_as_it_stands_when_the_sound_meets_it(sonar: Motion) -> None:
+    """Echoes, and the snap itself, by surface and bottom, after 40 ms in which it turns on and its speed changes."""
+    crate = Still(position=(22.0, 1.0, -29.0), heading=0.4)
+    assert max(away(crossing(crate, sonar, 0.35, 2, (0.0,)), [0])) < ALLOWED
 
 
 def test_a_corner_of_the_array_that_sees_other_limbs_is_asked() -> None:

@@ -9,8 +9,9 @@ from sonarsynth.environment.casts import profile_of
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.planning.choices import ALL_PRODUCTS
 from sonarsynth.planning.measured.ray_bending import bending_error
-from sonarsynth.planning.measured.sampled_arrivals import context_of, one_facet_in
+from sonarsynth.planning.measured.sampled_arrivals import one_facet_in
 from sonarsynth.planning.notes.formula_validity import curved_waves
+from sonarsynth.planning.notes.motion_rows import motion_left_out
 from sonarsynth.planning.plan_tables import Omission
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.reverberation_rows import reverberation_left_out
@@ -24,7 +25,6 @@ from sonarsynth.state import FrameContext, Receiver, Tolerances
 from sonarsynth.targets.mesh_resolution import expected_error
 from sonarsynth.targets.relief import BOTTOM, highest_within
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.meetings import meetings
 
 ENOUGH = 2500
 """Facets of a target that its reflections are estimated from."""
@@ -60,18 +60,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
             Omission("depth dependence of the absorption spectrum", "one absorption spectrum for all paths", bound)
         )
     rows += _facets_leave_out(plan) + _relief_left_out(plan)
-    moved = [
-        frame.sonar_velocity,
-        *(b.velocity for b in frame.moment.bodies),
-        *(s.velocity for s in frame.moment.snaps),
-    ]
-    moving = np.any(moved)
-    if moving and not scene.physics.doppler:
-        rows.append(Omission("Doppler", "not requested: positions are those at the time of the frame", _moved(plan)))
-    elif moving:
-        model = "bodies are posed when sound meets their middle; from there constant velocity and spin"
-        rows.append(Omission("motion of targets beyond constant velocity and spin", model, _carried(plan, frame)))
-    rows += _chorus_left_out(plan) + reverberation_left_out(plan)
+    rows += motion_left_out(plan, frame) + _chorus_left_out(plan) + reverberation_left_out(plan)
     if not environment.noises:
         rows.append(Omission("ambient noise", "none in the recipe", "signals are free of noise"))
     return tuple(rows + _thinned(plan) + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))
@@ -223,40 +212,6 @@ def _facets_leave_out(plan: Plan) -> list[Omission]:
         )
         rows.append(Omission("creeping waves and waves inside bodies", "facets are plane mirrors", bound))
     return rows
-
-
-def _carried(plan: Plan, frame: Frame) -> str:
-    """What velocity and spin leave out of the first frame, from when the first sound that is traced together meets a
-    body's middle to when the last does, and its far side: the rest of the phase, of families as loud as they are beside
-    the direct one; and how far bodies are that hide others from where they are then."""
-    context, speed, signal, off = context_of(plan, frame), float(plan.profile.speed.min()), 0.0, 0.0
-    bodies, times = context.bodies, meetings(context, frame.sonar_track, plan.propagation.bounces)
-    places = [body.pose.position for body in bodies]
-    for snap, emission in enumerate(context.snaps):
-        for owners, ways in times.classes(snap):
-            first = times.when(snap, ways)[0]
-            for n in (owner for owner in owners if owner < len(bodies)):
-                body, met = bodies[n], times.met[:, snap, n]
-                across = 2.0 * body.mesh.radius / speed
-                for way in range(len(met)) if ways is None else ways:
-                    late, weaker = met[way] - first[n] + across, (met[0] - emission.time) / (met[way] - emission.time)
-                    beyond = times.beyond(body.track.later(first[n]), late, body.mesh.radius)
-                    signal = max(signal, min(beyond, 1.0) * weaker)
-                    others = max(float(np.linalg.norm(places[n] - place)) for place in places)
-                    off = max(off, float(np.linalg.norm(body.velocity)) * (late + 2.0 * others / speed))
-    return f"{signal:.1g} of the signals; occlusion by positions up to {off:.1g} m off"
-
-
-def _moved(plan: Plan) -> str:
-    """How far targets and sonar move while sound is under way, and how much longer pulses come out."""
-    frame = plan.recipe.frame(0)[1]
-    fastest = max((float(np.linalg.norm(body.velocity)) for body in frame.moment.bodies), default=0.0)
-    fastest += float(np.linalg.norm(frame.sonar_velocity))
-    stretch = 2 * fastest / float(plan.profile.speed.min())
-    phase = 2 * np.pi * plan.scene.sonar.band.high * stretch * 50e-6
-    metres = fastest * plan.windows.echo_stop
-    off = f"{phase:.2g} rad over 50 us at the top of the band"
-    return f"echoes up to {metres:.2g} m off; Doppler factor {stretch:.2g}, {off}"
 
 
 def reflected_bound(plan: Plan) -> str:
