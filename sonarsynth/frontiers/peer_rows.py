@@ -24,7 +24,8 @@ from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.signal_knobs import FINER
 from sonarsynth.imaging import DenseDelayAndSum
 from sonarsynth.pipeline import BeamformedFrame
-from sonarsynth.planning import Plan, frame_start
+from sonarsynth.planning import Plan
+from sonarsynth.planning.measured.sampled_arrivals import reception_of
 from sonarsynth.products import Arrivals
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import GriddedSynthesis
@@ -46,8 +47,8 @@ def synthesis_peers(plan: Plan, frame: Frame, arrivals: Arrivals) -> Iterator[Po
     paths = plain(arrivals, plan, frame)
     if not len(paths.delay):
         return
-    elements, sonar, start = replace(plan.elements, face=0.0), plan.scene.sonar, frame_start(plan, frame)
-    arguments = (paths, frame.moment.snaps, elements, sonar, None, start, plan.windows.samples)
+    reception = reception_of(plan, frame)._replace(elements=replace(plan.elements, face=0.0), absorption=None)
+    arguments = (paths, frame.moment.snaps, reception)
     exact = golden(plan, FINER).pressure(*arguments)[0]
 
     def row(name: str, setting: str, pressure: np.ndarray, seconds: float) -> Point:

@@ -17,14 +17,13 @@ from sonarsynth.frontiers.exact_frame import Pressures, differences, golden
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.pipeline.frame_reverberation import frame_reverberation, with_reverberation
-from sonarsynth.planning import Plan, frame_start
-from sonarsynth.planning.measured.sampled_arrivals import pressures
+from sonarsynth.planning import Plan
+from sonarsynth.planning.measured.sampled_arrivals import pressures, reception_of
 from sonarsynth.products import Signals
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import DirectSum, GriddedSynthesis, Synthesis
 from sonarsynth.signals.auto_synthesis import PRECISIONS, deposit_for
-from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.gridded_synthesis import kernel_error
 from sonarsynth.validation.run_time import timed
 
@@ -123,12 +122,12 @@ def direct_sum_point(traced: TracedBySensor) -> Point:
     plan, (piece, arrivals) = traced.plan, traced.few[0]
     arrivals = arrivals.seen_from_centre  # they have as many terms at hydrophones that miss some
     paths = np.array(evenly(len(arrivals.delay), SUMMED_PATHS))
-    start, samples = frame_start(plan, traced.frame), plan.windows.samples
     seconds = []
     for count in SUMMED_HYDROPHONES:
         elements = subarray(piece.elements, np.resize(np.arange(piece.elements.count), count)).elements
-        summed = partial(exact_signals, arrivals.select(paths), traced.frame.moment.snaps, elements)
-        seconds.append(timed(partial(summed, plan.scene.sonar, plan.absorption, start, samples), 1)[1])
+        reception = reception_of(plan, traced.frame)._replace(elements=elements)
+        summed = partial(DirectSum().pressure, arrivals.select(paths), traced.frame.moment.snaps, reception)
+        seconds.append(timed(summed, 1)[1])
     few, more = SUMMED_HYDROPHONES
     per_hydrophone = max(seconds[1] - seconds[0], 0.0) / (more - few)  # of a hydrophone; the pulses' spectra serve all
     live = int(np.count_nonzero(plan.elements.gain))

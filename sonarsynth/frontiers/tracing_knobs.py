@@ -25,8 +25,8 @@ from sonarsynth.frontiers.exact_frame import (
     golden,
 )
 from sonarsynth.frontiers.rows import Point
-from sonarsynth.planning import Plan, arrivals_of, frame_start
-from sonarsynth.planning.measured.sampled_arrivals import pressures
+from sonarsynth.planning import Plan, arrivals_of
+from sonarsynth.planning.measured.sampled_arrivals import pressures, reception_of
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Straight
 from sonarsynth.receiver.subarrays import Subarray, subarrays
@@ -89,10 +89,9 @@ class TracedBySensor:
     def synthesis_seconds(self) -> float:
         """CPU seconds of the plan's synthesis at all parts."""
         plan, total = self.plan, 0.0
-        start, samples = frame_start(plan, self.frame), plan.windows.samples
         for piece, arrivals in self.few:
-            make = partial(plan.choices.synthesis.signals, arrivals, self.frame.moment.snaps, piece.elements)
-            total += timed(partial(make, plan.scene.sonar, plan.absorption, start, samples))[1]
+            reception = reception_of(plan, self.frame)._replace(elements=piece.elements)
+            total += timed(partial(plan.choices.synthesis.signals, arrivals, self.frame.moment.snaps, reception))[1]
         return total * self.parts / len(self.few)
 
 

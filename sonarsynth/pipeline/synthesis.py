@@ -14,6 +14,7 @@ from sonarsynth.conventions import NO_TARGET, Floats, depth
 from sonarsynth.geometry.motion import pose, velocity
 from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.planning import Plan, arrivals_of, behind_baffle, context_of, frame_start
+from sonarsynth.planning.measured.sampled_arrivals import reception_of
 from sonarsynth.planning.noise_rows import ELECTRONICS, SENSORS, part_names
 from sonarsynth.products import Arrivals, Kind, Signals
 from sonarsynth.randomness import stream
@@ -97,11 +98,8 @@ def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> tuple[dict[int
 
 def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> Signals:
     """What hydrophones hear of arrivals, expanded over all of them; what comes from behind, through the baffle."""
-    method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
-    start = frame_start(plan, frame)
-    return method.signals(
-        behind_baffle(arrivals, sonar), snaps, sensors, sonar, plan.absorption, start, plan.windows.samples
-    )
+    reception = reception_of(plan, frame)._replace(elements=sensors)
+    return plan.choices.synthesis.signals(behind_baffle(arrivals, plan.scene.sonar), frame.moment.snaps, reception)
 
 
 def errors_of(plan: Plan, frame: Frame) -> DrawnErrors | None:

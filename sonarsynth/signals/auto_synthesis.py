@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final, Literal
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, Method
 from sonarsynth.products import Arrivals, Signals
-from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.signals.direct_sum import DirectSum
 from sonarsynth.signals.gridded_synthesis import ROUNDING, SPENT, GriddedSynthesis, kernel_error
+from sonarsynth.signals.segments import Reception
 from sonarsynth.state import Emission
 
 DEFAULT_ERROR = 3e-4
@@ -48,15 +46,6 @@ class AutoSynthesis(Method):
         """The cheapest method whose echoes err by no more than is allowed, relative to their peak."""
         return DirectSum().resolve(demand) if demand.exact else deposit_for(demand.allowed).resolve(demand)
 
-    def signals(
-        self,
-        arrivals: Arrivals,
-        snaps: tuple[Emission, ...],
-        elements: Elements,
-        sonar: Sonar,
-        absorption: Callable[[Floats], Floats] | None,
-        start: float,
-        samples: int,
-    ) -> Signals:
-        """Pressure at each hydrophone, to `DEFAULT_ERROR`; arguments and errors as in `SignalSynthesis`."""
-        return deposit_for(DEFAULT_ERROR).signals(arrivals, snaps, elements, sonar, absorption, start, samples)
+    def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
+        """Pressure at each hydrophone, to `DEFAULT_ERROR`; as `SignalSynthesis.signals`."""
+        return deposit_for(DEFAULT_ERROR).signals(arrivals, snaps, reception)

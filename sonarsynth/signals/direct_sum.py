@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description import description
@@ -13,11 +15,11 @@ from sonarsynth.description.method import Demand, FrameSize, Method
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.products import Arrivals, Signals
-from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.receiver import Elements
 from sonarsynth.signals.array_paths import ArrayPaths, array_paths, arrival_directions, delay_and_gain, lost, reach
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.pulse_variation import changed
-from sonarsynth.signals.segments import fast_length, layout
+from sonarsynth.signals.segments import Reception, fast_length, layout
 from sonarsynth.state import Emission
 
 
@@ -65,8 +67,24 @@ def exact_spectra(
     return total
 
 
+class UnroundedSynthesis(Method):
+    """A synthesis that also gives what it computes before that is rounded to float32."""
+
+    @abstractmethod
+    def pressure(
+        self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
+    ) -> tuple[npt.NDArray[Any], int]:
+        """Pressure (sensor, sample) in the precision of the method, and the number of arrivals that the window cuts."""
+
+    def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
+        """As `SignalSynthesis.signals`."""
+        pressure, outside = self.pressure(arrivals, snaps, reception)
+        rate = reception.sonar.sampling_frequency
+        return Signals(pressure.astype(np.float32, copy=False), reception.start, rate, 0.0, 0, outside)
+
+
 @description
-class DirectSum(Method):
+class DirectSum(UnroundedSynthesis):
     """Sum of every path at every hydrophone and frequency, in float64, with exact delay, amplitude, directivity,
     phase, blur, Doppler and mean over its facet."""
 
@@ -80,61 +98,26 @@ class DirectSum(Method):
         """As `Method.cost`: every path at every frequency of every hydrophone."""
         return 6.4e-8 * size.paths * size.sensors * size.samples
 
-    def signals(
-        self,
-        arrivals: Arrivals,
-        snaps: tuple[Emission, ...],
-        elements: Elements,
-        sonar: Sonar,
-        absorption: Callable[[Floats], Floats] | None,
-        start: float,
-        samples: int,
-    ) -> Signals:
-        """Pressure at each hydrophone; the period of the transform is the window and a pulse at either end."""
-        return exact_signals(arrivals, snaps, elements, sonar, absorption, start, samples)[1]
-
-    def pressure(
-        self,
-        arrivals: Arrivals,
-        snaps: tuple[Emission, ...],
-        elements: Elements,
-        sonar: Sonar,
-        absorption: Callable[[Floats], Floats] | None,
-        start: float,
-        samples: int,
-    ) -> tuple[np.ndarray, int]:
-        """Pressure (sensor, sample) in float64, and the number of arrivals that the window cuts."""
-        pressure, signals = exact_signals(arrivals, snaps, elements, sonar, absorption, start, samples)
-        return pressure, signals.outside
-
-
-def exact_signals(
-    arrivals: Arrivals,
-    snaps: tuple[Emission, ...],
-    elements: Elements,
-    sonar: Sonar,
-    absorption: Callable[[Floats], Floats] | None,
-    start: float,
-    samples: int,
-) -> tuple[Floats, Signals]:
-    """The signals in float64 (sensor, sample), and as the stage gives them."""
-    fs = sonar.sampling_frequency
-    front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
-    plan = layout(arrivals, front, snaps, elements, sonar, start, samples)
-    pressure = np.zeros((elements.count, samples))
-    waveforms = [s.waveform for s in snaps]
-    for waveform in dict.fromkeys(waveforms):
-        rows = np.flatnonzero(np.array([w == waveform for w in waveforms])[arrivals.snap] & plan.audible)
-        if not rows.size:
-            continue
-        pad = int(np.ceil(plan.support[:, rows].sum(axis=0).max() * fs)) + 2
-        # where a pulse is partly heard at one hydrophone, it is at most this far out at another
-        spread = int(np.ceil(2.0 * reach(front).max(initial=0.0) * fs)) + pad
-        length = fast_length(samples + 2 * spread)
-        for doppler in np.unique(front.doppler[rows]):
-            frequency, spectrum = pulse_spectrum(waveform, sonar.antialias, fs, length, float(doppler))
-            relative = relative_absorption(absorption, frequency, sonar.band.centre)
-            group = front.select(rows[front.doppler[rows] == doppler])
-            transfer = exact_spectra(group, elements, frequency, relative, start - spread / fs)
-            pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
-    return pressure, Signals(pressure.astype(np.float32), start, fs, 0.0, 0, plan.outside)
+    def pressure(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> tuple[Floats, int]:
+        """As `UnroundedSynthesis.pressure`; the period of the transform is the window and a pulse at either end."""
+        elements, sonar, absorption, start, samples = reception
+        fs = sonar.sampling_frequency
+        front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
+        plan = layout(arrivals, front, snaps, reception)
+        pressure = np.zeros((elements.count, samples))
+        waveforms = [s.waveform for s in snaps]
+        for waveform in dict.fromkeys(waveforms):
+            rows = np.flatnonzero(np.array([w == waveform for w in waveforms])[arrivals.snap] & plan.audible)
+            if not rows.size:
+                continue
+            pad = int(np.ceil(plan.support[:, rows].sum(axis=0).max() * fs)) + 2
+            # where a pulse is partly heard at one hydrophone, it is at most this far out at another
+            spread = int(np.ceil(2.0 * reach(front).max(initial=0.0) * fs)) + pad
+            length = fast_length(samples + 2 * spread)
+            for doppler in np.unique(front.doppler[rows]):
+                frequency, spectrum = pulse_spectrum(waveform, sonar.antialias, fs, length, float(doppler))
+                relative = relative_absorption(absorption, frequency, sonar.band.centre)
+                group = front.select(rows[front.doppler[rows] == doppler])
+                transfer = exact_spectra(group, elements, frequency, relative, start - spread / fs)
+                pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
+        return pressure, plan.outside

@@ -3,23 +3,22 @@ domain."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 
-from sonarsynth.conventions import Floats, Ints, Number
+from sonarsynth.conventions import Ints, Number
 from sonarsynth.description import description
-from sonarsynth.description.method import Demand, FrameSize, Method
-from sonarsynth.products import Arrivals, Signals
-from sonarsynth.receiver import Elements, Sonar, stop_frequency
+from sonarsynth.description.method import Demand, FrameSize
+from sonarsynth.products import Arrivals
+from sonarsynth.receiver import stop_frequency
 from sonarsynth.signals.array_paths import array_paths
-from sonarsynth.signals.direct_sum import attenuation
+from sonarsynth.signals.direct_sum import UnroundedSynthesis, attenuation
 from sonarsynth.signals.gridded.bins import bins_of
 from sonarsynth.signals.gridded.deposit import add_segment
-from sonarsynth.signals.segments import layout
+from sonarsynth.signals.segments import Reception, layout
 from sonarsynth.state import Emission
 
 ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
@@ -51,7 +50,7 @@ def _apart(paths: Ints) -> Ints:
 
 
 @description
-class GriddedSynthesis(Method):
+class GriddedSynthesis(UnroundedSynthesis):
     """Synthesis by a Kaiser-Bessel kernel, Chebyshev nodes over the aperture and polynomial directivity.
 
     Measured: 508 hydrophones with faces, 2000 echoes of a body of 1.6 m and the direct snap, absorption; largest error
@@ -113,34 +112,14 @@ class GriddedSynthesis(Method):
         """Its kind and what it is set to."""
         return f"{self.kind}, width {self.width}, tolerance {self.tolerance:.1g}, {self.precision}"
 
-    def signals(
-        self,
-        arrivals: Arrivals,
-        snaps: tuple[Emission, ...],
-        elements: Elements,
-        sonar: Sonar,
-        absorption: Callable[[Floats], Floats] | None,
-        start: float,
-        samples: int,
-    ) -> Signals:
-        """Pressure at each hydrophone from `start` (s): silence, and stretches of it that hold whole pulses."""
-        pressure, outside = self.pressure(arrivals, snaps, elements, sonar, absorption, start, samples)
-        return Signals(pressure.astype(np.float32, copy=False), start, sonar.sampling_frequency, 0.0, 0, outside)
-
     def pressure(
-        self,
-        arrivals: Arrivals,
-        snaps: tuple[Emission, ...],
-        elements: Elements,
-        sonar: Sonar,
-        absorption: Callable[[Floats], Floats] | None,
-        start: float,
-        samples: int,
+        self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
     ) -> tuple[npt.NDArray[Any], int]:
-        """Pressure (sensor, sample) in the precision of the method, and the number of arrivals that the window cuts."""
+        """As `UnroundedSynthesis.pressure`: silence, and stretches of it that hold whole pulses."""
+        elements, sonar, absorption, start, samples = reception
         fs = sonar.sampling_frequency
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
-        plan = layout(arrivals, front, snaps, elements, sonar, start, samples, tolerance=0.01 * self.tolerance)
+        plan = layout(arrivals, front, snaps, reception, tolerance=0.01 * self.tolerance)
         out = np.zeros((elements.count, samples), self.precision)
         method = (self.width, self.oversampling, self.precision, self.tolerance)
         for span in plan.stretches:

@@ -23,7 +23,7 @@ from sonarsynth.signals.filtered_pulse import (
     stretched_spectra,
 )
 from sonarsynth.signals.gridded.nodes import polynomials, rounded_up
-from sonarsynth.signals.segments import GUARD, fast_length, layout
+from sonarsynth.signals.segments import GUARD, Reception, fast_length, layout
 from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
 
@@ -72,13 +72,14 @@ def measured_levels(
     hydrophone, alike = ideal_hydrophone(), paths.expansion.without("phase", "delay_variance")
     paths = replace(paths, expansion=alike)  # that of the centre is heard
     front = array_paths(paths, snaps, hydrophone)
-    before, after = layout(paths, front, snaps, hydrophone, sonar, 0.0, 1).support + reach(front)
+    reception = Reception(hydrophone, sonar, absorption, 0.0, 1)
+    before, after = layout(paths, front, snaps, reception).support + reach(front)
     lead = int(np.ceil(before.max() * fs)) + GUARD
     slot = fast_length(lead + int(np.ceil(after.max() * fs)) + GUARD)
     position = lead + slot * np.arange(count)
     mantissa, exponent = np.frexp(paths.amplitude)
     moved = replace(paths, delay=(paths.delay * fs % 1.0 + position) / fs, amplitude=mantissa)
-    signals = method.signals(moved, snaps, hydrophone, sonar, absorption, 0.0, slot * count)
+    signals = method.signals(moved, snaps, reception._replace(samples=slot * count))
     spectrum = rfft(np.asarray(signals.pressure[0], float).reshape(count, slot), axis=1) / fs
     at = np.arange(spectrum.shape[1]) - 0.5
     low, high = sonar.band.low * slot / fs, sonar.band.high * slot / fs  # in bins

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,16 @@ kept."""
 
 GUARD = 4
 """Samples of silence at either end of a stretch: half of the widest kernel that hydrophones hear it by."""
+
+
+class Reception(NamedTuple):
+    """By which hydrophones arrivals are heard, through which water, and when."""
+
+    elements: Elements
+    sonar: Sonar
+    absorption: Callable[[Floats], Floats] | None  # dB/m at frequencies (Hz); none: no absorption
+    start: float  # s: the first sample, by the clock of the arrivals
+    samples: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +72,7 @@ def layout(
     arrivals: Arrivals,
     front: ArrayPaths,
     snaps: tuple[Emission, ...],
-    elements: Elements,
-    sonar: Sonar,
-    start: float,
-    samples: int,
+    reception: Reception,
     *,
     tolerance: float = SUPPORT_TOLERANCE,
 ) -> Layout:
@@ -72,6 +80,7 @@ def layout(
     coherent echoes, whose pulses are differentiated; tolerance: what pulses may be, of their peak, at the ends of
     a stretch.
     """
+    elements, sonar, _, start, samples = reception
     if samples < 1:
         raise ValueError("a window needs at least one sample")
     fs = sonar.sampling_frequency

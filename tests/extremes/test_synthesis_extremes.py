@@ -11,7 +11,7 @@ from sonarsynth.equations.bubble import snap_pressure
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, LowPass, PositionTable, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis
-from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.segments import Reception
 from tests.laws.test_synthesis import MODEL, SNAPS, SONAR, arrivals, window
 
 GRID = np.linspace(-0.6, 0.6, 4)
@@ -21,8 +21,8 @@ METHODS = (DirectSum(), GriddedSynthesis())
 
 def error_of(method: GriddedSynthesis, of: Arrivals, array: Elements) -> float:
     start, samples = window(of, SONAR, array)
-    exact, _ = exact_signals(of, SNAPS, array, SONAR, None, start, samples)
-    got = method.signals(of, SNAPS, array, SONAR, None, start, samples).pressure
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, None, start, samples))
+    got = method.signals(of, SNAPS, Reception(array, SONAR, None, start, samples)).pressure
     return float(np.abs(got - exact).max() / np.abs(exact).max())
 
 
@@ -56,7 +56,7 @@ def test_paths_that_are_all_alike() -> None:
     one = arrivals([0.01], [[1.0, 0.2, 0.1]], [20.0], [1.0])
     start, samples = window(of, SONAR, ARRAY)
     many, single = (
-        GriddedSynthesis().signals(x, SNAPS, ARRAY, SONAR, None, start, samples).pressure for x in (of, one)
+        GriddedSynthesis().signals(x, SNAPS, Reception(ARRAY, SONAR, None, start, samples)).pressure for x in (of, one)
     )
     np.testing.assert_allclose(many, single, atol=1e-4 * np.abs(single).max())  # one path alone needs no deposit
 
@@ -65,9 +65,9 @@ def test_an_echo_120_db_below_the_direct_snap_keeps_its_accuracy() -> None:
     of = arrivals([0.01, 0.02], [[1.0, 0.1, 0.1], [1.0, -0.2, 0.0]], [20.0, 25.0], [1.0, 1e-6])
     of = replace(of, target=np.array([-1, 0]), kind=np.array([Kind.DIRECT, Kind.ECHO], np.int8))
     start, samples = window(of, SONAR, ARRAY)
-    exact, _ = exact_signals(of, SNAPS, ARRAY, SONAR, None, start, samples)
-    got = GriddedSynthesis().signals(of, SNAPS, ARRAY, SONAR, None, start, samples).pressure
-    alone, _ = exact_signals(of.select(of.target == 0), SNAPS, ARRAY, SONAR, None, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(ARRAY, SONAR, None, start, samples))
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(ARRAY, SONAR, None, start, samples)).pressure
+    alone, _ = DirectSum().pressure(of.select(of.target == 0), SNAPS, Reception(ARRAY, SONAR, None, start, samples))
     late = int((0.018 - start) * SONAR.sampling_frequency)
     assert np.abs(got - alone)[:, late:].max() < 1e-4 * np.abs(alone).max()
     assert np.abs(got - exact).max() < 1e-4 * np.abs(exact).max()
@@ -100,7 +100,7 @@ def test_what_cannot_be_synthesised_is_refused(
     array = elements(PositionTable(positions=((0.0, 0.0, 0.2), (0.0, 0.0, -0.2))))
     of = replace(arrivals([0.0, 1e-4], [[1.0, 0.0, 0.0]] * 2, [2.0, 2.0], [1.0, 1.0]), **change)
     with pytest.raises(ValueError, match=message):
-        method.signals(of, SNAPS, array, SONAR, None, -0.01, 4000)
+        method.signals(of, SNAPS, Reception(array, SONAR, None, -0.01, 4000))
 
 
 def shaped(of: Arrivals, phase: object, delay_std: object, doppler: object) -> Arrivals:
@@ -140,14 +140,14 @@ def test_pulses_of_any_shape_and_any_absorption(loss: tuple[float, float, float]
     of = replace(shaped(FEW, [0.0, 1.0, 2.0], [0.0, 3e-6, 5e-6], 1e-3), absorption=np.array(loss))
     of = replace(of, amplitude=of.amplitude * 10.0 ** (-of.absorption / 40.0))
     start, samples = window(of, SONAR, ARRAY)
-    exact, _ = exact_signals(of, SNAPS, ARRAY, SONAR, lambda f: 1e-6 * f, start, samples)
-    got = GriddedSynthesis().signals(of, SNAPS, ARRAY, SONAR, lambda f: 1e-6 * f, start, samples).pressure
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(ARRAY, SONAR, lambda f: 1e-6 * f, start, samples))
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(ARRAY, SONAR, lambda f: 1e-6 * f, start, samples)).pressure
     assert np.abs(got - exact).max() < 1e-4 * np.abs(exact).max()
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_huge_blur_is_silence_and_nothing_is_outside(method: DirectSum | GriddedSynthesis) -> None:
-    got = method.signals(shaped(FEW, 1.0, [1e300, 1.0, 0.1], 0.05), SNAPS, ARRAY, SONAR, None, 0.0, 4000)
+    got = method.signals(shaped(FEW, 1.0, [1e300, 1.0, 0.1], 0.05), SNAPS, Reception(ARRAY, SONAR, None, 0.0, 4000))
     assert not got.pressure.any()
     assert got.outside == 0
 
@@ -156,14 +156,16 @@ def test_a_low_pass_hears_what_a_wide_range_of_blurs_leaves() -> None:
     sonar = Sonar(filter=LowPass(cutoff=60e3), sampling_frequency=196e3)
     of = arrivals(0.05 + 1e-4 * np.arange(12), [[1.0, 0.1, 0.1]] * 12, [20.0] * 12, [1.0] * 12)
     of = shaped(of, np.arange(12.0), np.append(0.0, np.geomspace(1e-7, 1e-2, 11)), 0.0)
-    exact, _ = exact_signals(of, SNAPS, ARRAY, sonar, None, 0.0, 18000)
-    got = GriddedSynthesis().signals(of, SNAPS, ARRAY, sonar, None, 0.0, 18000).pressure
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(ARRAY, sonar, None, 0.0, 18000))
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(ARRAY, sonar, None, 0.0, 18000)).pressure
     assert np.abs(got - exact).max() < 1e-4 * np.abs(exact).max()
 
 
 def test_an_empty_window_is_refused() -> None:
     with pytest.raises(ValueError, match="at least one sample"):
-        GriddedSynthesis().signals(arrivals([0.0], [[1.0, 0, 0]], [1.0], [1.0]), SNAPS, ARRAY, SONAR, None, 0.0, 0)
+        GriddedSynthesis().signals(
+            arrivals([0.0], [[1.0, 0, 0]], [1.0], [1.0]), SNAPS, Reception(ARRAY, SONAR, None, 0.0, 0)
+        )
 
 
 def test_a_snap_of_other_scales() -> None:

@@ -12,7 +12,7 @@ from sonarsynth.equations.water.seawater import ainslie_mccolm
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements, PositionTable, Romanis, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis
-from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.segments import Reception
 from tests.laws.test_synthesis import SNAPS, SONAR, C, arrivals
 
 ROMANIS = elements(Romanis())
@@ -49,11 +49,13 @@ def of_face(position: Floats) -> Elements:
 def test_an_expansion_absorbs_what_the_way_to_each_hydrophone_does(distance: float, count: int) -> None:
     points, rate, (start, samples) = points_at(distance, count, 0.3), float(sea(SONAR.band.centre)), window(distance)
     part = elements(PositionTable(positions=tuple(map(tuple, ROMANIS.position[FAR].tolist())), face=ROMANIS.face))
-    whole, _ = exact_signals(from_points(points, np.zeros(3), rate), SNAPS, part, SONAR, sea, start, samples)
+    whole, _ = DirectSum().pressure(
+        from_points(points, np.zeros(3), rate), SNAPS, Reception(part, SONAR, sea, start, samples)
+    )
     single = of_face(np.zeros(3))
     for row, sensor in zip(whole, FAR, strict=True):
         here = from_points(points, ROMANIS.position[sensor], rate)
-        alone, _ = exact_signals(here, SNAPS, single, SONAR, sea, start, samples)
+        alone, _ = DirectSum().pressure(here, SNAPS, Reception(single, SONAR, sea, start, samples))
         assert np.abs(alone).max() > 0.0
         # a wave from here and one from the middle round otherwise
         assert np.abs(row - alone[0]).max() < 1e-9 * np.abs(alone).max()
@@ -66,9 +68,9 @@ def test_the_fast_synthesis_absorbs_as_the_exact_sum(count: int, face: float) ->
     points, rate, (start, samples) = points_at(6.0, count, 0.4), float(sea(SONAR.band.centre)), window(6.0)
     of = from_points(points, np.zeros(3), rate)
     part = elements(PositionTable(positions=tuple(map(tuple, ROMANIS.position[::16].tolist())), face=face))
-    exact, _ = exact_signals(of, SNAPS, part, SONAR, sea, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(part, SONAR, sea, start, samples))
     fast = GriddedSynthesis(width=10, precision="float64", tolerance=1e-7)
-    got, _ = fast.pressure(of, SNAPS, part, SONAR, sea, start, samples)
+    got, _ = fast.pressure(of, SNAPS, Reception(part, SONAR, sea, start, samples))
     assert np.abs(got - exact).max() < 5e-7 * np.abs(exact).max()
 
 
@@ -81,8 +83,8 @@ def test_absorption_that_is_strong_is_absorbed_at_every_hydrophone() -> None:
     points, rate, (start, samples) = points_at(6.0, 100, 0.4), float(strong(SONAR.band.centre)), window(6.0)
     of = from_points(points, np.zeros(3), rate)
     part = elements(PositionTable(positions=tuple(map(tuple, ROMANIS.position[::16].tolist())), face=ROMANIS.face))
-    exact, _ = exact_signals(of, SNAPS, part, SONAR, strong, start, samples)
-    got, _ = GriddedSynthesis().pressure(of, SNAPS, part, SONAR, strong, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(part, SONAR, strong, start, samples))
+    got, _ = GriddedSynthesis().pressure(of, SNAPS, Reception(part, SONAR, strong, start, samples))
     assert np.abs(got - exact).max() < 1.5e-4 * np.abs(exact).max()
 
 
@@ -93,7 +95,7 @@ def test_a_hydrophone_farther_away_hears_less_of_the_high_frequencies() -> None:
     of = from_points(np.array([[distance, 0.0, 0.0]]), np.zeros(3), float(sea(SONAR.band.centre)))
     start, samples = window(distance)
     for method in (DirectSum(), GriddedSynthesis(width=10, precision="float64", tolerance=1e-7)):
-        signals = method.signals(of, SNAPS, line, SONAR, sea, start, samples)
+        signals = method.signals(of, SNAPS, Reception(line, SONAR, sea, start, samples))
         near, far = np.abs(np.fft.rfft(signals.pressure.astype(float), axis=1))
         f = np.fft.rfftfreq(samples, 1.0 / SONAR.sampling_frequency)
         some = (f > SONAR.band.low) & (f < SONAR.band.high)

@@ -21,6 +21,7 @@ from sonarsynth.receiver import Elements, Romanis, Sonar, elements
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.scattering import Isotropic
 from sonarsynth.signals import GriddedSynthesis
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
@@ -100,4 +101,4 @@ def test_signals_of_one_expansion_are_nearly_those_of_each_hydrophone() -> None:
 
 def heard(found: Arrivals, part: Elements) -> Floats:
     method, echoes = GriddedSynthesis(tolerance=1e-6, precision="float64"), found.select(~found.direct)
-    return np.asarray(method.pressure(echoes, (SNAP,), part, SONAR, None, START, SAMPLES)[0])
+    return np.asarray(method.pressure(echoes, (SNAP,), Reception(part, SONAR, None, START, SAMPLES))[0])

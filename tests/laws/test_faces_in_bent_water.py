@@ -17,7 +17,7 @@ from sonarsynth.receiver import Elements, Romanis, Sonar, elements
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths, arrival_directions, towards
-from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
@@ -127,5 +127,4 @@ def over_far() -> Elements:
 
 
 def heard(method: GriddedSynthesis | DirectSum, found: Arrivals, part: Elements) -> Floats:
-    make = method.pressure if isinstance(method, GriddedSynthesis) else exact_signals
-    return np.asarray(make(found, SNAPS, part, SONAR, None, START, SAMPLES)[0])
+    return np.asarray(method.pressure(found, SNAPS, Reception(part, SONAR, None, START, SAMPLES))[0])

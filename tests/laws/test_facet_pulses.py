@@ -14,8 +14,8 @@ from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import BandPass, LowPass, PositionTable, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
-from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.snap_pulses import waveform
 from tests.laws.test_synthesis import FACES, MODEL, SHARP, SNAPS, C, absorption, arrivals, error, some_of, target_at
 
@@ -42,8 +42,8 @@ def heard(of: Arrivals, method: DirectSum | GriddedSynthesis | None = None, marg
     """Pressure (sample,) in the window of the arrivals at one hydrophone, in float64."""
     sonar, (start, samples) = SHARP, window(of, margin=margin)
     if isinstance(method, GriddedSynthesis):
-        return method.pressure(of, SNAPS, ONE, sonar, None, start, samples)[0][0]
-    return exact_signals(of, SNAPS, ONE, sonar, None, start, samples)[0][0]
+        return method.pressure(of, SNAPS, Reception(ONE, sonar, None, start, samples))[0][0]
+    return DirectSum().pressure(of, SNAPS, Reception(ONE, sonar, None, start, samples))[0][0]
 
 
 def facet(seed: int, size: float) -> tuple[Floats, Floats, Floats]:
@@ -140,7 +140,9 @@ def test_a_facet_in_four_parts_sends_the_same(method: DirectSum | GriddedSynthes
     parts = echo_of(split(corners[None]), incident, scattered, 0.03)
     start, samples = window(whole)
     array = some_of(FACES, 200, face=0.0)
-    one, four = (method.signals(x, SNAPS, array, SHARP, None, start, samples).pressure for x in (whole, parts))
+    one, four = (
+        method.signals(x, SNAPS, Reception(array, SHARP, None, start, samples)).pressure for x in (whole, parts)
+    )
     assert error(four, one) < 2e-7  # of single precision
 
 
@@ -153,7 +155,9 @@ def test_many_tiny_facets_are_one_that_is_large() -> None:
         parts = split(parts)
         points = echo_of(parts, incident, scattered, 0.03)
         points = replace(points, corner_delays=np.zeros_like(points.corner_delays))
-        errors.append(error(exact_signals(points, SNAPS, ONE, SHARP, None, start, samples)[0][0], exact))
+        errors.append(
+            error(DirectSum().pressure(points, SNAPS, Reception(ONE, SHARP, None, start, samples))[0][0], exact)
+        )
     assert errors[-1] < 2e-3
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.1)
 
@@ -171,7 +175,7 @@ def test_a_mirror_differentiates_and_an_edge_repeats(method: DirectSum | Gridded
     edge = replace(mirror, delay=np.array([0.03 + far / 3.0]), corner_delays=far * np.array([[-1.0, -1.0, 2.0]]) / 3.0)
     t = window(mirror)[0] + np.arange(plain.size) / SHARP.sampling_frequency - 0.03
     start, samples = window(mirror)
-    got = exact_signals(edge, SNAPS, ONE, SHARP, None, start, samples)[0][0]
+    got = DirectSum().pressure(edge, SNAPS, Reception(ONE, SHARP, None, start, samples))[0][0]
     first = np.abs(t) < 4e-4
     assert error(got[first], plain[first] / (np.pi * CENTRE * far)) < 0.01
 
@@ -215,7 +219,9 @@ def test_columns_that_say_nothing_change_no_bit(method: DirectSum | GriddedSynth
     start, samples = window(of, margin=2e-3)
     rng = np.random.default_rng(7)
     same = replace(of, height_delay_std=rng.uniform(0.0, 1e-3, of.delay.size), centre=np.nan)
-    one, two = (method.signals(x, SNAPS, array, SHARP, absorption, start, samples).pressure for x in (of, same))
+    one, two = (
+        method.signals(x, SNAPS, Reception(array, SHARP, absorption, start, samples)).pressure for x in (of, same)
+    )
     np.testing.assert_array_equal(one, two)
 
 
@@ -229,7 +235,7 @@ def test_corners_have_no_order_and_their_middle_is_a_delay(method: DirectSum | G
     start, samples = window(of)
 
     def one(x: Arrivals) -> Floats:
-        return method.signals(x, SNAPS, ONE, SHARP, None, start, samples).pressure
+        return method.signals(x, SNAPS, Reception(ONE, SHARP, None, start, samples)).pressure
 
     assert error(one(turned), one(of)) < 2e-7
     assert error(one(moved), one(of)) < 2e-7
@@ -245,6 +251,6 @@ def test_a_reshaped_pulse_is_over_after_its_support(chosen: BandPass | LowPass |
         of = paths([0.05], [1.0], **shape, height_delay_std=np.array([rough]))
         before, after = pulse_support(waveform(MODEL), sonar.antialias, sloped=sloped, rough=rough)
         start, samples = window(of, sonar, 12e-3)
-        got = np.abs(exact_signals(of, SNAPS, ONE, sonar, None, start, samples)[0][0])
+        got = np.abs(DirectSum().pressure(of, SNAPS, Reception(ONE, sonar, None, start, samples))[0][0])
         t = start + np.arange(samples) / sonar.sampling_frequency - 0.05
         assert got[(t < -before) | (t > after)].max() < left * got.max()

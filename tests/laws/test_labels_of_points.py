@@ -28,6 +28,7 @@ from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
@@ -120,7 +121,11 @@ def heard_alone(case: Made, beam: np.ndarray, delay: np.ndarray) -> tuple[list[t
     for rows in found.values():
         alone = case.arrivals.select(rows)
         absorption = case.plan.absorption
-        p = GriddedSynthesis().signals(alone, snaps, case.plan.elements, sonar, absorption, start, samples).pressure
+        p = (
+            GriddedSynthesis()
+            .signals(alone, snaps, Reception(case.plan.elements, sonar, absorption, start, samples))
+            .pressure
+        )
         spectra = np.fft.rfft(p.astype(float), axis=1)[:, inside]
         beams = np.einsum("bqf,qf->bf", steering, spectra)
         power.append(np.abs((beams * matched * np.exp(2j * np.pi * f * (delay[:, None] - start))).sum(axis=1)) ** 2)
@@ -156,7 +161,7 @@ def test_a_beam_holds_the_energy_of_the_signal_that_a_path_brings(crowd: Made) -
     for row in np.flatnonzero(crowd.arrivals.direct & (crowd.arrivals.surface + crowd.arrivals.bottom == 0)):
         alone, snaps = crowd.arrivals.select(np.array([row])), crowd.frame.moment.snaps
         start, fs = alone.delay[0] - 0.02, sonar.sampling_frequency
-        signals = GriddedSynthesis().signals(alone, snaps, one, sonar, crowd.plan.absorption, start, 8192)
+        signals = GriddedSynthesis().signals(alone, snaps, Reception(one, sonar, crowd.plan.absorption, start, 8192))
         f, wave = np.fft.rfftfreq(8192, 1.0 / fs), np.fft.rfft(signals.pressure[0].astype(float)) / fs
         energy = 2.0 * np.sum(np.abs(wave[(f > sonar.band.low) & (f < sonar.band.high)]) ** 2) * fs / 8192
         case = crowd._replace(arrivals=alone, listening=replace(crowd.listening, elements=one))

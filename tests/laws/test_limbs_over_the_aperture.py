@@ -17,7 +17,8 @@ from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, element
 from sonarsynth.scattering import Kirchhoff, PartlyReflecting
 from sonarsynth.scattering.components import CoherentKirchhoff
 from sonarsynth.scattering.facet_geometry import patches
-from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.direct_sum import DirectSum
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, OcclusionPoint, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
@@ -50,7 +51,7 @@ def traced(law: Kirchhoff, place: Floats, array: Elements, occlusion: OcclusionP
 
 
 def heard(found: Arrivals, array: Elements, start: float) -> Floats:
-    return exact_signals(found, (SNAP,), array, SONAR, None, start, 512)[0]
+    return DirectSum().pressure(found, (SNAP,), Reception(array, SONAR, None, start, 512))[0]
 
 
 def alone(law: Kirchhoff, sensor: int) -> Arrivals:

@@ -14,7 +14,6 @@ from sonarsynth.products import Arrivals
 from sonarsynth.receiver import LowPass, PositionTable, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.array_paths import array_paths, folded
-from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import (
     fir,
     pulse_spectrum,
@@ -23,6 +22,7 @@ from sonarsynth.signals.filtered_pulse import (
     stretched_spectra,
 )
 from sonarsynth.signals.pulse_shapes import shape_modes
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.state import Emission
@@ -60,8 +60,8 @@ def alone(sonar: Sonar, phase: float = 0.0, delay_std: float = 0.0, doppler: flo
     of = arrivals([0.05], [[1.0, 0.0, 0.0]], [10.0], [1.0])
     of = replace(of, phase=np.array([phase]), delay_std=np.array([delay_std]), doppler=np.array([doppler]))
     start, samples = window(of, sonar, 0.0, 6e-3)
-    got, signals = exact_signals(of, SNAPS, ONE, sonar, None, start, samples)
-    assert signals.outside == 0
+    got, outside = DirectSum().pressure(of, SNAPS, Reception(ONE, sonar, None, start, samples))
+    assert outside == 0
     return start + np.arange(samples) / sonar.sampling_frequency - 0.05, got[0]
 
 
@@ -127,8 +127,8 @@ def test_kernel_deposit_is_the_exact_sum(method: GriddedSynthesis, bound: float)
     of = shaped(target_at(8.0, 9, 2, refracted=True, direct=False), 3)
     of = replace(of, snap=np.random.default_rng(4).integers(0, 2, of.delay.size))
     start, samples = window(of, SHARP, array.aperture)
-    exact, _ = exact_signals(of, snaps, array, SHARP, absorption, start, samples)
-    got, outside = method.pressure(of, snaps, array, SHARP, absorption, start, samples)
+    exact, _ = DirectSum().pressure(of, snaps, Reception(array, SHARP, absorption, start, samples))
+    got, outside = method.pressure(of, snaps, Reception(array, SHARP, absorption, start, samples))
     assert outside == 0
     assert 1e-14 < error(got, exact) < bound
 
@@ -140,8 +140,8 @@ def test_many_shapes_over_the_whole_array(phase: float, delay_std: float) -> Non
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:2], 250)
     part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
     start, samples = window(of, SONAR, FACES.aperture)
-    exact, _ = exact_signals(of, SNAPS, part, SONAR, absorption, start, samples)
-    got = GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(part, SONAR, absorption, start, samples))
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure
     assert error(got[some], exact) < 1e-4
 
 
@@ -151,10 +151,12 @@ def test_one_odd_path_among_many_is_not_lost() -> None:
     of = replace(of, phase=np.where(np.arange(1000) == 500, 0.02, 0.0), amplitude=np.full(1000, 1e-4))
     start, samples = window(of, SONAR, FACES.aperture)
     plain = replace(of, phase=np.zeros(1000))
-    got, without = (GriddedSynthesis().pressure(x, SNAPS, FACES, SONAR, None, start, samples)[0] for x in (of, plain))
+    got, without = (
+        GriddedSynthesis().pressure(x, SNAPS, Reception(FACES, SONAR, None, start, samples))[0] for x in (of, plain)
+    )
     odd = of.select(np.array([500]))
     parts = (
-        DirectSum().signals(x, SNAPS, FACES, SONAR, None, start, samples).pressure
+        DirectSum().signals(x, SNAPS, Reception(FACES, SONAR, None, start, samples)).pressure
         for x in (odd, replace(odd, phase=np.zeros(1)))
     )
     turned, straight = parts
@@ -173,7 +175,9 @@ def test_half_turns_are_signs_and_nothing_is_nothing(method: DirectSum | Gridded
     turns = np.random.default_rng(9).integers(-9, 9, 12)
     half = replace(of, phase=np.pi * turns)
     signed = replace(of, amplitude=of.amplitude * (-1.0) ** turns)
-    got, expected = (method.signals(x, SNAPS, array, SHARP, None, start, samples).pressure for x in (half, signed))
+    got, expected = (
+        method.signals(x, SNAPS, Reception(array, SHARP, None, start, samples)).pressure for x in (half, signed)
+    )
     np.testing.assert_array_equal(got, expected)
 
 
@@ -184,7 +188,7 @@ def test_a_turn_keeps_the_energy_and_turns_add_up(method: DirectSum | GriddedSyn
 
     def heard(*phase: float) -> Floats:
         turned = replace(of, phase=np.array(phase))
-        return method.signals(turned, SNAPS, ONE, SHARP, None, start, samples).pressure[0].astype(float)
+        return method.signals(turned, SNAPS, Reception(ONE, SHARP, None, start, samples)).pressure[0].astype(float)
 
     plain, quarter = heard(0.0, 0.0), heard(0.5 * np.pi, 0.5 * np.pi)
     for angle in (0.3, 1.0, 2.5):
@@ -203,7 +207,7 @@ def test_blurs_add_by_squares_and_end_in_silence(method: DirectSum | GriddedSynt
 
     def heard(*delay_std: float) -> Floats:
         soft = replace(of, delay_std=np.array(delay_std))
-        got = method.signals(soft, SNAPS, ONE, SHARP, None, start, samples)
+        got = method.signals(soft, SNAPS, Reception(ONE, SHARP, None, start, samples))
         assert got.outside == 0
         return got.pressure[0].astype(float)
 
@@ -223,9 +227,9 @@ def test_shared_shapes_cost_no_modes() -> None:
     of = target_at(15.0, 6, 10, direct=False)
     start, samples = window(of, SHARP, 0.0, 1e-3)
     once = replace(of, phase=np.full(6, 0.8), delay_std=np.full(6, 4e-6), doppler=np.full(6, 2e-3))
-    exact, _ = exact_signals(once, SNAPS, ONE, SHARP, None, start, samples)
+    exact, _ = DirectSum().pressure(once, SNAPS, Reception(ONE, SHARP, None, start, samples))
     got, _ = GriddedSynthesis(width=14, precision="float64", tolerance=1e-10).pressure(
-        once, SNAPS, ONE, SHARP, None, start, samples
+        once, SNAPS, Reception(ONE, SHARP, None, start, samples)
     )
     assert error(got, exact) < 1e-8
 

@@ -19,6 +19,7 @@ from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import FacetLaw, Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.signals import DirectSum, GriddedSynthesis
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
@@ -146,8 +147,8 @@ def test_signals_of_one_expansion_are_those_of_each_hydrophone_alone(scene: tupl
         mine, theirs = both(found, exact)
         for direct in (True, False):
             some, other = mine.select(mine.direct == direct), theirs.select(theirs.direct == direct)
-            got = method.pressure(some, (SNAP,), ROMANIS, SONAR, None, START, 4000)[0][sensor]
-            want = method.pressure(other, (SNAP,), single(), SONAR, None, START, 4000)[0][0]
+            got = method.pressure(some, (SNAP,), Reception(ROMANIS, SONAR, None, START, 4000))[0][sensor]
+            want = method.pressure(other, (SNAP,), Reception(single(), SONAR, None, START, 4000))[0][0]
             assert np.linalg.norm(want) > 0.0
             assert np.linalg.norm(got - want) < most * np.linalg.norm(want)
 
@@ -166,8 +167,10 @@ def test_every_edge_of_a_blur_is_within_the_window_or_counted() -> None:
     terms[0, [1, 4, 7, 9]] = 0.0, 0.0, 4e-10, 4e-10
     one = replace(one, expansion=replace(one.expansion, delay_variance=terms).without("phase"))
     array = few()
-    exact = DirectSum().signals(one, (SNAP,), array, SONAR, None, START, 4000).pressure
-    got = GriddedSynthesis(precision="float64", tolerance=1e-6).signals(one, (SNAP,), array, SONAR, None, START, 4000)
+    exact = DirectSum().signals(one, (SNAP,), Reception(array, SONAR, None, START, 4000)).pressure
+    got = GriddedSynthesis(precision="float64", tolerance=1e-6).signals(
+        one, (SNAP,), Reception(array, SONAR, None, START, 4000)
+    )
     assert np.abs(got.pressure - exact).max() < 1e-4 * np.abs(exact).max()
     size = np.linalg.norm(exact, axis=1)
     assert size.max() > 2.0 * size.min()
@@ -190,10 +193,10 @@ def test_the_fast_synthesis_changes_pulses_as_the_exact_one_does(amplify: float)
     array = few()
     for direct in (True, False):
         part = found.select(found.direct == direct)
-        want = DirectSum().signals(part, (SNAP,), array, SONAR, None, START, 4000).pressure
+        want = DirectSum().signals(part, (SNAP,), Reception(array, SONAR, None, START, 4000)).pressure
         for method, most in (
             (GriddedSynthesis(), 2e-4),
             (GriddedSynthesis(precision="float64", tolerance=1e-6, width=12), 2e-6),
         ):
-            got = method.signals(part, (SNAP,), array, SONAR, None, START, 4000).pressure
+            got = method.signals(part, (SNAP,), Reception(array, SONAR, None, START, 4000)).pressure
             assert np.abs(got - want).max() < most * np.abs(want).max()

@@ -16,7 +16,8 @@ from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.direct_sum import DirectSum
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
@@ -76,7 +77,7 @@ def traced(
 
 def heard(found: Arrivals, array: Elements, start: float) -> Floats:
     snap = Emission(PLACE, 0.0, LogarithmicBubble(), None)
-    return exact_signals(found, (snap,), array, SONAR, None, start, 512)[0]
+    return DirectSum().pressure(found, (snap,), Reception(array, SONAR, None, start, 512))[0]
 
 
 def bounced(found: Arrivals, bounces: int) -> Arrivals:

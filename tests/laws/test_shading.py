@@ -19,7 +19,8 @@ from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe import Recipe
 from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths
-from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.direct_sum import DirectSum
+from sonarsynth.signals.segments import Reception
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target import Target
 from tests.laws.test_synthesis import FACES, SNAPS, SONAR, absorption, error, some_of, target_at, window
@@ -91,11 +92,11 @@ def test_shadows_of_paths_that_are_loud_at_the_rim_alone_are_kept() -> None:
     of = replace(of, expansion=replace(of.expansion, amplitude=terms))
     start, samples = window(of, SONAR, FACES)
     some = np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:4]
-    exact, _ = exact_signals(
-        of.for_sensors(some, FACES.count), SNAPS, FACES.select(some), SONAR, absorption, start, samples
+    exact, _ = DirectSum().pressure(
+        of.for_sensors(some, FACES.count), SNAPS, Reception(FACES.select(some), SONAR, absorption, start, samples)
     )
     for method in (GriddedSynthesis(), GriddedSynthesis(tolerance=1e-3)):
-        got = method.signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure[some]
+        got = method.signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure[some]
         assert error(got, exact) < method.tolerance
 
 
@@ -158,9 +159,13 @@ def test_kernel_deposit_keeps_silent_where_the_exact_sum_does(hidden: int, step:
     array = some_of(FACES, step)
     of = partly_hidden(target_at(8.0, 40, 2, refracted=True, direct=True), hidden, array.count)
     start, samples = window(of, SONAR, array)
-    exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
-    got = GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure
-    plain = GriddedSynthesis().signals(of.seen_from_centre, SNAPS, array, SONAR, absorption, start, samples).pressure
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples)).pressure
+    plain = (
+        GriddedSynthesis()
+        .signals(of.seen_from_centre, SNAPS, Reception(array, SONAR, absorption, start, samples))
+        .pressure
+    )
     late = slice(int((of.delay[of.target == 0].min() - 1e-3 - start) * SONAR.sampling_frequency), None)
     assert error(got[:, late], exact[:, late]) < 1e-4
     assert error(got, exact) < 1e-4
@@ -185,7 +190,7 @@ def test_shade_of_another_array_is_refused() -> None:
     start, samples = window(of, SONAR, FACES)
     array = replace(FACES, position=FACES.position[:9], gain=FACES.gain[:9])
     with pytest.raises(ValueError, match="hidden from hydrophones of another array"):
-        GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples)
+        GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
 
 
 @pytest.mark.long

@@ -14,7 +14,7 @@ from sonarsynth.equations.noise import filters
 from sonarsynth.receiver import LowPass, PositionTable, Romanis, Sonar, elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.signals import GriddedSynthesis, pulse_support
-from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.direct_sum import DirectSum
 from sonarsynth.signals.filtered_pulse import (
     LONGEST_TAIL,
     at_longest,
@@ -24,6 +24,7 @@ from sonarsynth.signals.filtered_pulse import (
     snap_gains,
     snap_levels,
 )
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble, SnapModel, SnappingShrimp
 from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
 from sonarsynth.sources.snap_pulses import largest_scales, waveform
@@ -112,8 +113,8 @@ def test_the_fast_synthesis_of_different_snaps_is_the_exact_one(tmp_path: Path) 
     )
     for sonar in (SONAR, Sonar(filter=LOW, sampling_frequency=250e3)):
         start, samples = float(of.delay.min()) - 4e-3, int(9e-3 * sonar.sampling_frequency)
-        exact, _ = exact_signals(of, snaps, array, sonar, absorption, start, samples)
-        got, _ = GriddedSynthesis().pressure(of, snaps, array, sonar, absorption, start, samples)
+        exact, _ = DirectSum().pressure(of, snaps, Reception(array, sonar, absorption, start, samples))
+        got, _ = GriddedSynthesis().pressure(of, snaps, Reception(array, sonar, absorption, start, samples))
         assert 1e-9 < error(got, exact) < 3e-4
 
 
@@ -122,7 +123,9 @@ def test_a_path_gives_the_pulse_itself(width: float) -> None:
     of = arrivals([0.05], [[1.0, 0.0, 0.0]], [10.0], [1.0])
     start, samples = 0.047, 1200
     for model in MODELS:
-        got, _ = exact_signals(of, (snap(model, gain=1.5, width=width),), ONE, SONAR, None, start, samples)
+        got, _ = DirectSum().pressure(
+            of, (snap(model, gain=1.5, width=width),), Reception(ONE, SONAR, None, start, samples)
+        )
         made = pulses.scaled(model.pulse(0.0, 2.0 * pulses.reach(fir(SONAR.antialias))), 1.5, width)
         t = start + np.arange(samples) / SONAR.sampling_frequency - 0.05
         assert error(got[0], pulses.filtered(t, made, fir(SONAR.antialias))) < 1e-3  # the filter's stop band is cut

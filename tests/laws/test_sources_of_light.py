@@ -19,6 +19,7 @@ from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import LowPass, PositionTable, Sonar, elements
 from sonarsynth.scattering import Isotropic
 from sonarsynth.signals import DirectSum
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.snap_models import Gabor
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.tracing.arrivals import trace
@@ -48,7 +49,9 @@ def traced(snap: Emission, sonar: Floats = STILL) -> Arrivals:
 
 
 def heard(found: Arrivals, snap: Emission, start: float, samples: int) -> Floats:
-    return np.asarray(DirectSum().signals(found, (snap,), ARRAY, SONAR, None, start, samples).pressure, float)
+    return np.asarray(
+        DirectSum().signals(found, (snap,), Reception(ARRAY, SONAR, None, start, samples)).pressure, float
+    )
 
 
 def tone(time: Floats) -> Floats:

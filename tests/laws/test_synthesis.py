@@ -13,10 +13,10 @@ from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind
 from sonarsynth.receiver import Band, BandPass, Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
-from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.signals.gridded.nodes import chebyshev, interpolation, nodes_for
 from sonarsynth.signals.gridded_synthesis import deposit_error
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.state import Emission
@@ -139,7 +139,7 @@ def test_exact_sum_is_the_filtered_snap_at_the_exact_delays() -> None:
     array = some_of(FACES, 100, face=0.0)
     of = target_at(12.0, 3, 1, direct=False)
     start, samples = window(of, SHARP, array)
-    got, _ = exact_signals(of, SNAPS, array, SHARP, None, start, samples)
+    got, _ = DirectSum().pressure(of, SNAPS, Reception(array, SHARP, None, start, samples))
     expected = np.zeros_like(got)
     t = start + np.arange(samples) / SHARP.sampling_frequency
     for e in range(3):
@@ -157,7 +157,7 @@ def test_exact_sum_with_the_default_filter_leaves_out_what_would_fold() -> None:
     array = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
     of = arrivals([0.01], [[1.0, 0.2, 0.0]], [10.0], [1.0])
     start, samples = window(of, SONAR, array)
-    got, _ = exact_signals(of, SNAPS, array, SONAR, None, start, samples)
+    got, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, None, start, samples))
     t = start + np.arange(samples) / SONAR.sampling_frequency - 0.01
     exact = filtered_pulse(t, MODEL.bubble, fir(SONAR.antialias))
     assert 1e-8 < error(got[0], exact) < 2e-5  # 80 dB down and beyond half the sampling frequency
@@ -171,8 +171,10 @@ def test_element_face_is_the_mean_of_points_over_it() -> None:
     of = arrivals([0.01], [[1.0, 0.35, -0.2]], [np.inf], [1.0])
     one = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=face))
     start, samples = window(of, SONAR, one)
-    got, _ = exact_signals(of, SNAPS, one, SONAR, None, start, samples)
-    mean, _ = exact_signals(of, SNAPS, elements(PositionTable(positions=points)), SONAR, None, start, samples)
+    got, _ = DirectSum().pressure(of, SNAPS, Reception(one, SONAR, None, start, samples))
+    mean, _ = DirectSum().pressure(
+        of, SNAPS, Reception(elements(PositionTable(positions=points)), SONAR, None, start, samples)
+    )
     assert error(got[0], mean.mean(axis=0)) < 3e-3
     assert element_directivity(80e3, of.direction[0], face, C) < 0.7  # so the face does something
 
@@ -182,8 +184,8 @@ def test_absorption_is_relative_to_the_band_centre() -> None:
     array = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
     of = arrivals([0.01], [[1.0, 0.0, 0.0]], [10.0], [10 ** (-40 / 20)], loss=np.array([40.0]))
     start, samples = window(of, SONAR, array)
-    lost, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
-    plain, _ = exact_signals(of, SNAPS, array, SONAR, None, start, samples)
+    lost, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
+    plain, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, None, start, samples))
     f = np.fft.rfftfreq(samples, 1 / SONAR.sampling_frequency)
     inside = (f > 30e3) & (f < 80e3)
     ratio = np.abs(np.fft.rfft(lost[0]) / np.fft.rfft(plain[0]))[inside]
@@ -202,8 +204,8 @@ def test_many_echoes_of_one_sign_keep_the_error_of_each(seed: int) -> None:
     spread = rng.uniform(-1, 1, (count, 3)) * [0.1, 0.03, 0.03]
     found = arrivals(0.02 + 1.5e-4 * rng.random(count), [1.0, 0.0, 0.0] + spread, np.full(count, 20.0), np.ones(count))
     array = some_of(FACES, 100, 0.0)
-    exact, _ = exact_signals(found, SNAPS, array, sonar, None, 0.0185, 1024)
-    fast, _ = method.pressure(found, SNAPS, array, sonar, None, 0.0185, 1024)
+    exact, _ = DirectSum().pressure(found, SNAPS, Reception(array, sonar, None, 0.0185, 1024))
+    fast, _ = method.pressure(found, SNAPS, Reception(array, sonar, None, 0.0185, 1024))
     assert np.abs(fast - exact).max() < deposit_error(method) * np.abs(exact).max()
 
 
@@ -223,8 +225,8 @@ def test_paths_of_one_sign_at_few_hydrophones_keep_the_bound(seed: int, toleranc
     found = replace(found, expansion=ArrayExpansion.none(count, array.aperture))
     start, samples = delay.min() - 0.4 / C, int((np.ptp(delay) + 0.8 / C) * 196e3) + 200
     method = GriddedSynthesis(width=8, tolerance=tolerance)
-    exact, _ = exact_signals(found, SNAPS, array, SONAR, None, start, samples)
-    fast, _ = method.pressure(found, SNAPS, array, SONAR, None, start, samples)
+    exact, _ = DirectSum().pressure(found, SNAPS, Reception(array, SONAR, None, start, samples))
+    fast, _ = method.pressure(found, SNAPS, Reception(array, SONAR, None, start, samples))
     assert np.abs(fast - exact).max() < deposit_error(method) * np.abs(exact).max()
 
 
@@ -236,8 +238,8 @@ def test_what_a_narrow_filter_leaks_is_heard(low: float, width: float, transitio
     sonar, method = Sonar(band=band, filter=chosen), GriddedSynthesis(width=8, tolerance=2e-5)
     found = target_at(20.0, count, 3, direct=False)
     start, samples = window(found, sonar, FACES)
-    exact, _ = exact_signals(found, SNAPS, some_of(FACES, 127), sonar, absorption, start, samples)
-    fast, _ = method.pressure(found, SNAPS, FACES, sonar, absorption, start, samples)
+    exact, _ = DirectSum().pressure(found, SNAPS, Reception(some_of(FACES, 127), sonar, absorption, start, samples))
+    fast, _ = method.pressure(found, SNAPS, Reception(FACES, sonar, absorption, start, samples))
     assert error(fast[::127], exact) < deposit_error(method)
 
 
@@ -249,8 +251,8 @@ def test_a_pulse_by_itself_keeps_the_bound(distance: float, tolerance: float) ->
     places = [(0.0, 0.05 * y, 0.05 * z) for y in range(-4, 4) for z in range(-3, 3)]
     array = elements(PositionTable(positions=tuple(places), face=0.05))
     found = arrivals(np.array([0.02]), np.array([[0.88, 0.45, 0.15]]), np.array([distance]), np.ones(1))
-    exact, _ = exact_signals(found, SNAPS, array, SONAR, None, 0.0185, 1024)
-    fast, _ = method.pressure(found, SNAPS, array, SONAR, None, 0.0185, 1024)
+    exact, _ = DirectSum().pressure(found, SNAPS, Reception(array, SONAR, None, 0.0185, 1024))
+    fast, _ = method.pressure(found, SNAPS, Reception(array, SONAR, None, 0.0185, 1024))
     assert np.abs(fast - exact).max() < deposit_error(method) * np.abs(exact).max()
 
 
@@ -260,8 +262,8 @@ def test_kernel_deposit_is_the_exact_sum(distance: float, refracted: bool) -> No
     array = some_of(FACES, 32)
     of = target_at(distance, 40, 2, refracted=refracted, direct=False)
     start, samples = window(of, SONAR, array)
-    exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
-    got = GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
     assert error(got.pressure, exact) < 1e-4
     assert got.outside == 0
     assert got.pressure.dtype == np.float32
@@ -274,8 +276,8 @@ def test_few_hydrophones_hear_as_exactly_as_many(count: int, refracted: bool) ->
     array = FACES.select(np.linspace(7, FACES.count - 1, count).astype(int))
     of = target_at(20.0, 40, 2, refracted=refracted, direct=False)
     start, samples = window(of, SONAR, FACES)
-    exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
-    got = GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
     assert error(got.pressure, exact) < 1e-4
 
 
@@ -283,8 +285,8 @@ def test_nodes_over_the_aperture_serve_the_whole_array() -> None:
     """Enough paths that nodes pay: 508 hydrophones interpolated from some tens of points, the direct snap apart."""
     of = target_at(20.0, 500, 3)
     start, samples = window(of, SONAR, FACES)
-    got = GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure[::127]
-    exact, _ = exact_signals(of, SNAPS, some_of(FACES, 127), SONAR, absorption, start, samples)
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure[::127]
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(some_of(FACES, 127), SONAR, absorption, start, samples))
     late = int((of.delay[of.target == 0].min() - 2.3e-3 - start) * SONAR.sampling_frequency)
     assert error(got[:, late:], exact[:, late:]) < 1e-4  # relative to the echo
     assert error(got, exact) < 1e-4
@@ -302,8 +304,8 @@ def test_bodies_heard_one_after_the_other_are_each_where_they_belong() -> None:
         loss=np.tile(body.absorption, len(sides)),
     )
     start, samples = window(of, SONAR, FACES)
-    got = GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure[::127]
-    exact, _ = exact_signals(of, SNAPS, some_of(FACES, 127), SONAR, absorption, start, samples)
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure[::127]
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(some_of(FACES, 127), SONAR, absorption, start, samples))
     assert error(got, exact) < 1e-4
 
 
@@ -314,10 +316,10 @@ def test_lobes_that_vary_over_the_aperture(size: float) -> None:
     terms = np.random.default_rng(18).uniform(-1, 1, (400, 20)) * size
     of = replace(of, expansion=replace(of.expansion, amplitude=terms))
     start, samples = window(of, SONAR, FACES)
-    got = GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:4], 250)  # rim and middle
     part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
-    exact, _ = exact_signals(of, SNAPS, part, SONAR, absorption, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(part, SONAR, absorption, start, samples))
     assert error(got[some], exact) < 1e-4
 
 
@@ -326,9 +328,9 @@ def test_one_path_needs_no_deposit() -> None:
     array = some_of(FACES, 20)
     of = target_at(15.0, 1, 19, refracted=True)
     start, samples = window(of, SONAR, array)
-    exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
     got, _ = GriddedSynthesis(tolerance=1e-6, precision="float64").pressure(
-        of, SNAPS, array, SONAR, absorption, start, samples
+        of, SNAPS, Reception(array, SONAR, absorption, start, samples)
     )
     assert 1e-14 < error(got, exact) < 1e-6
 
@@ -366,8 +368,8 @@ def test_each_knob_buys_its_error(method: GriddedSynthesis, bound: float) -> Non
     array = some_of(FACES, 30)
     of = target_at(8.0, 20, 4, refracted=True, direct=False)
     start, samples = window(of, SHARP, array)
-    exact, _ = exact_signals(of, SNAPS, array, SHARP, absorption, start, samples)
-    got, _ = method.pressure(of, SNAPS, array, SHARP, absorption, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SHARP, absorption, start, samples))
+    got, _ = method.pressure(of, SNAPS, Reception(array, SHARP, absorption, start, samples))
     assert 1e-14 < error(got, exact) < bound
 
 
@@ -377,8 +379,8 @@ def test_hydrophones_anywhere_and_plane_waves() -> None:
     n = 12
     of = arrivals(rng.uniform(0.01, 0.012, n), rng.standard_normal((n, 3)), np.full(n, np.inf), rng.standard_normal(n))
     start, samples = window(of, SONAR, array)
-    exact, _ = exact_signals(of, SNAPS, array, SONAR, None, start, samples)
-    got = GriddedSynthesis().signals(of, SNAPS, array, SONAR, None, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, None, start, samples))
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, None, start, samples))
     assert error(got.pressure, exact) < 1e-4
 
 
@@ -390,10 +392,13 @@ def test_several_snaps_of_different_kinds_and_levels() -> None:
     of = arrivals(of.delay, of.direction, of.radius, of.amplitude, snap=rng.integers(0, 3, 30))
     array = some_of(FACES, 60)
     start, samples = window(of, SONAR, array)
-    exact, _ = exact_signals(of, snaps, array, SONAR, None, start, samples)
-    got = GriddedSynthesis().signals(of, snaps, array, SONAR, None, start, samples)
+    exact, _ = DirectSum().pressure(of, snaps, Reception(array, SONAR, None, start, samples))
+    got = GriddedSynthesis().signals(of, snaps, Reception(array, SONAR, None, start, samples))
     assert error(got.pressure, exact) < 1e-4
-    parts = sum(exact_signals(of.select(of.snap == i), snaps, array, SONAR, None, start, samples)[0] for i in range(3))
+    parts = sum(
+        DirectSum().pressure(of.select(of.snap == i), snaps, Reception(array, SONAR, None, start, samples))[0]
+        for i in range(3)
+    )
     np.testing.assert_allclose(parts, exact, atol=1e-12)
 
 
@@ -405,7 +410,7 @@ Run = Callable[[Arrivals, float, int], np.ndarray]
 
 def run(method: DirectSum | GriddedSynthesis, array: Elements) -> Run:
     def go(of: Arrivals, start: float, samples: int) -> np.ndarray:
-        return method.signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure.astype(float)
+        return method.signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples)).pressure.astype(float)
 
     return go
 
@@ -446,9 +451,9 @@ def test_windows_that_adjoin_hold_what_one_window_holds(method: DirectSum | Grid
     start, samples = window(of, SONAR, array)
     fs = SONAR.sampling_frequency
     cut = int((np.median(of.delay) - start) * fs)
-    whole = method.signals(of, SNAPS, array, SONAR, absorption, start, samples)
-    first = method.signals(of, SNAPS, array, SONAR, absorption, start, cut)
-    second = method.signals(of, SNAPS, array, SONAR, absorption, start + cut / fs, samples - cut)
+    whole = method.signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
+    first = method.signals(of, SNAPS, Reception(array, SONAR, absorption, start, cut))
+    second = method.signals(of, SNAPS, Reception(array, SONAR, absorption, start + cut / fs, samples - cut))
     assert error(np.hstack([first.pressure, second.pressure]), whole.pressure) < 3e-6
     assert whole.outside == 0
     assert first.outside == 24  # every echo begins before the middle one has ended
@@ -461,7 +466,7 @@ def test_what_falls_outside_is_counted_and_never_wrapped(method: DirectSum | Gri
     of = target_at(15.0, 8, 12, direct=False)
     start, samples = window(of, SONAR, array)
     for far in (-1.0, -(samples + 300) / SONAR.sampling_frequency, samples / SONAR.sampling_frequency, 5.0):
-        got = method.signals(of, SNAPS, array, SONAR, absorption, start + far, samples)
+        got = method.signals(of, SNAPS, Reception(array, SONAR, absorption, start + far, samples))
         assert got.outside == 8
         assert not got.pressure.any()
 
@@ -470,7 +475,7 @@ def test_quiet_time_is_exactly_silent() -> None:
     array = some_of(FACES, 100)
     of = target_at(15.0, 8, 13)
     start, samples = window(of, SONAR, array)
-    got = GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples)).pressure
     silent = (got == 0.0).all(axis=0)
     before, after = pulse_support(waveform(MODEL), SONAR.antialias)
     t = start + np.arange(samples) / SONAR.sampling_frequency
@@ -495,8 +500,8 @@ def test_dead_elements_give_nothing_and_change_no_other() -> None:
     of = target_at(20.0, 50, 15)
     start, samples = window(of, SONAR, FACES)
     some = elements(Romanis(dead=(0, 200, 507)))
-    alive = GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, None, start, samples).pressure
-    got = GriddedSynthesis().signals(of, SNAPS, some, SONAR, None, start, samples).pressure
+    alive = GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, None, start, samples)).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, Reception(some, SONAR, None, start, samples)).pressure
     assert not got[[0, 200, 507]].any()
     rest = some.gain > 0
     np.testing.assert_array_equal(got[rest], alive[rest])
@@ -505,5 +510,8 @@ def test_dead_elements_give_nothing_and_change_no_other() -> None:
 def test_the_same_bits_every_time() -> None:
     of = target_at(20.0, 300, 16)
     start, samples = window(of, SONAR, FACES)
-    a, b = (GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure for _ in range(2))
+    a, b = (
+        GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure
+        for _ in range(2)
+    )
     np.testing.assert_array_equal(a, b)

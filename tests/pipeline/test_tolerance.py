@@ -17,6 +17,7 @@ from sonarsynth.planning.choosing import HEARD_AT, heard_at
 from sonarsynth.receiver.subarrays import subarray, subarrays
 from sonarsynth.recipe import Accuracy, reading
 from sonarsynth.signals import GriddedSynthesis
+from sonarsynth.signals.segments import Reception
 from tests.scenes import remus
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -56,12 +57,16 @@ def _error(made: Plan, index: int, sensors: np.ndarray) -> float:
             arrivals = arrivals_of(made, frame, part)
             some = arrivals.select(arrivals.direct == direct)
             method = made.choices.synthesis
-            heard = method.signals(some, snaps, part.elements, sonar, made.absorption, start, samples).pressure
+            heard = method.signals(
+                some, snaps, Reception(part.elements, sonar, made.absorption, start, samples)
+            ).pressure
             for n in mine:
                 one = subarray(made.elements, part.sensor[n : n + 1])
                 own = arrivals_of(alone, frame, one)
                 own = own.select(own.direct == direct)
-                truth = EXACT.pressure(own, snaps, one.elements, sonar, made.absorption, start, samples)[0][0]
+                truth = EXACT.pressure(own, snaps, Reception(one.elements, sonar, made.absorption, start, samples))[0][
+                    0
+                ]
                 missed += float(np.sum((heard[n] - truth) ** 2))
                 size += float(np.sum(truth**2))
         worst.append(np.sqrt(missed / size))

@@ -10,11 +10,12 @@ from sonarsynth.environment.sea import Absorption, Environment, Tabulated
 from sonarsynth.geometry.motion import Still
 from sonarsynth.pipeline import beamform_frame, range_frame, render, trace_frame
 from sonarsynth.planning import plan
+from sonarsynth.planning.measured.sampled_arrivals import reception_of
 from sonarsynth.receiver import BeamGrid, Converter, Sonar
 from sonarsynth.recipe.scene import Scene, Trajectory, World
 from sonarsynth.scattering import MirrorLobe
 from sonarsynth.signals import GriddedSynthesis
-from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.direct_sum import DirectSum
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.targets.target import Target
@@ -114,16 +115,9 @@ def test_narrow_lobes_are_synthesised_as_stated() -> None:
     traced = trace_frame(made, 0)
     echoes = np.flatnonzero(~traced.arrivals.direct)
     chosen = echoes[np.argsort(-traced.arrivals.amplitude[echoes])[:40]]
-    arguments = (
-        traced.arrivals.select(np.sort(chosen)),
-        traced.frame.moment.snaps,
-        made.elements,
-        made.scene.sonar,
-        made.absorption,
-        float(made.windows.start[0]),
-        made.windows.samples,
-    )
-    exact, fast = exact_signals(*arguments)[0], GriddedSynthesis().signals(*arguments).pressure
+    reception = reception_of(made, traced.frame)
+    arguments = traced.arrivals.select(np.sort(chosen)), traced.frame.moment.snaps, reception
+    exact, fast = DirectSum().pressure(*arguments)[0], GriddedSynthesis().signals(*arguments).pressure
     assert np.abs(fast - exact).max() < 2e-4 * np.abs(exact).max()
 
 

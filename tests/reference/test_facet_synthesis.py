@@ -17,9 +17,9 @@ from sonarsynth.products import Arrivals
 from sonarsynth.receiver import LowPass, PositionTable, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.array_paths import array_paths
-from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.pulse_shapes import MOST_PHASE, shape_modes
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.snap_models import Ricker
 from sonarsynth.sources.snap_pulses import waveform
 from tests.laws.test_synthesis import (
@@ -87,12 +87,12 @@ def test_kernel_deposit_is_the_exact_sum(kind: dict[str, float], also: bool, son
     of = shaped(of, 3) if also else of
     array = some_of(FACES, 130)
     start, samples = window(of, sonar)
-    exact, _ = exact_signals(of, SNAPS, array, sonar, absorption, start, samples)
-    got, outside = GriddedSynthesis().pressure(of, SNAPS, array, sonar, absorption, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, sonar, absorption, start, samples))
+    got, outside = GriddedSynthesis().pressure(of, SNAPS, Reception(array, sonar, absorption, start, samples))
     assert outside == 0
     assert 1e-14 < error(got, exact) < 1e-4
     if sonar is SHARP:
-        got, _ = PRECISE.pressure(of, SNAPS, array, sonar, absorption, start, samples)
+        got, _ = PRECISE.pressure(of, SNAPS, Reception(array, sonar, absorption, start, samples))
         assert error(got, exact) < 1e-9
 
 
@@ -102,8 +102,8 @@ def test_long_facets_of_a_fast_converter_are_taken_up_to_where_the_filter_stops(
     array, fast = some_of(FACES, 12), replace(SONAR, sampling_frequency=1e6)
     snaps = (replace(SNAPS[0], model=Ricker(frequency=400e3)),)  # most of it beyond the band
     start, samples = window(of, fast)
-    exact, _ = exact_signals(of, snaps, array, fast, absorption, start, samples)
-    got, _ = GriddedSynthesis().pressure(of, snaps, array, fast, absorption, start, samples)
+    exact, _ = DirectSum().pressure(of, snaps, Reception(array, fast, absorption, start, samples))
+    got, _ = GriddedSynthesis().pressure(of, snaps, Reception(array, fast, absorption, start, samples))
     assert 1e-14 < error(got, exact) < 2e-4
 
 
@@ -124,8 +124,8 @@ def test_any_mixture_is_the_exact_sum(
     of = shaped(of, seed) if also else of
     array = some_of(FACES, 250)
     start, samples = window(of, SHARP)
-    exact, _ = exact_signals(of, SNAPS, array, SHARP, absorption, start, samples)
-    got, _ = PRECISE.pressure(of, SNAPS, array, SHARP, absorption, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SHARP, absorption, start, samples))
+    got, _ = PRECISE.pressure(of, SNAPS, Reception(array, SHARP, absorption, start, samples))
     assert np.isfinite(got).all()
     assert np.abs(got - exact).max() <= 1e-8 * np.abs(exact).max()
 
@@ -160,16 +160,16 @@ def test_a_coherent_body_whose_facets_cancel() -> None:
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:1], 250)
     part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
     start, samples = window(of, SONAR)
-    exact, _ = exact_signals(of, SNAPS, part, SONAR, absorption, start, samples)
-    got, _ = GriddedSynthesis().pressure(of, SNAPS, FACES, SONAR, absorption, start, samples)
+    exact, _ = DirectSum().pressure(of, SNAPS, Reception(part, SONAR, absorption, start, samples))
+    got, _ = GriddedSynthesis().pressure(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples))
     one = of.select(np.array([int(np.argmax(of.amplitude))]))
-    alone, _ = exact_signals(one, SNAPS, part, SONAR, absorption, start, samples)
+    alone, _ = DirectSum().pressure(one, SNAPS, Reception(part, SONAR, absorption, start, samples))
     assert np.abs(of.amplitude).sum() / one.amplitude[0] * np.abs(alone).max() > 10.0 * np.abs(exact).max()
     assert error(got[some], exact) < 1e-4
     # as loud as the echo of a sphere: half its radius
     point = replace(one, amplitude=one.amplitude * 0.05 / f[np.argmax(of.amplitude)], coherent=np.zeros(1, bool))
-    ball, _ = exact_signals(
-        replace(point, corner_delays=np.zeros((1, 3))), SNAPS, part, SONAR, absorption, start, samples
+    ball, _ = DirectSum().pressure(
+        replace(point, corner_delays=np.zeros((1, 3))), SNAPS, Reception(part, SONAR, absorption, start, samples)
     )
     assert np.sqrt((exact**2).sum() / (ball**2).sum()) == pytest.approx(1.0, abs=0.05)
 
@@ -215,7 +215,7 @@ def test_what_is_no_facet_is_refused() -> None:
     ):
         for method in (DirectSum(), GriddedSynthesis()):
             with pytest.raises(ValueError, match=message):
-                method.signals(replace(of, **columns), SNAPS, FACES, SONAR, None, start, samples)
+                method.signals(replace(of, **columns), SNAPS, Reception(FACES, SONAR, None, start, samples))
 
 
 def test_facets_too_large_for_modes_are_refused_and_the_exact_sum_takes_them() -> None:
@@ -227,14 +227,18 @@ def test_facets_too_large_for_modes_are_refused_and_the_exact_sum_takes_them() -
     def of_size(size: float) -> Arrivals:
         return replace(of, corner_delays=size * np.array([[-1.0, 0.0, 1.0]] * 3 + [[-0.5, 0.0, 0.5]]))
 
-    exact, _ = exact_signals(of_size(0.99 * limit), SNAPS, array, SONAR, None, start, samples)
-    got, _ = GriddedSynthesis().pressure(of_size(0.99 * limit), SNAPS, array, SONAR, None, start, samples)
+    exact, _ = DirectSum().pressure(of_size(0.99 * limit), SNAPS, Reception(array, SONAR, None, start, samples))
+    got, _ = GriddedSynthesis().pressure(of_size(0.99 * limit), SNAPS, Reception(array, SONAR, None, start, samples))
     assert error(got, exact) < 1e-4
     with pytest.raises(FieldError, match="direct_sum"):
-        GriddedSynthesis().pressure(of_size(1.1 * limit), SNAPS, array, SONAR, None, start, samples)
-    assert np.isfinite(exact_signals(of_size(1.1 * limit), SNAPS, array, SONAR, None, start, samples)[0]).all()
+        GriddedSynthesis().pressure(of_size(1.1 * limit), SNAPS, Reception(array, SONAR, None, start, samples))
+    assert np.isfinite(
+        DirectSum().pressure(of_size(1.1 * limit), SNAPS, Reception(array, SONAR, None, start, samples))[0]
+    ).all()
     alike = replace(
         of, corner_delays=np.tile([-3e-5, 0.0, 3e-5], (4, 1))
     )  # one shape for all is exact, whatever its size
-    exact, _ = exact_signals(alike, SNAPS, array, SONAR, None, start, samples)
-    assert error(GriddedSynthesis().pressure(alike, SNAPS, array, SONAR, None, start, samples)[0], exact) < 1e-4
+    exact, _ = DirectSum().pressure(alike, SNAPS, Reception(array, SONAR, None, start, samples))
+    assert (
+        error(GriddedSynthesis().pressure(alike, SNAPS, Reception(array, SONAR, None, start, samples))[0], exact) < 1e-4
+    )

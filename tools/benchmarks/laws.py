@@ -12,10 +12,10 @@ from benchmarks.timing import RECIPE, cpu
 from sonarsynth import pipeline, planning
 from sonarsynth.pipeline import TracedFrame
 from sonarsynth.planning import Plan
+from sonarsynth.planning.measured.sampled_arrivals import reception_of
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.recipe import reading
 from sonarsynth.signals import DirectSum
-from sonarsynth.signals.direct_sum import exact_signals
 
 LAWS = {
     "lobe": ss.MirrorLobe(),
@@ -45,10 +45,8 @@ def plain(arrivals: Arrivals) -> Arrivals:
 
 def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
     """What reaches the hydrophones: no noise, no converter."""
-    return plan.scene.physics.synthesis.signals(
-        traced.arrivals, traced.frame.moment.snaps, plan.elements, plan.scene.sonar, plan.absorption,
-        float(plan.windows.start[traced.frame.index]), plan.windows.samples,
-    )  # fmt: skip
+    reception = reception_of(plan, traced.frame)
+    return plan.scene.physics.synthesis.signals(traced.arrivals, traced.frame.moment.snaps, reception)
 
 
 def synthesis_ms(plan: Plan, index: int) -> tuple[float, float, float]:
@@ -61,9 +59,10 @@ def synthesis_ms(plan: Plan, index: int) -> tuple[float, float, float]:
     outmost = int(np.argmax(np.linalg.norm(elements.position, axis=1)))
     some = np.unique([outmost, *HEARD])
     few = elements.select(some)
-    sonar, start = plan.scene.sonar, float(plan.windows.start[index])
     heard = echoes.arrivals.for_sensors(some, elements.count)
-    exact, _ = exact_signals(heard, traced.frame.moment.snaps, few, sonar, plan.absorption, start, plan.windows.samples)
+    exact, _ = DirectSum().pressure(
+        heard, traced.frame.moment.snaps, reception_of(plan, traced.frame)._replace(elements=few)
+    )
     times = []
     for make in (lambda a: a, plain):
         others = []

@@ -12,7 +12,7 @@ from sonarsynth.conventions import Floats, Ints, direction
 from sonarsynth.description.method import Demand
 from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.planning.listening_windows import frame_start
-from sonarsynth.planning.measured.sampled_arrivals import sampled_arrivals
+from sonarsynth.planning.measured.sampled_arrivals import reception_of, sampled_arrivals
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Signals
 from sonarsynth.signals.auto_synthesis import DEFAULT_ERROR, deposit_for
@@ -88,7 +88,7 @@ def _signals_of_frame(plan: Plan, index: int) -> tuple[Signals, float, float] | 
     sonar = plan.scene.sonar
     # Not by the plan's own method: direct sums would take minutes, and the same signals go into both images.
     imaged = arrivals.select(~arrivals.direct) if plan.windows.direct_removed else arrivals
-    signals = deposit_for(DEFAULT_ERROR).signals(imaged, snaps, plan.elements, sonar, plan.absorption, start, samples)
+    signals = deposit_for(DEFAULT_ERROR).signals(imaged, snaps, reception_of(plan, frame))
     direct, levels = arrivals.select(arrivals.direct), np.array(snap_levels(snaps))
     loudest = np.argmax(levels[direct.snap] + 20.0 * np.log10(np.abs(direct.amplitude)))
     clock = float(direct.delay[loudest])

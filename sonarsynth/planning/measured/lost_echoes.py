@@ -8,7 +8,13 @@ import numpy as np
 
 from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.planning.listening_windows import frame_start
-from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, behind_baffle, receiver_of, survey_of
+from sonarsynth.planning.measured.sampled_arrivals import (
+    arrivals_of,
+    behind_baffle,
+    receiver_of,
+    reception_of,
+    survey_of,
+)
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Signals, SourceEstimates
@@ -78,8 +84,7 @@ def losses(plan: Plan, index: int) -> EchoLosses | None:
     lit, method = arrivals.snap == arrivals.snap[first], deposit_for(DEFAULT_ERROR)
 
     def hear(selected: np.ndarray) -> Signals:
-        own = arrivals.select(selected & lit)
-        return method.signals(own, snaps, plan.elements, sonar, plan.absorption, start, windows.samples)
+        return method.signals(arrivals.select(selected & lit), snaps, reception_of(plan, frame))
 
     direct = hear(straight)
     echoes = [hear(arrivals.target == target) for target in range(len(frame.moment.bodies))]

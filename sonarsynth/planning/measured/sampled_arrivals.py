@@ -17,6 +17,7 @@ from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.receiver.subarrays import Subarray
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import Synthesis
+from sonarsynth.signals.segments import Reception
 from sonarsynth.state import FrameContext, Receiver, Survey, Tolerances
 from sonarsynth.tracing.arrivals import trace
 
@@ -94,6 +95,11 @@ def survey_of(plan: Plan, frame: Frame) -> Survey:
     return Survey(plan.scene.world.environment.depth, plan.profile, told)
 
 
+def reception_of(plan: Plan, frame: Frame) -> Reception:
+    """What hears the arrivals of a frame, and when."""
+    return Reception(plan.elements, plan.scene.sonar, plan.absorption, frame_start(plan, frame), plan.windows.samples)
+
+
 def subarray_pose(pose: Pose, subarray: Subarray) -> Pose:
     """The pose of a part of an array that has a pose."""
     return Pose(pose.to_world(subarray.centre[None, :])[0], pose.orientation)
@@ -103,11 +109,9 @@ def pressures(
     plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: Synthesis
 ) -> tuple[Floats, Floats]:
     """Echoes and direct arrivals (sensor, sample) in Pa, each by itself, of given arrivals."""
-    start, samples = frame_start(plan, frame), plan.windows.samples
-    sonar, snaps = plan.scene.sonar, frame.moment.snaps
-    received = []
+    reception, received = reception_of(plan, frame)._replace(elements=elements), []
     for mask in (~arrivals.direct, arrivals.direct):
-        arguments = arrivals.select(mask), snaps, elements, sonar, plan.absorption, start, samples
+        arguments = arrivals.select(mask), frame.moment.snaps, reception
         unrounded = getattr(method, "pressure", None)
         received.append(unrounded(*arguments)[0] if unrounded is not None else method.signals(*arguments).pressure)
     return np.asarray(received[0], float), np.asarray(received[1], float)

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonarsynth.conventions import depth, evenly
-from sonarsynth.planning.listening_windows import frame_start
-from sonarsynth.planning.measured.sampled_arrivals import behind_baffle, context_of
+from sonarsynth.planning.measured.sampled_arrivals import behind_baffle, context_of, reception_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Plan
 from sonarsynth.receiver.sensor_errors import drawn_errors
@@ -40,13 +39,11 @@ def clipping_notes(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
 def excess(plan: Plan, frame: Frame) -> float:
     """Level (dB) of the largest pressure of the direct pulses of a frame over the full scale of the converter; without
     echoes, noise and chorus. `plan` is that of the frame's sequence, whose sonar has a converter."""
-    sonar, snaps = plan.scene.sonar, frame.moment.snaps
+    sonar = plan.scene.sonar
     assert sonar.converter is not None
     arrivals = trace(replace(context_of(plan, frame), bodies=(), laws=()), plan.propagation)
-    signals = deposit_for(DEFAULT_ERROR).signals(
-        behind_baffle(arrivals, sonar), snaps, plan.elements, sonar, plan.absorption,
-        frame_start(plan, frame), plan.windows.samples,
-    )  # fmt: skip
+    heard = behind_baffle(arrivals, sonar)
+    signals = deposit_for(DEFAULT_ERROR).signals(heard, frame.moment.snaps, reception_of(plan, frame))
     if sonar.sensor_errors is not None:
         drawn = drawn_errors(sonar.sensor_errors, plan.elements.count, frame.seed, frame.key)
         speed = float(plan.profile.at(depth(frame.sonar_pose.position)))

@@ -18,6 +18,7 @@ from sonarsynth.receiver import Band, BeamGrid, LowPass, PlanarLattice, Position
 from sonarsynth.scattering.boundaries import BoundarySite, WindySurface
 from sonarsynth.scattering.isotropic import Isotropic
 from sonarsynth.signals import DirectSum, GriddedSynthesis
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.snap_models import Gabor, Ricker
 from sonarsynth.state import Receiver, Survey
 from sonarsynth.targets.meshes import mesh_of
@@ -97,7 +98,7 @@ def _one_sample() -> CaseResult:
         start = float(np.linalg.norm(position)) / C + late
         exact = direct(FEW, position, times(start, 1))
         for method in methods():
-            signals = method.signals(arrivals, snaps, FEW, SONAR, None, start, 1)
+            signals = method.signals(arrivals, snaps, Reception(FEW, SONAR, None, start, 1))
             results.append(off(np.abs(signals.pressure - exact).max() / peak, FINE, "of peak"))
     short = synthesised(methods()[0], arrivals, snaps, FEW, start, 1)
     image = refused(lambda: FocusedDelayAndSum().image(short, FEW, SONAR, start, start), "window")

@@ -16,6 +16,7 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Band, Elements, LowPass, Sonar
+from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import SnapModel
 from sonarsynth.sources.snap_models import Ricker
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
@@ -75,7 +76,7 @@ def synthesised(
     sonar: Sonar = SONAR,
 ) -> Signals:
     """Signals of paths."""
-    return method.signals(arrivals, tuple(snaps), elements, sonar, None, start, samples)
+    return method.signals(arrivals, tuple(snaps), Reception(elements, sonar, None, start, samples))
 
 
 def ricker(time: Floats, frequency: float = PULSE.frequency) -> Floats:
