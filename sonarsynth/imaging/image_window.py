@@ -31,16 +31,19 @@ def snapshots_of(
     first, count = gate_samples(start, stop, signals.start, rate, signals.pressure.shape[1])
     frequency, spectra, power = gated_spectra(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
     if lasting is None:
-        lasting = _lasting(power.astype(float)) / rate
+        begins, ends = sounding(power.astype(float))
+        lasting = (ends - begins) / rate
     spacing, begin = frequency_spacing(count, rate), signals.start + first / rate
     return Snapshots(frequency, spacing, spectra, begin, count, rate, lasting)
 
 
-def _lasting(power: Floats) -> int:
-    """Samples from where a power (sample,) has `QUIET` of its energy behind it to where it has so much before it."""
+def sounding(power: Floats) -> tuple[int, int]:
+    """The first sample, and the one after the last, of what a power (sample,) has but for `QUIET` of its energy before
+    and as much after."""
     silence = QUIET * power.sum()
     before, after = np.cumsum(power), np.cumsum(power[::-1])
-    return max(len(power) - int(np.searchsorted(before, silence)) - int(np.searchsorted(after, silence)), 0)
+    first, stop = int(np.searchsorted(before, silence)), len(power) - int(np.searchsorted(after, silence))
+    return first, max(first, stop)
 
 
 def weights(elements: Elements, shading: Shading) -> Floats:

@@ -12,8 +12,9 @@ from typing import Final
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, direction
+from sonarsynth.equations.arrays.gates import GATE_TAPER, gate_samples
 from sonarsynth.imaging import FocusedDelayAndSum
-from sonarsynth.imaging.image_window import snapshots_of
+from sonarsynth.imaging.image_window import snapshots_of, sounding
 from sonarsynth.labels.estimate_labels import heard_first
 from sonarsynth.pipeline.labelled_estimates import heard_directly
 from sonarsynth.pipeline.stage_times import mark_stage
@@ -26,6 +27,8 @@ from sonarsynth.recipe.scene import Frame
 
 MOST: Final = 64
 """Beams of a target that are looked at, spread evenly over all of its beams."""
+FINE: Final = 256
+"""Bins of the band at least, so that little lies between its edges and the next bins."""
 SILENCE: Final = 1e-32
 """Pa2 s, -200 dB: what stands for nothing at all, so that every ratio is a number."""
 Part = Pressure | None  # None: silence
@@ -132,7 +135,17 @@ class _Look:
         """Energy (beam,) in Pa2 s of pressure in beams (beam,)."""
         if pressure is None:
             return np.zeros(len(beams))
-        heard = replace(self.signals, pressure=pressure)
-        snapshots = snapshots_of(heard, self.sonar, *self.window, lasting=self.window[1] - self.window[0])
+        heard, (start, stop) = replace(self.signals, pressure=pressure), self._gate(pressure)
+        snapshots = snapshots_of(heard, self.sonar, start, stop, lasting=stop - start)
         steered = self.method.steer(snapshots, self.elements, self.sonar, self.grid[beams])
         return np.asarray(snapshots.unit * np.sum(np.abs(steered).astype(float) ** 2, axis=1))
+
+    def _gate(self, pressure: Pressure) -> tuple[float, float]:
+        """The part (s) of the window that pressure sounds in, as beams delay it: an echo is over soon."""
+        (start, stop), rate, band = self.window, self.signals.sampling_frequency, self.sonar.band
+        first, count = gate_samples(start, stop, self.signals.start, rate, pressure.shape[1])
+        inside = pressure[:, first : first + count]
+        begins, ends = (n / rate for n in sounding(np.einsum("ij,ij->j", inside, inside).astype(float)))
+        apart = GATE_TAPER + self.elements.aperture / self.sonar.assumed_sound_speed
+        apart = max(apart, 0.5 * (FINE / (band.high - band.low) - ends + begins))
+        return max(start, start + begins - apart), min(stop, start + ends + apart)
