@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from functools import lru_cache
 
 import numpy as np
 
@@ -24,9 +24,6 @@ from sonarsynth.receiver import elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.filtered_pulse import snap_levels
-
-if TYPE_CHECKING:
-    from sonarsynth.planning.plans import Windows
 
 MARGIN = 0.1e-3
 """Seconds added at both ends of every window. Covers what straight rays leave out of an arrival time: under 2 us at
@@ -105,10 +102,14 @@ def frame_start(plan: Plan, frame: Frame) -> float:
 
     Raises FieldError for a frame that was not looked at before and does not fit in the windows.
     """
+    planned = float(plan.windows.start[frame.index])
+    return planned if np.isfinite(planned) else _new_start(plan, frame)
+
+
+@lru_cache(maxsize=4)  # every stage of a frame asks for it
+def _new_start(plan: Plan, frame: Frame) -> float:
+    """As `frame_start`, of a frame that was not looked at before."""
     windows, scene = plan.windows, plan.scene
-    planned = float(windows.start[frame.index])
-    if np.isfinite(planned):
-        return planned
     (span,) = _spans(SampledScene(scene, plan.profile, (frame,)))
     supports, rate, gate = windows.supports, scene.sonar.sampling_frequency, scene.processing.echo_window
     first = float(_first_sample(np.asarray(span.first), supports, rate))

@@ -93,15 +93,11 @@ class Plan:
     odds: str = ""  # of finding targets in frames that were tried; "": none were, or no target is in view
     sources: tuple[Source, ...] | None = None  # in the place of the recipe's (`other_sources`); None: those
 
-    @property
+    @cached_property
     def scene(self) -> Scene:
         """The scene of the sequence."""
-        return self.recipe.scene_of(self.sequence) if self.sources is None else self._with_sources
-
-    @cached_property
-    def _with_sources(self) -> Scene:
-        assert self.sources is not None
-        return with_sources(self.recipe.scene_of(self.sequence), self.sources)
+        scene = self.recipe.scene_of(self.sequence)
+        return scene if self.sources is None else with_sources(scene, self.sources)
 
     def frame(self, index: int) -> Frame:
         """Frame number `index`, which is one of the sequence."""
