@@ -79,7 +79,8 @@ class PositionTable:
 
     kind: Literal["position_table"] = "position_table"
     positions: Annotated[tuple[Position, ...], MinLen(1)]
-    """Positions (x, y, z) of the elements."""
+    """Positions (x, y, z) of the elements; `{table: array.csv}` reads them from a table with these columns, of m or
+    with a unit: `x [mm]`."""
     face: NonNegativeMetres = 0.0
     """Side of the square face of an element, 0 for point hydrophones."""
     dead: tuple[int, ...] = ()

@@ -347,3 +347,53 @@ def test_the_digest_of_a_recipe_is_of_what_its_files_hold(home: Path) -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
     trimesh.Trimesh(vertices, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).export(other)
     assert reading.load(recipe(home, "other.stl")).digest != made.digest
+
+
+ARRAY = "array: {kind: position_table, positions: [[0, 0.05, 0.05], [0, -0.05, 0.05], [0.01, 0, -0.05]]}"
+STONES = "{kind: stones, positions: [[3, 50.5], [-4, 60]]}"
+"""What tables stand for: of an array, and of stones."""
+
+
+def tabled(home: Path, array: str, stones: str = "x,y\n3,50.5\n-4,60\n") -> Path:
+    (home / "array.csv").write_text(array)
+    (home / "stones.csv").write_text(stones)
+    table = "{kind: position_table, positions: {table: array.csv}}"
+    return listed(home, f"array: {table}", "{kind: stones, positions: {table: stones.csv}}")
+
+
+def listed(home: Path, array: str = ARRAY, stones: str = STONES) -> Path:
+    file = recipe(home, "here.stl")
+    text = re.sub(r"array: \{.*\}", array, file.read_text())
+    file.write_text(re.sub(r"( +)targets:", rf"\1scatterers: [{stones}]\n\1targets:", text, count=1))
+    return file
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        "x,y,z\n0,0.05,0.05\n0,-0.05,0.05\n0.01,0,-0.05\n",
+        "z [cm], x (mm), y\n5, 0, 0.05\n5, 0, -0.05\n-5, 10, 0\n",
+    ],
+)
+def test_positions_in_a_table_are_those_written_in_a_list(home: Path, array: str) -> None:
+    assert reading.load(tabled(home, array)) == reading.load(listed(home))
+
+
+@pytest.mark.parametrize(
+    ("array", "words"),
+    [
+        ("x,y\n0,1\n", "array.csv: has no column 'z'; known: x, y, z"),
+        ("x,y,z,gain\n0,1,2,3\n", "array.csv: 'gain' is no column; known: x, y, z"),
+        ("x,y,z\n0,1,2\n0,b,2\n", "array.csv, line 3: y: 'b' is not a number"),
+        ("x,y,z\n0,nan,2\n", "array.csv, line 2: y: 'nan' is not a number"),
+        ("x,y,z\n0,1\n", "array.csv, line 2: must have 3 values"),
+        ("x,y,z\n", "array.csv: has no rows under its column names"),
+        ("", "array.csv: has no column 'x'; known: x, y, z"),
+        ("x,y [furlong],z\n0,1,2\n", "has unit 'furlong'"),
+    ],
+)
+def test_a_table_that_has_no_positions_is_one_clear_line(home: Path, array: str, words: str) -> None:
+    with pytest.raises(RecipeError) as error:
+        reading.load(tabled(home, array))
+    assert "scene.sonar.array.positions" in str(error.value)
+    assert words in str(error.value)

@@ -23,7 +23,7 @@ class Stones(ScatteringField):
 
     kind: Literal["stones"] = "stones"
     positions: Annotated[tuple[tuple[Metres, Metres], ...], MinLen(1), MaxLen(100_000)]
-    """East and north of each."""
+    """East and north of each; `{table: stones.csv}` reads them from a table with columns x and y."""
     radius: PositiveMetres = 0.1
     """Radius of each stone."""
 

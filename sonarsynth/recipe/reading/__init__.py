@@ -22,7 +22,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.recipe import FILE_KINDS, Recipe
 from sonarsynth.recipe.reading.json_schema import schema, schema_text
 from sonarsynth.recipe.reading.messages import explain
-from sonarsynth.recipe.reading.model_tables import with_models
+from sonarsynth.recipe.reading.recipe_tables import with_tables
 from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, override, read_file, read_text
 from sonarsynth.recipe.variation.values import Where
 
@@ -93,7 +93,7 @@ def read(path: Path | str, sets: Sequence[str] = ()) -> Source:
 
 def recipe_of(source: Source, *, check_files: bool = True, resolved: bool = False) -> Recipe:
     """The recipe that a source describes, files resolved to absolute paths. Raises RecipeError."""
-    source = source if resolved else with_models(source)
+    source = source if resolved else with_tables(source)
     data = _resolved(source, source.data, (), check_files)
     try:
         return _ADAPTER.validate_json(json.dumps(data), strict=True, context={"resolved": resolved})

@@ -240,7 +240,7 @@ def _broken() -> CaseResult:
             ("file\nnone.stl", "no such file"),
             ("file,weight\nempty.stl,much", "must be a plain number"),
             ("file,shape\nempty.stl,ball", "'shape' is no column"),
-            ("file", "lists no model"),
+            ("file", "has no rows"),
             ("\x00\xff", "is no column"),
         ):
             (folder / "hulls/all.csv").write_text(row)
