@@ -92,6 +92,17 @@ class Receiver:
         """Of sound at the middle of the array, m/s."""
         return float(medium.profile.at(depth(self.pose.position)))
 
+    def seen(self, towards: Floats, time: Floats) -> Floats:
+        """Directions (path, xyz) of the world in the frame of the array, at times (path,) s after the instant of the
+        frame, by when it has turned on as it then does."""
+        direction = towards @ self.pose.rotation
+        if self.track is None or not (spin := self.pose.turn_to_body(self.track.spin)).any():
+            return np.asarray(direction)
+        rate = float(np.linalg.norm(spin))
+        axis, turned = spin / rate, -rate * time[:, None]
+        along = (direction @ axis)[:, None] * axis
+        return along + np.cos(turned) * (direction - along) + np.sin(turned) * np.cross(axis, direction)
+
 
 @dataclass(frozen=True, eq=False)
 class Trigger:

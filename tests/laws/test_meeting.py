@@ -9,6 +9,8 @@ import pytest
 from scipy.optimize import brentq
 
 from sonarsynth.description import FieldError
+from sonarsynth.environment.noise.directions import OneDirection
+from sonarsynth.environment.noise.flat_noise import FlatNoise
 from sonarsynth.geometry.hovering import Hover
 from sonarsynth.geometry.motion import Circle, ConstantVelocity, Still, Track, Waypoint, Waypoints, pose, spin, velocity
 from sonarsynth.labels import label
@@ -158,6 +160,20 @@ def test_a_plan_says_by_how_much_signals_err_where_bodies_or_sonar_turn(body, ow
     (row,) = (o for o in made.left_out if "motion" in o.what)
     error, said = np.abs(heard[0] - heard[1]).max() / np.abs(heard[1]).max(), float(row.bound.split(" of the")[0])
     assert 0.0 < error < said < 10.0 * error < made.recipe.accuracy.signal
+
+
+def test_a_plan_says_how_far_a_sonar_turns_while_it_hears_noise() -> None:
+    """Its rate times the time from the instant of the frame to the end of what is heard; nothing at rest."""
+    for own in (None, Circle(centre=(2.0, 0.0, -5.0), radius=2.0, speed=0.6, bearing=1.5 * np.pi)):
+        recipe = reflected(STAYS, own)
+        environment = replace(
+            recipe.scene.world.environment, noise=FlatNoise(level=30.0, directions=OneDirection(bearing=1.0))
+        )
+        scene = replace(recipe.scene, world=replace(recipe.scene.world, environment=environment))
+        made = plan(replace(recipe, scene=scene), ("signals",), Choices())
+        rows = [float(o.bound.split()[3]) for o in made.left_out if "in noise" in o.what]
+        last = made.windows.start[0] + made.windows.samples / scene.sonar.sampling_frequency
+        assert rows == ([] if own is None else pytest.approx([np.rad2deg(0.3 * last)], rel=0.1))
 
 
 def test_a_target_that_turns_is_refused_where_a_reflection_would_meet_it_out_of_the_water() -> None:

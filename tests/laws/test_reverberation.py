@@ -16,7 +16,7 @@ from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.reverberation.speckle import SINC
 from sonarsynth.frontiers.signal_knobs import speckle_points
 from sonarsynth.geometry import Pose
-from sonarsynth.geometry.motion import Still
+from sonarsynth.geometry.motion import Still, Waypoint, Waypoints, pose
 from sonarsynth.pipeline import render, synthesise, trace_at
 from sonarsynth.pipeline.frame_reverberation import scattered_paths
 from sonarsynth.pipeline.synthesis import frame_signals
@@ -121,6 +121,19 @@ def test_the_contrast_counted_in_a_frame_is_what_the_knob_says() -> None:
     for point in points:
         assert point.error / float(point.setting) == pytest.approx(1.0, abs=0.06 if float(point.setting) < 1.0 else 0.2)
         assert abs(point.also["level_db"]) < 10.0 * np.log10(1.0 + 4.0 / point.also["scatterers"] ** 0.5)
+
+
+def test_a_sonar_that_turns_where_it_is_hears_scatterers_where_they_are() -> None:
+    """Each at its time in the attitude of then: those that a sonar at rest hears, at 90 degrees a second."""
+    times = ((0.0, 0.0), (2.0, np.pi))
+    points = tuple(Waypoint(time=t, position=BACK.position, heading=0.99 * angle) for t, angle in times)
+    turning, still = Waypoints(points=points, pitch=0.3), replace(BACK, pitch=0.3)
+    found, rest = heard(plan(recipe(sonar=turning))), heard(plan(recipe(sonar=still)))
+    assert np.array_equal(found.delay, rest.delay) and np.ptp(found.delay) > 0.02
+    for n in range(0, len(found.delay), 97):
+        there = pose(still, 0.0).turn_to_world(rest.direction[n])
+        seen = pose(turning, float(found.delay[n])).turn_to_body(there)
+        np.testing.assert_allclose(found.direction[n], seen, atol=1e-12)
 
 
 def test_nothing_comes_before_the_first_possible_echo() -> None:

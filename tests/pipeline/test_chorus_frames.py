@@ -63,12 +63,19 @@ def test_parts_of_the_sea_add_up_and_change_no_draw_of_each_other() -> None:
     assert np.abs(together - sum(alone)).max() < 1e-2 * quietest
 
 
-@pytest.mark.parametrize("sonar", ["still", "over the border of a cell"])
+STILL = "{kind: still, position: [0, 0, -5], heading: 90 deg}"
+OVER_A_BORDER = "{kind: course, start: [24.994 m, 0 m, -5 m], heading: 90 deg, speed: 2 m/s}"  # of a cell
+TURNS = (
+    "{kind: waypoints, points: [{time: -1 s, position: [0, 0, -5], heading: 20 deg}, "
+    "{time: 1 s, position: [0, 0, -5], heading: 160 deg}]}"
+)
+
+
+@pytest.mark.parametrize("sonar", [STILL, OVER_A_BORDER, TURNS])
 def test_overlapping_windows_hear_the_same_chorus(sonar: str) -> None:
     """Two frames 2 ms apart hear the same sea: their records agree where they overlap."""
-    moving = "{kind: course, start: [24.994 m, 0 m, -5 m], heading: 90 deg, speed: 2 m/s}"
     more = (
-        *(() if sonar == "still" else (f"scene.trajectory.sonar={moving}",)),
+        f"scene.trajectory.sonar={sonar}",
         "scene.world.chorus={density: 0.05, reach: 60 m, images: 1, distant: false}",
         "scene.world.sources.0.source_level=0 dB",
         "scene.world.environment.noise=null",

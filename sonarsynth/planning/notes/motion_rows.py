@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import context_of
 from sonarsynth.planning.plan_tables import Omission
 from sonarsynth.planning.plans import Plan
@@ -22,7 +23,8 @@ def motion_left_out(plan: Plan, frame: Frame) -> list[Omission]:
         return [Omission("Doppler", "not requested: positions are those at the time of the frame", _moved(plan))]
     what, model = "bodies are posed when sound meets their middle", "the sonar when it hears that"
     why = f"{what}, {model}; from there constant velocity and spin"
-    return [Omission("motion of targets and sonar beyond constant velocity and spin", why, _carried(plan, frame))]
+    carried = Omission("motion of targets and sonar beyond constant velocity and spin", why, _carried(plan, frame))
+    return [carried, *_background(plan, frame)]
 
 
 def _carried(plan: Plan, frame: Frame) -> str:
@@ -77,6 +79,26 @@ def _hiding_bodies_off(times: MeetingTimes, context: FrameContext, snap: int, sp
             late = last - first[n] + 2.0 * (bodies[n].mesh.radius + others) / speed
             off.append(float(np.linalg.norm(bodies[n].velocity) * late))
     return max(off)
+
+
+def _background(plan: Plan, frame: Frame) -> list[Omission]:
+    """What the sonar does, of which what is heard beside snaps and echoes has nothing."""
+    world, sonar, start, rows = plan.scene.world, frame.sonar_track, frame_start(plan, frame), list[Omission]()
+    late = max(abs(start), start + plan.windows.samples / plan.scene.sonar.sampling_frequency)
+    level = sonar.velocity * (1.0, 1.0, 0.0)
+    then = sonar.later(late).pose
+    off = float(np.linalg.norm(then.position - sonar.pose.position - level * late))
+    if off > 1e-9 and (world.chorus is not None or world.reverberation is not None):
+        why = "level velocity and spin, of the time of the frame"
+        what = "climb and acceleration of the sonar in reverberation and chorus"
+        rows.append(Omission(what, why, f"places up to {off:.1g} m off in the first frame"))
+    turned = float(np.rad2deg(np.linalg.norm(then.rotation - sonar.pose.rotation)) / np.sqrt(2.0))
+    fields = [(noise.played, of) for noise in world.environment.noises if (of := noise.directions) is not None]
+    waves = any(played or of.toward is not None for played, of in fields)
+    if turned > 1e-6 and (waves or world.noise_sources):  # the rest is alike in all azimuths
+        why, bound = "it comes from where it does at the frame's time", f"directions up to {turned:.2g} degrees off"
+        rows.append(Omission("turning of the sonar within a frame, in noise", why, f"{bound} in the first frame"))
+    return rows
 
 
 def _moved(plan: Plan) -> str:

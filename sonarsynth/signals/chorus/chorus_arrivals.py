@@ -150,9 +150,9 @@ def chorus_arrivals(
 ) -> ChorusArrivals:
     """Arrivals in a window (s, after the instant of the frame, which is `time` (s) after the start of the motions).
 
-    The array moves from snap to snap at its velocity; while it hears one it is at rest. A path so rough that the phase
-    of its reflections is lost (2 pi f sigma > 1 in the middle of the band) keeps its energy, with a random sign. Paths
-    that are `FAINT` are left out.
+    The array moves from snap to snap at its velocity and spin; while it hears one it is at rest. A path so rough that
+    the phase of its reflections is lost (2 pi f sigma > 1 in the middle of the band) keeps its energy, with a random
+    sign. Paths that are `FAINT` are left out.
     """
     distance = np.hypot(*(snaps.position - receiver.pose.position[:2]).T)
     ring = np.clip(np.searchsorted(reach.edges, distance), 1, None) - 1
@@ -184,7 +184,7 @@ def chorus_arrivals(
     used, number = np.unique(snap, return_inverse=True)
     chorus = ChorusArrivals(
         delay=delay,
-        direction=towards @ receiver.pose.rotation,
+        direction=receiver.seen(towards, delay),
         length=length,
         gain=np.where(lost, sign, 1.0) * louder[snap] * bounced.modulus / np.maximum(length, CAVITY),
         phase=np.where(lost, 0.0, bounced.phase),

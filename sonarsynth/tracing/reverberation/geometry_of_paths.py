@@ -57,7 +57,7 @@ def back_ways(medium: Medium, receiver: Receiver, end: Floats, bounces: int, own
 def scattered_paths(
     position: Floats, emission: Emission, medium: Medium, receiver: Receiver, out: UnfoldedPaths, back: UnfoldedPaths
 ) -> ScatteredPaths:
-    """Paths by places (point, xyz) m. The array is where it is when they arrive."""
+    """Paths by places (point, xyz) m. The array is where its velocity, and its spin, bring it till they arrive."""
     velocity = np.zeros(3) if receiver.track is None else receiver.track.velocity
     begin, away = emission.position, position - emission.position
     over = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
@@ -83,7 +83,7 @@ def scattered_paths(
     if back.own:
         factor = factor * _with_own_image(medium, back.own, sine_out, receiver.centre, 1.0, 1.0)
     if receiver.sonar.baffle:
-        factor = factor * np.where((towards @ receiver.pose.rotation)[:, 0] < 0.0, receiver.sonar.behind, 1.0)
+        factor = factor * np.where(receiver.seen(towards, late)[:, 0] < 0.0, receiver.sonar.behind, 1.0)
     factor = (
         factor * _reflected(medium, out, sine_in, receiver.centre) * _reflected(medium, back, sine_out, receiver.centre)
     )

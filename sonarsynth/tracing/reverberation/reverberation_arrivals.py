@@ -113,7 +113,7 @@ def reverberation_arrivals(
         )
     drawn = [_drawn(described, f, x, snaps, medium, receiver, listening, number(seed, f.owner, key))
              for f, x in zip(audible, expected, strict=True)]  # fmt: skip
-    return _joined(drawn, audible, names, tuple(left_out), receiver.pose.rotation, receiver.speed(medium))
+    return _joined(drawn, audible, names, tuple(left_out), receiver, receiver.speed(medium))
 
 
 class _DrawnScatterers(NamedTuple):
@@ -156,7 +156,7 @@ def _joined(
     families: list[Family],
     names: tuple[str, ...],
     left_out: tuple[tuple[str, float], ...],
-    rotation: Floats,
+    receiver: Receiver,
     sound_speed: float,
 ) -> ReverberationArrivals:
     def joined(values: list[Floats], shape: tuple[int, ...] = ()) -> Floats:
@@ -167,7 +167,7 @@ def _joined(
     none = np.zeros(len(delay))
     return ReverberationArrivals(
         delay=delay,
-        direction=joined([p.towards for p in paths], (3,)) @ rotation,
+        direction=receiver.seen(joined([p.towards for p in paths], (3,)), delay),
         length=joined([p.back for p in paths]),
         gain=joined([p.gain for p in drawn]),
         phase=none,
