@@ -78,6 +78,11 @@ class Unit:
         """True where people write another unit than the one inside: a bare number could be either."""
         return self.symbol in ("rad", "rad/s")
 
+    @property
+    def _written(self) -> str:
+        """The unit that people write."""
+        return self.symbol.replace("rad", "deg")
+
     def validate(self, value: Any, info: ValidationInfo) -> Any:
         """`parse`, where bare numbers are refused in recipes (JSON) that could be of two units.
 
@@ -85,8 +90,7 @@ class Unit:
         """
         bare = self.ambiguous and type(value) in (int, float) and value != 0  # a default comes as NumPy's float64
         if bare and info.mode == "json" and not (info.context or {}).get("resolved"):
-            degrees = self.symbol.replace("rad", "deg")
-            raise ValueError(f"{value} could be {value} {degrees} or {value} {self.symbol}: write the unit")
+            raise ValueError(f"{value} could be {value} {self._written} or {value} {self.symbol}: write the unit")
         number = self.parse(value)
         return bounded(number, f" {self.symbol}") if info.mode == "json" else number
 
@@ -108,7 +112,8 @@ class Unit:
         try:
             number = float(text)
         except ValueError:
-            spaced = f"must be a number in {self.symbol}, or a text such as '1 {self.symbol}', with a space"
+            number = "" if self.ambiguous else f"a number in {self.symbol}, or "
+            spaced = f"must be {number}a text such as '1 {self._written}', with a space"
             raise ValueError(f"{spaced}, not {value[:40]!r}") from None
         if symbol not in accepted:
             raise ValueError(
