@@ -242,7 +242,8 @@ def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointClou
         return no_points()
     elements, sonar, choices = known_elements(plan, frame), plan.scene.sonar, plan.choices
     loudest = ranging_kernels.peak(signals.pressure)
-    window = ReceivedWindow(elements, sonar, image, beams, loudest, beamformed.signals, estimates)
+    pulse = plan.windows.supports.direct
+    window = ReceivedWindow(elements, sonar, image, beams, loudest, beamformed.signals, estimates, pulse)
     track = receiver_of(plan, frame).track
     return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile, track)
 

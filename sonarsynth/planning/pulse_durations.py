@@ -14,7 +14,7 @@ from sonarsynth.planning.plans import PulseDurations
 from sonarsynth.receiver import elements
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.signals import pulse_support
-from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, silencing_blur
+from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, envelope_delay, silencing_blur
 from sonarsynth.sources.snap_pulses import Waveform, waveform
 
 SUPPORT = 1e-7
@@ -23,6 +23,8 @@ TAIL = 1e-3
 """s after the direct pulse in its plain shape: echoes are heard from then on, though a turned one has a longer tail."""
 ECHO_SUPPORT = 1e-4
 """The echo window holds every echo down to this part of its peak: its feet, under -80 dB, are cut."""
+DIRECT = 0.1
+"""What ranging takes out of echoes is the direct pulse where it is over this part of its peak."""
 FOOT = 1e-2
 """Where the direct pulse is in the way, feet of echoes under this part of their peak may be cut."""
 
@@ -41,8 +43,17 @@ def supports_of(looks: Sequence[SampledScene]) -> PulseDurations:
         plain = _support(scene, SUPPORT, turned=False)[1]
         clear = min(after, plain + across + TAIL)  # a turned pulse may never end: what echoes meanwhile must be heard
         echo, foot = (_support(scene, threshold, turned=turned) + across for threshold in (ECHO_SUPPORT, FOOT))
-        rows.append((before, after, *echo, clear, foot.max()))
+        rows.append((before, after, *echo, clear, foot.max(), _direct(scene)))
     return PulseDurations(*(float(n) for n in np.max(rows, axis=0)))
+
+
+def _direct(scene: Scene) -> float:
+    """Longest time (s) before or after the peak of its envelope that any filtered snap exceeds `DIRECT` of its peak."""
+    sonar, longest = scene.sonar, 0.0
+    for shape in extreme_waveforms(scene):
+        (before, after), late = pulse_support(shape, sonar.antialias, DIRECT), envelope_delay(shape, sonar)
+        longest = max(longest, before + late, after - late)
+    return longest
 
 
 def _support(scene: Scene, tolerance: float, *, turned: bool) -> Floats:

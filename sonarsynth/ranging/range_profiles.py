@@ -21,7 +21,7 @@ from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.plane_waves import PlaneWaveFit
 from sonarsynth.ranging.received_window import ReceivedWindow
-from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.receiver import Band, Elements, Sonar
 
 MAX_BEAMS = 16384
 """No more beams are ranged, the loudest of them: a bound on memory where a whole image is loud."""
@@ -33,6 +33,12 @@ HALFWAY = np.array([0.605571, -0.133738, 0.032692, -0.004536], np.float32)
 The transform of all of them takes two thirds longer."""
 WHITENING = 0.03
 """Share of the pulse's largest power density below which the spectrum is no more flattened (-15 dB)."""
+OWN = 0.1 * WHITENING
+"""Share of that below which a pulse counts as having nothing at a frequency: flattening leaves 0.1 of its amplitude."""
+EDGE = 0.1
+"""Share of the band, at either end, within which a pulse may end and be tapered over all of the band: by 0.1 there."""
+FLAT = 0.75
+"""Share of the window about a pulse in which that is whole, as `pulse_times.align` cuts."""
 RESIDUE = 1e-6
 """Of the loudest pressure: what single precision and the cut tail of a pulse (1e-7 of its peak) may leave anywhere."""
 
@@ -129,14 +135,15 @@ def loudest_beams(image: EnergyImage, chosen: npt.NDArray[np.bool_]) -> tuple[tu
 
 
 def direct_spectrum(
-    signals: Signals, estimates: SourceEstimates, elements: Elements, sonar: Sonar, length: int
+    signals: Signals, estimates: SourceEstimates, elements: Elements, sonar: Sonar, length: int, pulse: float = 0.0
 ) -> Complexes:
     """Spectrum (bin,) in Pa s of the direct pulse at the array centre, without the face, about `estimates.time`.
 
-    At the frequencies of an FFT of `length` samples.
+    At the frequencies of an FFT of `length` samples. pulse (s): how long it is heard before and after that time.
     """
     c, front = sonar.assumed_sound_speed, PlaneWaveFit.of(estimates)
-    aligned = pulse_times.align(signals, elements, sonar.band, front.delays(elements, c), whole=True)
+    expected, longer = front.delays(elements, c), max(pulse / (FLAT * pulse_times.PULSE_HALF), 1.0)
+    aligned = pulse_times.align(signals, elements, sonar.band, expected, whole=True, longer=longer)
     wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
     return template_spectrum(wave.template, length)
 
@@ -158,16 +165,19 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
 
     With W the direct pulse at the array centre and D the face directivity towards the beam, the profile is the envelope
     of the inverse transform of B conj(W) D/(|W|^2 + w max|W|^2): all of the band counts alike, which is as sharp as the
-    band allows in delay, and sharper in angle than the snap's own falling spectrum. D is divided by its root mean
-    square over an echo's spectrum, or an echo would be loudest where the face hears best, nearer to the axis.
+    band allows in delay, and sharper in angle than the snap's own falling spectrum. A pulse that has less than the band
+    is tapered over what it has: steep ends of its spectrum would ring. D is divided by its root mean square over an
+    echo's spectrum, or an echo would be loudest where the face hears best, nearer to the axis.
     """
     window, sonar, elements = received.beams.snapshots, received.sonar, received.elements
     c, f, spacing = sonar.assumed_sound_speed, window.frequency, window.spacing
     lowest = round(f[0] / spacing)
-    wave = direct_spectrum(received.direct, received.estimates, elements, sonar, fast_length(window.samples))
+    samples = fast_length(window.samples)
+    wave = direct_spectrum(received.direct, received.estimates, elements, sonar, samples, received.pulse)
     wave = wave[lowest : lowest + len(f)]
     density = np.abs(wave) ** 2
-    taper = np.sin(np.pi * np.clip((f - sonar.band.low) / (sonar.band.high - sonar.band.low), 0.0, 1.0)) ** 2
+    low, high = _own_band(f, density, sonar.band)
+    taper = np.sin(np.pi * np.clip((f - low) / (high - low), 0.0, 1.0)) ** 2
     matched = wave.conj() * taper / (density + WHITENING * density.max()) if density.max() > 0 else 0 * wave
     share = np.abs(wave * matched) + np.finfo(float).tiny
     share /= share.sum()
@@ -193,6 +203,14 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
         moments=_moments(f, share, np.abs(matched) ** 2, spacing),
         filter=echoes,
     )
+
+
+def _own_band(f: Floats, density: Floats, band: Band) -> tuple[float, float]:
+    """Ends (Hz) of what a pulse has of the band, by its power densities (bin,) at frequencies (bin,); those of the band
+    where it ends next to them, and a taper over the band is small there."""
+    loud, spacing, beside = f[density >= OWN * density.max()], f[1] - f[0], EDGE * (band.high - band.low)
+    low = band.low if loud[0] < band.low + beside else float(loud[0] - spacing)
+    return low, band.high if loud[-1] > band.high - beside else float(loud[-1] + spacing)
 
 
 def _moments(f: Floats, echo: Floats, noise: Floats, spacing: float) -> Moments:

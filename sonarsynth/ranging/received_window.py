@@ -21,6 +21,7 @@ class ReceivedWindow:
     loudest: float  # Pa: largest pressure in the signals that the beams are made of
     direct: Signals  # with the direct pulse in them
     estimates: SourceEstimates
+    pulse: float = 0.0  # s: how long either side of its peak the direct pulse is heard
 
     @property
     def located(self) -> bool:
