@@ -175,7 +175,10 @@ def rays_to_centre(
     chosen: Callable[[Paths], Bools] = usable,
 ) -> ReceivePaths:  # fmt: skip
     """Rays from points (point, xyz) in the world to the array centre, sorted by point: all, or those that are chosen
-    (path,) of the usable ones."""
+    (path,) of the usable ones. Raises ValueError for an array that has moved out of the water."""
+    if receiver.track is not None and not receiver.track.still:
+        down = depth(receiver.pose.to_world(receiver.elements.position))
+        _require_between("the array, where it hears sound,", float(down.min()), float(down.max()), medium.depth)
     end = alike(receiver.pose.position, len(point))
     paths = propagation.connect(medium.profile, medium.depth, point, end)
     paths = paths.select(picked(usable(paths) & chosen(paths)))
@@ -210,9 +213,13 @@ def require_in_water(bodies: tuple[PlacedTarget, ...], bottom: float) -> None:
         for rows in in_blocks(len(body.mesh.vertices)):
             down = depth(body.pose.to_world(body.mesh.vertices[rows]))
             highest, deepest = float(down.min(initial=highest)), float(down.max(initial=deepest))
-        if highest < -TOLERANCE or deepest > bottom + TOLERANCE:
-            where = "above the surface" if highest < -TOLERANCE else "below the bottom"
-            raise ValueError(f"target '{body.name}' reaches {where} ({highest:g} to {deepest:g} m in {bottom:g} m)")
+        _require_between(f"target '{body.name}'", highest, deepest, bottom)
+
+
+def _require_between(what: str, highest: float, deepest: float, bottom: float) -> None:
+    if highest < -TOLERANCE or deepest > bottom + TOLERANCE:
+        where = "above the surface" if highest < -TOLERANCE else "below the bottom"
+        raise ValueError(f"{what} reaches {where} ({highest:g} to {deepest:g} m in {bottom:g} m)")
 
 
 def facets_of(

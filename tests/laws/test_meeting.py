@@ -176,6 +176,15 @@ def test_a_plan_says_how_far_a_sonar_turns_while_it_hears_noise() -> None:
         assert rows == ([] if own is None else pytest.approx([np.rad2deg(0.3 * last)], rel=0.1))
 
 
+@pytest.mark.parametrize("own", [ConstantVelocity(start=(0.0, 0.0, -0.03), climb=2.0),
+                                 Hover(position=(0.0, 0.0, -0.06), heave=0.5, period=2.0)])  # fmt: skip
+def test_a_sonar_that_would_hear_out_of_the_water_is_refused(own) -> None:
+    """In the water when the snap sounds, and at its instant."""
+    made = plan(reflected(STAYS, own), ("signals",), Choices())
+    with pytest.raises(ValueError, match="the array, where it hears sound, reaches above the surface"):
+        trace(context_of(made, made.recipe.frame(0)[1]), made.propagation)
+
+
 def test_a_target_that_turns_is_refused_where_a_reflection_would_meet_it_out_of_the_water() -> None:
     """In the water till the direct sound has met it."""
     rising = Hover(position=(20.0, 0.0, -0.17), heave=0.5, period=2.0)  # at 1.6 m/s
