@@ -112,8 +112,8 @@ class Unit:
         try:
             number = float(text)
         except ValueError:
-            number = "" if self.ambiguous else f"a number in {self.symbol}, or "
-            spaced = f"must be {number}a text such as '1 {self._written}', with a space"
+            plain = "" if self.ambiguous else f"a number in {self.symbol}, or "
+            spaced = f"must be {plain}a text such as '1 {self._written}', with a space"
             raise ValueError(f"{spaced}, not {value[:40]!r}") from None
         if symbol not in accepted:
             raise ValueError(
