@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge, Le, MinLen
@@ -39,6 +39,11 @@ def _as_long_as_depth(values: tuple[float, ...], info: ValidationInfo) -> tuple[
     if (depth := info.data.get("depth")) is not None and len(values) != len(depth):
         raise ValueError(f"has {len(values)} entries, but depth has {len(depth)}")
     return values
+
+
+def _of_water(model: Any) -> Any:
+    _ = model.nodes  # raises where a speed is not of water
+    return model
 
 
 @description
@@ -167,10 +172,7 @@ class Thermocline(SpeedModel):
         depth = [0.0, self.mixed_depth, self.mixed_depth + self.thickness]
         return carried_on(depth, [self.surface_speed, mixed, mixed - self.drop], self.gradient)
 
-    @model_validator(mode="after")
-    def _of_water(self) -> Thermocline:
-        _ = self.nodes  # raises where a speed is not of water
-        return self
+    _check = model_validator(mode="after")(_of_water)
 
 
 RayTimeError = Annotated[PositiveSeconds, Ge(1e-9), Le(1e-4)]
@@ -214,10 +216,7 @@ class Munk(SpeedModel):
         """Depths (m) and speeds (m/s) of the layers."""
         return munk_nodes(self.axis_depth, self.scale, self.epsilon, self.axis_speed, self.tolerance)
 
-    @model_validator(mode="after")
-    def _of_water(self) -> Munk:
-        _ = self.nodes
-        return self
+    _check = model_validator(mode="after")(_of_water)
 
 
 @description
@@ -243,10 +242,7 @@ class Catenary(SpeedModel):
         """Depths (m) and speeds (m/s) of the layers."""
         return catenary_nodes(self.axis_depth, self.scale, self.axis_speed, self.tolerance)
 
-    @model_validator(mode="after")
-    def _of_water(self) -> Catenary:
-        _ = self.nodes
-        return self
+    _check = model_validator(mode="after")(_of_water)
 
 
 SoundSpeed = Annotated[

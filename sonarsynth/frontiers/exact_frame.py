@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -171,6 +172,11 @@ def spread(live: Ints, count: int) -> Ints:
     """So many of the live hydrophones, spread by golden ratio, ascending; not those that a planner measures at."""
     turns = np.mod((np.arange(count) + 0.23) * 0.6180339887498949, 1.0)
     return np.unique(live[np.floor(turns * len(live)).astype(int)])
+
+
+def signal_point(plan: Plan, stage: str, knob: str, setting: str, error: float, seconds: float, **more: Any) -> Point:
+    """A row whose error is that of signals, relative to them; more: as the fields of `Point`."""
+    return Point(stage, knob, setting, error, "relative", plan.recipe.accuracy.signal, seconds, **more)
 
 
 def differences(measured: Sequence[Floats], exact: Sequence[Floats]) -> tuple[float, float]:

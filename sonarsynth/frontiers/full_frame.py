@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonarsynth.frontiers.exact_frame import ExactFrame, differences, exact_plan
+from sonarsynth.frontiers.exact_frame import ExactFrame, differences, exact_plan, signal_point
 from sonarsynth.frontiers.image_knobs import apart, image_point, imaged
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
@@ -48,14 +48,13 @@ def whole_points(full: FullFrame, traced: TracedBySensor, seconds: float) -> Ite
     exact, plan, accuracy = full.exact, full.exact.plan, full.exact.plan.recipe.accuracy
     synthesised = _signals(exact, traced)
     error, largest = differences(synthesised, exact.pressures)
-    yield Point(
-        stage="frame",
-        knob="signals",
-        setting="the plan",
-        error=error,
-        unit="relative",
-        allowed=accuracy.signal,
-        seconds=seconds,
+    yield signal_point(
+        plan,
+        "frame",
+        "signals",
+        "the plan",
+        error,
+        seconds,
         chosen=True,
         also={"largest": largest, "hydrophones": len(exact.sensor)},
         note=exact.partly,

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from sonarsynth.conventions import evenly
-from sonarsynth.frontiers.exact_frame import golden
+from sonarsynth.frontiers.exact_frame import golden, signal_point
 from sonarsynth.frontiers.image_knobs import image_of, imaged
 from sonarsynth.frontiers.peers import (
     acoular_image,
@@ -53,17 +53,8 @@ def synthesis_peers(plan: Plan, frame: Frame, arrivals: Arrivals) -> Iterator[Po
 
     def row(name: str, setting: str, pressure: np.ndarray, seconds: float) -> Point:
         error = float(np.linalg.norm(pressure - exact) / np.linalg.norm(exact))
-        return Point(
-            stage="synthesis",
-            knob=name,
-            setting=setting,
-            error=error,
-            unit="relative",
-            allowed=plan.recipe.accuracy.signal,
-            seconds=seconds,
-            role="peer",
-            also={"paths": len(paths.delay)},
-            note=PLAIN,
+        return signal_point(
+            plan, "synthesis", name, setting, error, seconds, role="peer", also={"paths": len(paths.delay)}, note=PLAIN
         )
 
     for asked in EPSILONS:

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from sonarsynth.conventions import evenly
-from sonarsynth.frontiers.exact_frame import Pressures, differences, golden
+from sonarsynth.frontiers.exact_frame import Pressures, differences, golden, signal_point
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.pipeline.frame_reverberation import frame_reverberation, with_reverberation
@@ -96,14 +96,13 @@ def _point(
         [np.vstack([m[n] for m in received]) for n in (0, 1)], [np.vstack([e[n] for e in exact]) for n in (0, 1)]
     )
     seconds = replace(traced, plan=replace(plan, choices=replace(plan.choices, synthesis=method))).synthesis_seconds()
-    return Point(
-        stage="synthesis",
-        knob=knob,
-        setting=named(method),
-        error=error,
-        unit="relative",
-        allowed=plan.recipe.accuracy.signal,
-        seconds=seconds,
+    return signal_point(
+        plan,
+        "synthesis",
+        knob,
+        named(method),
+        error,
+        seconds,
         chosen=chosen,
         also={"largest": largest},
         note="" if len(few) == traced.parts else f"on {len(few)} of {traced.parts} parts",
@@ -132,14 +131,13 @@ def direct_sum_point(traced: TracedBySensor) -> Point:
     per_hydrophone = max(seconds[1] - seconds[0], 0.0) / (more - few)  # of a hydrophone; the pulses' spectra serve all
     live = int(np.count_nonzero(plan.elements.gain))
     once = max(seconds[0] - few * per_hydrophone, 0.0)
-    return Point(
-        stage="synthesis",
-        knob="direct sum",
-        setting="direct sum",
-        error=0.0,
-        unit="relative",
-        allowed=plan.recipe.accuracy.signal,
-        seconds=(once * traced.parts + per_hydrophone * live) * len(arrivals.delay) / len(paths),
+    return signal_point(
+        plan,
+        "synthesis",
+        "direct sum",
+        "direct sum",
+        0.0,
+        (once * traced.parts + per_hydrophone * live) * len(arrivals.delay) / len(paths),
         chosen=isinstance(plan.choices.synthesis, DirectSum),
         note=f"cost from {len(paths)} paths at {few} and {more} hydrophones",
     )

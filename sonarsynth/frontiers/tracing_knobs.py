@@ -23,6 +23,7 @@ from sonarsynth.frontiers.exact_frame import (
     each_hydrophone,
     exact_plan,
     golden,
+    signal_point,
 )
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.planning import Plan, arrivals_of
@@ -158,14 +159,13 @@ def _of_each(exact: ExactFrame, single: SensorPressures, sensor: Ints, knob: str
     rows = np.searchsorted(exact.sensor, sensor)
     error, largest = differences(single.at(sensor), [received[rows] for received in exact.pressures])
     few = f"at {len(sensor)} hydrophones" if len(sensor) < len(exact.sensor) else exact.partly
-    return Point(
-        stage="trace",
-        knob=knob,
-        setting=setting,
-        error=error,
-        unit="relative",
-        allowed=exact.plan.recipe.accuracy.signal,
-        seconds=sum(single.seconds),
+    return signal_point(
+        exact.plan,
+        "trace",
+        knob,
+        setting,
+        error,
+        sum(single.seconds),
         also={"trace_s": single.seconds[0], "synthesis_s": single.seconds[1], "largest": largest},
         note=few,
     )
@@ -179,14 +179,13 @@ def _counts(plan: Plan) -> list[int]:
 
 def exact_point(exact: ExactFrame) -> Point:
     """What all are compared with: no error, and what it costs."""
-    return Point(
-        stage="trace",
-        knob="exact",
-        setting=exact.note or "from the description alone",
-        error=0.0,
-        unit="relative",
-        allowed=exact.plan.recipe.accuracy.signal,
-        seconds=exact.seconds,
+    return signal_point(
+        exact.plan,
+        "trace",
+        "exact",
+        exact.note or "from the description alone",
+        0.0,
+        exact.seconds,
         also={"trace_s": exact.seconds, "synthesis_s": 0.0, "largest": 0.0},
         note=f"cost from {len(exact.sensor)} hydrophones" if exact.partly else "",
     )
@@ -197,14 +196,13 @@ def _point(exact: ExactFrame, traced: TracedBySensor, knob: str, setting: str, *
     synthesis_seconds = traced.synthesis_seconds()
     paths = max(len(arrivals.delay) for _, arrivals in traced.pieces)
     several = f", {len(traced.pieces)} of {traced.parts} parts" if len(traced.pieces) < traced.parts else ""
-    return Point(
-        stage="trace",
-        knob=knob,
-        setting=setting,
-        error=error,
-        unit="relative",
-        allowed=exact.plan.recipe.accuracy.signal,
-        seconds=traced.seconds + synthesis_seconds,
+    return signal_point(
+        exact.plan,
+        "trace",
+        knob,
+        setting,
+        error,
+        traced.seconds + synthesis_seconds,
         chosen=chosen,
         also={
             "largest": largest,

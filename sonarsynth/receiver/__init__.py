@@ -46,6 +46,13 @@ __all__ = [
 ]
 
 
+def _above_low(value: float, info: ValidationInfo) -> float:
+    """Validate the upper edge of a band against its lower one."""
+    if value <= info.data.get("low", 0.0):
+        raise ValueError(f"must be above low ({info.data['low']:g} Hz)")
+    return value
+
+
 @description
 class Band:
     """The band that the sonar works in: the bins that are beamformed, located and ranged."""
@@ -55,10 +62,7 @@ class Band:
     high: PositiveHertz
     """Highest frequency."""
 
-    @field_validator("high")
-    @classmethod
-    def _check_high(cls, value: float, info: ValidationInfo) -> float:
-        return _above_low(value, info)
+    _high = field_validator("high")(_above_low)
 
     @property
     def centre(self) -> float:
@@ -102,10 +106,7 @@ class BandPass:
     attenuation: Annotated[Decibels, Ge(21), Le(160)] = 80.0
     """Attenuation of what is stopped, at least."""
 
-    @field_validator("high")
-    @classmethod
-    def _check_high(cls, value: float, info: ValidationInfo) -> float:
-        return _above_low(value, info)
+    _high = field_validator("high")(_above_low)
 
     @property
     def edges(self) -> tuple[float, float]:
@@ -153,13 +154,6 @@ class BeamGrid:
     def elevation(self) -> Floats:
         """(elevation,) rad, up positive."""
         return _symmetric(self.elevation_span, self.elevations)
-
-
-def _above_low(value: float, info: ValidationInfo) -> float:
-    """Validate the upper edge of a band against its lower one."""
-    if value <= info.data.get("low", 0.0):
-        raise ValueError(f"must be above low ({info.data['low']:g} Hz)")
-    return value
 
 
 def _symmetric(span: float, count: int) -> Floats:
