@@ -12,7 +12,8 @@ from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, LowPass, PositionTable, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.segments import Reception
-from tests.laws.test_synthesis import MODEL, SNAPS, SONAR, arrivals, window
+from tests.hearing import hearing
+from tests.laws.test_synthesis import MODEL, SNAPS, SONAR, arrivals
 
 GRID = np.linspace(-0.6, 0.6, 4)
 ARRAY = elements(PositionTable(positions=tuple((0.0, float(y), float(z)) for y in GRID for z in GRID), face=49.53e-3))
@@ -20,9 +21,9 @@ METHODS = (DirectSum(), GriddedSynthesis())
 
 
 def error_of(method: GriddedSynthesis, of: Arrivals, array: Elements) -> float:
-    start, samples = window(of, SONAR, array)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, None, start, samples))
-    got = method.signals(of, SNAPS, Reception(array, SONAR, None, start, samples)).pressure
+    hears = hearing(of, SONAR, array)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears)
+    got = method.signals(of, SNAPS, hears).pressure
     return float(np.abs(got - exact).max() / np.abs(exact).max())
 
 
@@ -54,21 +55,19 @@ def test_opposite_paths_of_one_tile() -> None:
 def test_paths_that_are_all_alike() -> None:
     of = arrivals(np.full(300, 0.01), np.tile([1.0, 0.2, 0.1], (300, 1)), np.full(300, 20.0), np.full(300, 1 / 300))
     one = arrivals([0.01], [[1.0, 0.2, 0.1]], [20.0], [1.0])
-    start, samples = window(of, SONAR, ARRAY)
-    many, single = (
-        GriddedSynthesis().signals(x, SNAPS, Reception(ARRAY, SONAR, None, start, samples)).pressure for x in (of, one)
-    )
+    hears = hearing(of, SONAR, ARRAY)
+    many, single = (GriddedSynthesis().signals(x, SNAPS, hears).pressure for x in (of, one))
     np.testing.assert_allclose(many, single, atol=1e-4 * np.abs(single).max())  # one path alone needs no deposit
 
 
 def test_an_echo_120_db_below_the_direct_snap_keeps_its_accuracy() -> None:
     of = arrivals([0.01, 0.02], [[1.0, 0.1, 0.1], [1.0, -0.2, 0.0]], [20.0, 25.0], [1.0, 1e-6])
     of = replace(of, target=np.array([-1, 0]), kind=np.array([Kind.DIRECT, Kind.ECHO], np.int8))
-    start, samples = window(of, SONAR, ARRAY)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(ARRAY, SONAR, None, start, samples))
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(ARRAY, SONAR, None, start, samples)).pressure
-    alone, _ = DirectSum().pressure(of.select(of.target == 0), SNAPS, Reception(ARRAY, SONAR, None, start, samples))
-    late = int((0.018 - start) * SONAR.sampling_frequency)
+    hears = hearing(of, SONAR, ARRAY)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears)
+    got = GriddedSynthesis().signals(of, SNAPS, hears).pressure
+    alone, _ = DirectSum().pressure(of.select(of.target == 0), SNAPS, hears)
+    late = int((0.018 - hears.start) * SONAR.sampling_frequency)
     assert np.abs(got - alone)[:, late:].max() < 1e-4 * np.abs(alone).max()
     assert np.abs(got - exact).max() < 1e-4 * np.abs(exact).max()
 
@@ -139,9 +138,9 @@ def test_pulses_of_any_shape_and_any_absorption(loss: tuple[float, float, float]
     """Absorption among the modes, and, where it differs by 2 Np over the band, in terms of its own."""
     of = replace(shaped(FEW, [0.0, 1.0, 2.0], [0.0, 3e-6, 5e-6], 1e-3), absorption=np.array(loss))
     of = replace(of, amplitude=of.amplitude * 10.0 ** (-of.absorption / 40.0))
-    start, samples = window(of, SONAR, ARRAY)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(ARRAY, SONAR, lambda f: 1e-6 * f, start, samples))
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(ARRAY, SONAR, lambda f: 1e-6 * f, start, samples)).pressure
+    hears = hearing(of, SONAR, ARRAY, lambda f: 1e-06 * f)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears)
+    got = GriddedSynthesis().signals(of, SNAPS, hears).pressure
     assert np.abs(got - exact).max() < 1e-4 * np.abs(exact).max()
 
 

@@ -15,20 +15,14 @@ from sonarsynth.products import Arrivals
 from sonarsynth.receiver import BandPass, LowPass, PositionTable, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
-from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.snap_pulses import waveform
+from tests.hearing import hearing
 from tests.laws.test_synthesis import FACES, MODEL, SHARP, SNAPS, C, absorption, arrivals, error, some_of, target_at
 
 CENTRE = SHARP.band.centre
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 PRECISE = GriddedSynthesis(precision="float64", width=14, tolerance=1e-10)
 METHODS = (DirectSum(), PRECISE)
-
-
-def window(of: Arrivals, sonar: Sonar = SHARP, margin: float = 1.5e-3) -> tuple[float, int]:
-    before, after = pulse_support(waveform(MODEL), sonar.antialias, turned=True)
-    start, stop = float(of.delay.min() - before - margin), float(of.delay.max() + after + margin)
-    return start, int((stop - start) * sonar.sampling_frequency) + 1
 
 
 def paths(delay: list[float] | Floats, amplitude: list[float] | Floats, **columns: object) -> Arrivals:
@@ -40,10 +34,8 @@ def paths(delay: list[float] | Floats, amplitude: list[float] | Floats, **column
 
 def heard(of: Arrivals, method: DirectSum | GriddedSynthesis | None = None, margin: float = 1.5e-3) -> Floats:
     """Pressure (sample,) in the window of the arrivals at one hydrophone, in float64."""
-    sonar, (start, samples) = SHARP, window(of, margin=margin)
-    if isinstance(method, GriddedSynthesis):
-        return method.pressure(of, SNAPS, Reception(ONE, sonar, None, start, samples))[0][0]
-    return DirectSum().pressure(of, SNAPS, Reception(ONE, sonar, None, start, samples))[0][0]
+    hears = hearing(of, SHARP, ONE, margin=margin)
+    return (method or DirectSum()).pressure(of, SNAPS, hears)[0][0]
 
 
 def facet(seed: int, size: float) -> tuple[Floats, Floats, Floats]:
@@ -106,7 +98,7 @@ def test_signals_are_the_kirchhoff_integral_frequency_by_frequency(
     some = np.abs(spectrum) > 0.0
     omega, weight = 2.0 * np.pi * f[some], 2.0 * spectrum[some] * SHARP.sampling_frequency / period
     heard_of_it = weight * facet_amplitude(corners, incident, scattered, omega / C)
-    start, samples = window(of, margin=1e-3)
+    start, samples = hearing(of, SHARP, ONE, margin=1e-3)[3:]
     t = start + np.arange(samples) / SHARP.sampling_frequency - delay
     near = np.abs(t) < 8e-4  # the period of the tones is longer than the echo
     got = heard(of, method=method, margin=1e-3)
@@ -138,11 +130,9 @@ def test_a_facet_in_four_parts_sends_the_same(method: DirectSum | GriddedSynthes
     corners, incident, scattered = facet(4, 4e-3)
     whole = echo_of(corners[None], incident, scattered, 0.03)
     parts = echo_of(split(corners[None]), incident, scattered, 0.03)
-    start, samples = window(whole)
     array = some_of(FACES, 200, face=0.0)
-    one, four = (
-        method.signals(x, SNAPS, Reception(array, SHARP, None, start, samples)).pressure for x in (whole, parts)
-    )
+    hears = hearing(whole, SHARP, array, margin=1.5e-3)
+    one, four = (method.signals(x, SNAPS, hears).pressure for x in (whole, parts))
     assert error(four, one) < 2e-7  # of single precision
 
 
@@ -150,14 +140,12 @@ def test_many_tiny_facets_are_one_that_is_large() -> None:
     """Points instead of facets, each a plain derivative: their error falls by 4 with every split."""
     corners, incident, scattered = facet(5, 4e-3)
     exact, parts, errors = heard(echo_of(corners[None], incident, scattered, 0.03)), corners[None], []
-    start, samples = window(echo_of(corners[None], incident, scattered, 0.03))
+    hears = hearing(echo_of(corners[None], incident, scattered, 0.03), SHARP, ONE, margin=1.5e-3)
     for _ in range(4):
         parts = split(parts)
         points = echo_of(parts, incident, scattered, 0.03)
         points = replace(points, corner_delays=np.zeros_like(points.corner_delays))
-        errors.append(
-            error(DirectSum().pressure(points, SNAPS, Reception(ONE, SHARP, None, start, samples))[0][0], exact)
-        )
+        errors.append(error(DirectSum().pressure(points, SNAPS, hears)[0][0], exact))
     assert errors[-1] < 2e-3
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.1)
 
@@ -173,9 +161,9 @@ def test_a_mirror_differentiates_and_an_edge_repeats(method: DirectSum | Gridded
     # a long strip, one of its ends at 0: what comes from there is the pulse itself, of 1/(pi f_c) over its length
     far = 1e-3
     edge = replace(mirror, delay=np.array([0.03 + far / 3.0]), corner_delays=far * np.array([[-1.0, -1.0, 2.0]]) / 3.0)
-    t = window(mirror)[0] + np.arange(plain.size) / SHARP.sampling_frequency - 0.03
-    start, samples = window(mirror)
-    got = DirectSum().pressure(edge, SNAPS, Reception(ONE, SHARP, None, start, samples))[0][0]
+    t = hearing(mirror, SHARP, ONE, margin=1.5e-3).start + np.arange(plain.size) / SHARP.sampling_frequency - 0.03
+    hears = hearing(mirror, SHARP, ONE, margin=1.5e-3)
+    got = DirectSum().pressure(edge, SNAPS, hears)[0][0]
     first = np.abs(t) < 4e-4
     assert error(got[first], plain[first] / (np.pi * CENTRE * far)) < 0.01
 
@@ -216,12 +204,10 @@ def test_limits_of_roughness() -> None:
 def test_columns_that_say_nothing_change_no_bit(method: DirectSum | GriddedSynthesis) -> None:
     of = target_at(15.0, 30, 6)
     array = some_of(FACES, 60)
-    start, samples = window(of, margin=2e-3)
+    hears = hearing(of, SHARP, array, absorption, margin=0.002)
     rng = np.random.default_rng(7)
     same = replace(of, height_delay_std=rng.uniform(0.0, 1e-3, of.delay.size), centre=np.nan)
-    one, two = (
-        method.signals(x, SNAPS, Reception(array, SHARP, absorption, start, samples)).pressure for x in (of, same)
-    )
+    one, two = (method.signals(x, SNAPS, hears).pressure for x in (of, same))
     np.testing.assert_array_equal(one, two)
 
 
@@ -232,10 +218,10 @@ def test_corners_have_no_order_and_their_middle_is_a_delay(method: DirectSum | G
     off = np.array([7e-6, -3e-6])
     turned = replace(of, corner_delays=corners[:, [2, 0, 1]])
     moved = replace(of, delay=of.delay - off, corner_delays=corners + off[:, None])
-    start, samples = window(of)
+    hears = hearing(of, SHARP, ONE, margin=1.5e-3)
 
     def one(x: Arrivals) -> Floats:
-        return method.signals(x, SNAPS, Reception(ONE, SHARP, None, start, samples)).pressure
+        return method.signals(x, SNAPS, hears).pressure
 
     assert error(one(turned), one(of)) < 2e-7
     assert error(one(moved), one(of)) < 2e-7
@@ -250,7 +236,7 @@ def test_a_reshaped_pulse_is_over_after_its_support(chosen: BandPass | LowPass |
         shape = {"coherent": np.array([sloped]), "coherent_fraction": np.array([1.0 * (rough > 0.0)])}
         of = paths([0.05], [1.0], **shape, height_delay_std=np.array([rough]))
         before, after = pulse_support(waveform(MODEL), sonar.antialias, sloped=sloped, rough=rough)
-        start, samples = window(of, sonar, 12e-3)
-        got = np.abs(DirectSum().pressure(of, SNAPS, Reception(ONE, sonar, None, start, samples))[0][0])
-        t = start + np.arange(samples) / sonar.sampling_frequency - 0.05
+        hears = hearing(of, sonar, ONE, margin=0.012)
+        got = np.abs(DirectSum().pressure(of, SNAPS, hears)[0][0])
+        t = hears.start + np.arange(hears.samples) / sonar.sampling_frequency - 0.05
         assert got[(t < -before) | (t > after)].max() < left * got.max()

@@ -22,11 +22,11 @@ from sonarsynth.signals.filtered_pulse import (
     stretched_spectra,
 )
 from sonarsynth.signals.pulse_shapes import shape_modes
-from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.state import Emission
 from tests.filtered import filtered_pulse
+from tests.hearing import hearing
 from tests.laws.test_synthesis import FACES, MODEL, SHARP, SNAPS, SONAR, absorption, arrivals, error, some_of, target_at
 
 LOW = Sonar(filter=LowPass(cutoff=60e3, attenuation=140), sampling_frequency=250e3)
@@ -48,21 +48,14 @@ def shaped(
     )
 
 
-def window(of: Arrivals, sonar: Sonar, aperture: float, margin: float = 4e-4) -> tuple[float, int]:
-    before, after = pulse_support(waveform(MODEL), sonar.antialias, turned=True)
-    start = float(of.delay.min() - before - aperture / of.sound_speed - margin)
-    stop = float(of.delay.max() + after + aperture / of.sound_speed + margin)
-    return start, int((stop - start) * sonar.sampling_frequency) + 1
-
-
 def alone(sonar: Sonar, phase: float = 0.0, delay_std: float = 0.0, doppler: float = 0.0) -> tuple[Floats, Floats]:
     """Times after the collapse (sample,) and the exact pressure (sample,) of one path at one hydrophone."""
     of = arrivals([0.05], [[1.0, 0.0, 0.0]], [10.0], [1.0])
     of = replace(of, phase=np.array([phase]), delay_std=np.array([delay_std]), doppler=np.array([doppler]))
-    start, samples = window(of, sonar, 0.0, 6e-3)
-    got, outside = DirectSum().pressure(of, SNAPS, Reception(ONE, sonar, None, start, samples))
+    hears = hearing(of, sonar, ONE, margin=0.006)
+    got, outside = DirectSum().pressure(of, SNAPS, hears)
     assert outside == 0
-    return start + np.arange(samples) / sonar.sampling_frequency - 0.05, got[0]
+    return hears.start + np.arange(hears.samples) / sonar.sampling_frequency - 0.05, got[0]
 
 
 # ---- the exact sum against closed forms ------------------------------------------------------------------------------
@@ -126,9 +119,9 @@ def test_kernel_deposit_is_the_exact_sum(method: GriddedSynthesis, bound: float)
     array = some_of(FACES, 60)
     of = shaped(target_at(8.0, 9, 2, refracted=True, direct=False), 3)
     of = replace(of, snap=np.random.default_rng(4).integers(0, 2, of.delay.size))
-    start, samples = window(of, SHARP, array.aperture)
-    exact, _ = DirectSum().pressure(of, snaps, Reception(array, SHARP, absorption, start, samples))
-    got, outside = method.pressure(of, snaps, Reception(array, SHARP, absorption, start, samples))
+    hears = hearing(of, SHARP, array, absorption, margin=4e-4)
+    exact, _ = DirectSum().pressure(of, snaps, hears)
+    got, outside = method.pressure(of, snaps, hears)
     assert outside == 0
     assert 1e-14 < error(got, exact) < bound
 
@@ -139,9 +132,9 @@ def test_many_shapes_over_the_whole_array(phase: float, delay_std: float) -> Non
     of = shaped(target_at(20.0, 300, 5, direct=False), 6, phase=phase, delay_std=delay_std, doppler=0.0)
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:2], 250)
     part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
-    start, samples = window(of, SONAR, FACES.aperture)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(part, SONAR, absorption, start, samples))
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure
+    hears = hearing(of, SONAR, FACES, absorption, margin=4e-4)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=part))
+    got = GriddedSynthesis().signals(of, SNAPS, hears).pressure
     assert error(got[some], exact) < 1e-4
 
 
@@ -149,16 +142,11 @@ def test_one_odd_path_among_many_is_not_lost() -> None:
     """Modes are chosen for the loudest path too, not for the mean alone: a phase of one path in a thousand is kept."""
     of = target_at(20.0, 1000, 7, direct=False)
     of = replace(of, phase=np.where(np.arange(1000) == 500, 0.02, 0.0), amplitude=np.full(1000, 1e-4))
-    start, samples = window(of, SONAR, FACES.aperture)
+    hears = hearing(of, SONAR, FACES, margin=4e-4)
     plain = replace(of, phase=np.zeros(1000))
-    got, without = (
-        GriddedSynthesis().pressure(x, SNAPS, Reception(FACES, SONAR, None, start, samples))[0] for x in (of, plain)
-    )
+    got, without = (GriddedSynthesis().pressure(x, SNAPS, hears)[0] for x in (of, plain))
     odd = of.select(np.array([500]))
-    parts = (
-        DirectSum().signals(x, SNAPS, Reception(FACES, SONAR, None, start, samples)).pressure
-        for x in (odd, replace(odd, phase=np.zeros(1)))
-    )
+    parts = (DirectSum().signals(x, SNAPS, hears).pressure for x in (odd, replace(odd, phase=np.zeros(1))))
     turned, straight = parts
     assert np.abs(turned - straight).max() > 0.015 * np.abs(straight).max()
     assert np.abs(got - without - (turned - straight)).max() < 1e-2 * np.abs(straight).max()
@@ -171,24 +159,22 @@ def test_one_odd_path_among_many_is_not_lost() -> None:
 def test_half_turns_are_signs_and_nothing_is_nothing(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 100)
     of = target_at(15.0, 12, 8, direct=False)
-    start, samples = window(of, SHARP, array.aperture)
+    hears = hearing(of, SHARP, array, margin=4e-4)
     turns = np.random.default_rng(9).integers(-9, 9, 12)
     half = replace(of, phase=np.pi * turns)
     signed = replace(of, amplitude=of.amplitude * (-1.0) ** turns)
-    got, expected = (
-        method.signals(x, SNAPS, Reception(array, SHARP, None, start, samples)).pressure for x in (half, signed)
-    )
+    got, expected = (method.signals(x, SNAPS, hears).pressure for x in (half, signed))
     np.testing.assert_array_equal(got, expected)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_turn_keeps_the_energy_and_turns_add_up(method: DirectSum | GriddedSynthesis) -> None:
     of = arrivals([0.05, 0.0501], [[1.0, 0.0, 0.0], [1.0, 0.1, 0.0]], [10.0, 11.0], [1.0, 0.4])
-    start, samples = window(of, SHARP, 0.0, 2e-3)
+    hears = hearing(of, SHARP, ONE, margin=0.002)
 
     def heard(*phase: float) -> Floats:
         turned = replace(of, phase=np.array(phase))
-        return method.signals(turned, SNAPS, Reception(ONE, SHARP, None, start, samples)).pressure[0].astype(float)
+        return method.signals(turned, SNAPS, hears).pressure[0].astype(float)
 
     plain, quarter = heard(0.0, 0.0), heard(0.5 * np.pi, 0.5 * np.pi)
     for angle in (0.3, 1.0, 2.5):
@@ -203,18 +189,18 @@ def test_a_turn_keeps_the_energy_and_turns_add_up(method: DirectSum | GriddedSyn
 @pytest.mark.parametrize("method", METHODS)
 def test_blurs_add_by_squares_and_end_in_silence(method: DirectSum | GriddedSynthesis) -> None:
     of = arrivals([0.05, 0.0502], [[1.0, 0.0, 0.0], [1.0, 0.1, 0.0]], [10.0, 11.0], [1.0, 0.4])
-    start, samples = window(of, SHARP, 0.0, 2e-3)
+    hears = hearing(of, SHARP, ONE, margin=0.002)
 
     def heard(*delay_std: float) -> Floats:
         soft = replace(of, delay_std=np.array(delay_std))
-        got = method.signals(soft, SNAPS, Reception(ONE, SHARP, None, start, samples))
+        got = method.signals(soft, SNAPS, hears)
         assert got.outside == 0
         return got.pressure[0].astype(float)
 
     plain, soft = heard(0.0, 0.0), heard(3e-6, 3e-6)
-    f = np.fft.rfftfreq(samples, 1.0 / SHARP.sampling_frequency)
-    once = np.fft.irfft(np.fft.rfft(plain) * np.exp(-0.5 * (2 * np.pi * f * 3e-6) ** 2), samples)
-    twice = np.fft.irfft(np.fft.rfft(soft) * np.exp(-0.5 * (2 * np.pi * f * 4e-6) ** 2), samples)
+    f = np.fft.rfftfreq(hears.samples, 1.0 / SHARP.sampling_frequency)
+    once = np.fft.irfft(np.fft.rfft(plain) * np.exp(-0.5 * (2 * np.pi * f * 3e-6) ** 2), hears.samples)
+    twice = np.fft.irfft(np.fft.rfft(soft) * np.exp(-0.5 * (2 * np.pi * f * 4e-6) ** 2), hears.samples)
     assert error(soft, once) < 1e-6
     assert error(heard(5e-6, 5e-6), twice) < 1e-6
     silent = silencing_blur(waveform(MODEL), SHARP.antialias)
@@ -225,12 +211,10 @@ def test_blurs_add_by_squares_and_end_in_silence(method: DirectSum | GriddedSynt
 def test_shared_shapes_cost_no_modes() -> None:
     """Where all paths have one shape, what is deposited is what plain pulses deposit: only their spectrum differs."""
     of = target_at(15.0, 6, 10, direct=False)
-    start, samples = window(of, SHARP, 0.0, 1e-3)
+    hears = hearing(of, SHARP, ONE, margin=0.001)
     once = replace(of, phase=np.full(6, 0.8), delay_std=np.full(6, 4e-6), doppler=np.full(6, 2e-3))
-    exact, _ = DirectSum().pressure(once, SNAPS, Reception(ONE, SHARP, None, start, samples))
-    got, _ = GriddedSynthesis(width=14, precision="float64", tolerance=1e-10).pressure(
-        once, SNAPS, Reception(ONE, SHARP, None, start, samples)
-    )
+    exact, _ = DirectSum().pressure(once, SNAPS, hears)
+    got, _ = GriddedSynthesis(width=14, precision="float64", tolerance=1e-10).pressure(once, SNAPS, hears)
     assert error(got, exact) < 1e-8
 
 

@@ -20,10 +20,10 @@ from sonarsynth.recipe import Recipe
 from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths
 from sonarsynth.signals.direct_sum import DirectSum
-from sonarsynth.signals.segments import Reception
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target import Target
-from tests.laws.test_synthesis import FACES, SNAPS, SONAR, absorption, error, some_of, target_at, window
+from tests.hearing import hearing
+from tests.laws.test_synthesis import FACES, SNAPS, SONAR, absorption, error, some_of, target_at
 from tests.scenes import point_scene, remus
 
 
@@ -90,13 +90,13 @@ def test_shadows_of_paths_that_are_loud_at_the_rim_alone_are_kept() -> None:
     terms[faint, 7] = 1e4  # of y squared
     of = replace(of, amplitude=np.where(faint, 1e-4, 1.0) * of.amplitude)
     of = replace(of, expansion=replace(of.expansion, amplitude=terms))
-    start, samples = window(of, SONAR, FACES)
+    hears = hearing(of, SONAR, FACES, absorption)
     some = np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:4]
     exact, _ = DirectSum().pressure(
-        of.for_sensors(some, FACES.count), SNAPS, Reception(FACES.select(some), SONAR, absorption, start, samples)
+        of.for_sensors(some, FACES.count), SNAPS, hears._replace(elements=FACES.select(some))
     )
     for method in (GriddedSynthesis(), GriddedSynthesis(tolerance=1e-3)):
-        got = method.signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure[some]
+        got = method.signals(of, SNAPS, hears).pressure[some]
         assert error(got, exact) < method.tolerance
 
 
@@ -158,15 +158,11 @@ def test_kernel_deposit_keeps_silent_where_the_exact_sum_does(hidden: int, step:
     """Of many hydrophones, paths that miss some are synthesised one by one, of few together."""
     array = some_of(FACES, step)
     of = partly_hidden(target_at(8.0, 40, 2, refracted=True, direct=True), hidden, array.count)
-    start, samples = window(of, SONAR, array)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples)).pressure
-    plain = (
-        GriddedSynthesis()
-        .signals(of.seen_from_centre, SNAPS, Reception(array, SONAR, absorption, start, samples))
-        .pressure
-    )
-    late = slice(int((of.delay[of.target == 0].min() - 1e-3 - start) * SONAR.sampling_frequency), None)
+    hears = hearing(of, SONAR, array, absorption)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears)
+    got = GriddedSynthesis().signals(of, SNAPS, hears).pressure
+    plain = GriddedSynthesis().signals(of.seen_from_centre, SNAPS, hears).pressure
+    late = slice(int((of.delay[of.target == 0].min() - 1e-3 - hears.start) * SONAR.sampling_frequency), None)
     assert error(got[:, late], exact[:, late]) < 1e-4
     assert error(got, exact) < 1e-4
     assert error(plain, exact) > 1e-2
@@ -187,10 +183,10 @@ def test_hydrophones_keep_their_own_shade() -> None:
 
 def test_shade_of_another_array_is_refused() -> None:
     of = partly_hidden(target_at(8.0, 4, 2), 2)
-    start, samples = window(of, SONAR, FACES)
+    hears = hearing(of, SONAR, FACES, absorption)
     array = replace(FACES, position=FACES.position[:9], gain=FACES.gain[:9])
     with pytest.raises(ValueError, match="hidden from hydrophones of another array"):
-        GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
+        GriddedSynthesis().signals(of, SNAPS, hears._replace(elements=array))
 
 
 @pytest.mark.long

@@ -21,6 +21,7 @@ from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.state import Emission
 from tests.filtered import filtered_pulse
+from tests.hearing import hearing
 
 MODEL = LogarithmicBubble()
 SNAPS = (Emission(np.zeros(3), 0.0, MODEL, None),)
@@ -119,14 +120,6 @@ def target_at(distance: float, count: int, seed: int, *, refracted: bool = False
     )
 
 
-def window(of: Arrivals, sonar: Sonar, array: Elements) -> tuple[float, int]:
-    """A window that holds all of it."""
-    before, after = pulse_support(waveform(MODEL), sonar.antialias)
-    reach = array.aperture / C + 1e-4
-    start = float(of.delay.min() - before - reach)
-    return start, int(np.ceil((of.delay.max() + after + reach - start) * sonar.sampling_frequency)) + 1
-
-
 def error(got: np.ndarray, exact: np.ndarray) -> float:
     return float(np.abs(got - exact).max() / np.abs(exact).max())
 
@@ -138,10 +131,10 @@ def test_exact_sum_is_the_filtered_snap_at_the_exact_delays() -> None:
     """Point hydrophones, spherical waves: amplitude R/|R d - q| and delay |R d - q|/c, evaluated in time."""
     array = some_of(FACES, 100, face=0.0)
     of = target_at(12.0, 3, 1, direct=False)
-    start, samples = window(of, SHARP, array)
-    got, _ = DirectSum().pressure(of, SNAPS, Reception(array, SHARP, None, start, samples))
+    hears = hearing(of, SHARP, array)
+    got, _ = DirectSum().pressure(of, SNAPS, hears)
     expected = np.zeros_like(got)
-    t = start + np.arange(samples) / SHARP.sampling_frequency
+    t = hears.start + np.arange(hears.samples) / SHARP.sampling_frequency
     for e in range(3):
         source = of.radius[e] * of.direction[e]
         for s, q in enumerate(array.position):
@@ -156,9 +149,9 @@ def test_exact_sum_is_the_filtered_snap_at_the_exact_delays() -> None:
 def test_exact_sum_with_the_default_filter_leaves_out_what_would_fold() -> None:
     array = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
     of = arrivals([0.01], [[1.0, 0.2, 0.0]], [10.0], [1.0])
-    start, samples = window(of, SONAR, array)
-    got, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, None, start, samples))
-    t = start + np.arange(samples) / SONAR.sampling_frequency - 0.01
+    hears = hearing(of, SONAR, array)
+    got, _ = DirectSum().pressure(of, SNAPS, hears)
+    t = hears.start + np.arange(hears.samples) / SONAR.sampling_frequency - 0.01
     exact = filtered_pulse(t, MODEL.bubble, fir(SONAR.antialias))
     assert 1e-8 < error(got[0], exact) < 2e-5  # 80 dB down and beyond half the sampling frequency
 
@@ -170,11 +163,9 @@ def test_element_face_is_the_mean_of_points_over_it() -> None:
     points = tuple((0.0, float(y), float(z)) for y in offset for z in offset)
     of = arrivals([0.01], [[1.0, 0.35, -0.2]], [np.inf], [1.0])
     one = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=face))
-    start, samples = window(of, SONAR, one)
-    got, _ = DirectSum().pressure(of, SNAPS, Reception(one, SONAR, None, start, samples))
-    mean, _ = DirectSum().pressure(
-        of, SNAPS, Reception(elements(PositionTable(positions=points)), SONAR, None, start, samples)
-    )
+    hears = hearing(of, SONAR, one)
+    got, _ = DirectSum().pressure(of, SNAPS, hears)
+    mean, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=elements(PositionTable(positions=points))))
     assert error(got[0], mean.mean(axis=0)) < 3e-3
     assert element_directivity(80e3, of.direction[0], face, C) < 0.7  # so the face does something
 
@@ -183,10 +174,10 @@ def test_absorption_is_relative_to_the_band_centre() -> None:
     """A path of 40 dB at the centre: each frequency is as loud as its own absorption says."""
     array = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
     of = arrivals([0.01], [[1.0, 0.0, 0.0]], [10.0], [10 ** (-40 / 20)], loss=np.array([40.0]))
-    start, samples = window(of, SONAR, array)
-    lost, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
-    plain, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, None, start, samples))
-    f = np.fft.rfftfreq(samples, 1 / SONAR.sampling_frequency)
+    hears = hearing(of, SONAR, array, absorption)
+    lost, _ = DirectSum().pressure(of, SNAPS, hears)
+    plain, _ = DirectSum().pressure(of, SNAPS, hears._replace(absorption=None))
+    f = np.fft.rfftfreq(hears.samples, 1 / SONAR.sampling_frequency)
     inside = (f > 30e3) & (f < 80e3)
     ratio = np.abs(np.fft.rfft(lost[0]) / np.fft.rfft(plain[0]))[inside]
     centre = absorption(np.array([SONAR.band.centre]))
@@ -237,9 +228,9 @@ def test_what_a_narrow_filter_leaks_is_heard(low: float, width: float, transitio
     band, chosen = Band(low=low, high=low + width), BandPass(low=low, high=low + width, transition=transition)
     sonar, method = Sonar(band=band, filter=chosen), GriddedSynthesis(width=8, tolerance=2e-5)
     found = target_at(20.0, count, 3, direct=False)
-    start, samples = window(found, sonar, FACES)
-    exact, _ = DirectSum().pressure(found, SNAPS, Reception(some_of(FACES, 127), sonar, absorption, start, samples))
-    fast, _ = method.pressure(found, SNAPS, Reception(FACES, sonar, absorption, start, samples))
+    hears = hearing(found, sonar, FACES, absorption)
+    exact, _ = DirectSum().pressure(found, SNAPS, hears._replace(elements=some_of(FACES, 127)))
+    fast, _ = method.pressure(found, SNAPS, hears)
     assert error(fast[::127], exact) < deposit_error(method)
 
 
@@ -261,9 +252,9 @@ def test_a_pulse_by_itself_keeps_the_bound(distance: float, tolerance: float) ->
 def test_kernel_deposit_is_the_exact_sum(distance: float, refracted: bool) -> None:
     array = some_of(FACES, 32)
     of = target_at(distance, 40, 2, refracted=refracted, direct=False)
-    start, samples = window(of, SONAR, array)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
+    hears = hearing(of, SONAR, array, absorption)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears)
+    got = GriddedSynthesis().signals(of, SNAPS, hears)
     assert error(got.pressure, exact) < 1e-4
     assert got.outside == 0
     assert got.pressure.dtype == np.float32
@@ -275,19 +266,19 @@ def test_few_hydrophones_hear_as_exactly_as_many(count: int, refracted: bool) ->
     """Fewer than the terms that wavefronts and amplitudes are expanded in."""
     array = FACES.select(np.linspace(7, FACES.count - 1, count).astype(int))
     of = target_at(20.0, 40, 2, refracted=refracted, direct=False)
-    start, samples = window(of, SONAR, FACES)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
+    hears = hearing(of, SONAR, FACES, absorption)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=array))
+    got = GriddedSynthesis().signals(of, SNAPS, hears._replace(elements=array))
     assert error(got.pressure, exact) < 1e-4
 
 
 def test_nodes_over_the_aperture_serve_the_whole_array() -> None:
     """Enough paths that nodes pay: 508 hydrophones interpolated from some tens of points, the direct snap apart."""
     of = target_at(20.0, 500, 3)
-    start, samples = window(of, SONAR, FACES)
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure[::127]
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(some_of(FACES, 127), SONAR, absorption, start, samples))
-    late = int((of.delay[of.target == 0].min() - 2.3e-3 - start) * SONAR.sampling_frequency)
+    hears = hearing(of, SONAR, FACES, absorption)
+    got = GriddedSynthesis().signals(of, SNAPS, hears).pressure[::127]
+    exact, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=some_of(FACES, 127)))
+    late = int((of.delay[of.target == 0].min() - 2.3e-3 - hears.start) * SONAR.sampling_frequency)
     assert error(got[:, late:], exact[:, late:]) < 1e-4  # relative to the echo
     assert error(got, exact) < 1e-4
 
@@ -303,9 +294,9 @@ def test_bodies_heard_one_after_the_other_are_each_where_they_belong() -> None:
         np.tile(body.amplitude, len(sides)),
         loss=np.tile(body.absorption, len(sides)),
     )
-    start, samples = window(of, SONAR, FACES)
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure[::127]
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(some_of(FACES, 127), SONAR, absorption, start, samples))
+    hears = hearing(of, SONAR, FACES, absorption)
+    got = GriddedSynthesis().signals(of, SNAPS, hears).pressure[::127]
+    exact, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=some_of(FACES, 127)))
     assert error(got, exact) < 1e-4
 
 
@@ -315,11 +306,11 @@ def test_lobes_that_vary_over_the_aperture(size: float) -> None:
     of = target_at(20.0, 400, 17, direct=False)
     terms = np.random.default_rng(18).uniform(-1, 1, (400, 20)) * size
     of = replace(of, expansion=replace(of.expansion, amplitude=terms))
-    start, samples = window(of, SONAR, FACES)
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure
+    hears = hearing(of, SONAR, FACES, absorption)
+    got = GriddedSynthesis().signals(of, SNAPS, hears).pressure
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:4], 250)  # rim and middle
     part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(part, SONAR, absorption, start, samples))
+    exact, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=part))
     assert error(got[some], exact) < 1e-4
 
 
@@ -327,11 +318,9 @@ def test_one_path_needs_no_deposit() -> None:
     """Alone in its stretch of time a path is exact but for its directivity between nodes and the ends of the band."""
     array = some_of(FACES, 20)
     of = target_at(15.0, 1, 19, refracted=True)
-    start, samples = window(of, SONAR, array)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
-    got, _ = GriddedSynthesis(tolerance=1e-6, precision="float64").pressure(
-        of, SNAPS, Reception(array, SONAR, absorption, start, samples)
-    )
+    hears = hearing(of, SONAR, array, absorption)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears)
+    got, _ = GriddedSynthesis(tolerance=1e-6, precision="float64").pressure(of, SNAPS, hears)
     assert 1e-14 < error(got, exact) < 1e-6
 
 
@@ -367,9 +356,9 @@ def test_waves_are_interpolated_to_the_tolerance(tolerance: float, phase: float,
 def test_each_knob_buys_its_error(method: GriddedSynthesis, bound: float) -> None:
     array = some_of(FACES, 30)
     of = target_at(8.0, 20, 4, refracted=True, direct=False)
-    start, samples = window(of, SHARP, array)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SHARP, absorption, start, samples))
-    got, _ = method.pressure(of, SNAPS, Reception(array, SHARP, absorption, start, samples))
+    hears = hearing(of, SHARP, array, absorption)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears)
+    got, _ = method.pressure(of, SNAPS, hears)
     assert 1e-14 < error(got, exact) < bound
 
 
@@ -378,9 +367,9 @@ def test_hydrophones_anywhere_and_plane_waves() -> None:
     array = elements(PositionTable(positions=tuple(map(tuple, rng.uniform(-0.4, 0.4, (14, 3)).tolist())), face=0.02))
     n = 12
     of = arrivals(rng.uniform(0.01, 0.012, n), rng.standard_normal((n, 3)), np.full(n, np.inf), rng.standard_normal(n))
-    start, samples = window(of, SONAR, array)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SONAR, None, start, samples))
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, None, start, samples))
+    hears = hearing(of, SONAR, array)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears)
+    got = GriddedSynthesis().signals(of, SNAPS, hears)
     assert error(got.pressure, exact) < 1e-4
 
 
@@ -391,14 +380,11 @@ def test_several_snaps_of_different_kinds_and_levels() -> None:
     of = target_at(15.0, 30, 7, direct=False)
     of = arrivals(of.delay, of.direction, of.radius, of.amplitude, snap=rng.integers(0, 3, 30))
     array = some_of(FACES, 60)
-    start, samples = window(of, SONAR, array)
-    exact, _ = DirectSum().pressure(of, snaps, Reception(array, SONAR, None, start, samples))
-    got = GriddedSynthesis().signals(of, snaps, Reception(array, SONAR, None, start, samples))
+    hears = hearing(of, SONAR, array)
+    exact, _ = DirectSum().pressure(of, snaps, hears)
+    got = GriddedSynthesis().signals(of, snaps, hears)
     assert error(got.pressure, exact) < 1e-4
-    parts = sum(
-        DirectSum().pressure(of.select(of.snap == i), snaps, Reception(array, SONAR, None, start, samples))[0]
-        for i in range(3)
-    )
+    parts = sum(DirectSum().pressure(of.select(of.snap == i), snaps, hears)[0] for i in range(3))
     np.testing.assert_allclose(parts, exact, atol=1e-12)
 
 
@@ -419,7 +405,7 @@ def run(method: DirectSum | GriddedSynthesis, array: Elements) -> Run:
 def test_doubled_amplitude_doubles_the_pressure_and_sums_add(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 60)
     of = target_at(15.0, 24, 9, direct=False)
-    start, samples = window(of, SONAR, array)
+    start, samples = hearing(of, SONAR, array)[3:]
     go = run(method, array)
     whole = go(of, start, samples)
     half = go(of.select(np.arange(24) < 12), start, samples) + go(of.select(np.arange(24) >= 12), start, samples)
@@ -432,7 +418,7 @@ def test_doubled_amplitude_doubles_the_pressure_and_sums_add(method: DirectSum |
 def test_a_delay_of_part_of_a_sample_is_a_ramp_of_phase(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 60)
     of = target_at(15.0, 24, 10, direct=False)
-    start, samples = window(of, SONAR, array)
+    start, samples = hearing(of, SONAR, array)[3:]
     shift = 3.37 / SONAR.sampling_frequency
     later = arrivals(of.delay + shift, of.direction, of.radius, of.amplitude, loss=of.absorption)
     go = run(method, array)
@@ -448,12 +434,12 @@ def test_a_delay_of_part_of_a_sample_is_a_ramp_of_phase(method: DirectSum | Grid
 def test_windows_that_adjoin_hold_what_one_window_holds(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 60)
     of = target_at(15.0, 24, 11)
-    start, samples = window(of, SONAR, array)
+    hears = hearing(of, SONAR, array, absorption)
     fs = SONAR.sampling_frequency
-    cut = int((np.median(of.delay) - start) * fs)
-    whole = method.signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples))
-    first = method.signals(of, SNAPS, Reception(array, SONAR, absorption, start, cut))
-    second = method.signals(of, SNAPS, Reception(array, SONAR, absorption, start + cut / fs, samples - cut))
+    cut = int((np.median(of.delay) - hears.start) * fs)
+    whole = method.signals(of, SNAPS, hears)
+    first = method.signals(of, SNAPS, Reception(array, SONAR, absorption, hears.start, cut))
+    second = method.signals(of, SNAPS, Reception(array, SONAR, absorption, hears.start + cut / fs, hears.samples - cut))
     assert error(np.hstack([first.pressure, second.pressure]), whole.pressure) < 3e-6
     assert whole.outside == 0
     assert first.outside == 24  # every echo begins before the middle one has ended
@@ -464,7 +450,7 @@ def test_windows_that_adjoin_hold_what_one_window_holds(method: DirectSum | Grid
 def test_what_falls_outside_is_counted_and_never_wrapped(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 100)
     of = target_at(15.0, 8, 12, direct=False)
-    start, samples = window(of, SONAR, array)
+    start, samples = hearing(of, SONAR, array)[3:]
     for far in (-1.0, -(samples + 300) / SONAR.sampling_frequency, samples / SONAR.sampling_frequency, 5.0):
         got = method.signals(of, SNAPS, Reception(array, SONAR, absorption, start + far, samples))
         assert got.outside == 8
@@ -474,14 +460,14 @@ def test_what_falls_outside_is_counted_and_never_wrapped(method: DirectSum | Gri
 def test_quiet_time_is_exactly_silent() -> None:
     array = some_of(FACES, 100)
     of = target_at(15.0, 8, 13)
-    start, samples = window(of, SONAR, array)
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(array, SONAR, absorption, start, samples)).pressure
+    hears = hearing(of, SONAR, array, absorption)
+    got = GriddedSynthesis().signals(of, SNAPS, hears).pressure
     silent = (got == 0.0).all(axis=0)
     before, after = pulse_support(waveform(MODEL), SONAR.antialias)
-    t = start + np.arange(samples) / SONAR.sampling_frequency
+    t = hears.start + np.arange(hears.samples) / SONAR.sampling_frequency
     near = ((t > of.delay[:, None] - before - 1e-3) & (t < of.delay[:, None] + after + 1e-3)).any(axis=0)
     assert (silent | near).mean() > 0.99
-    assert silent.sum() > 0.1 * samples
+    assert silent.sum() > 0.1 * hears.samples
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -491,17 +477,17 @@ def test_mirrored_paths_give_mirrored_signals(method: DirectSum | GriddedSynthes
     array = elements(PositionTable(positions=positions, face=0.05))
     of = target_at(15.0, 16, 14, direct=False)
     other = arrivals(of.delay, of.direction * [1, -1, 1], of.radius, of.amplitude, loss=of.absorption)
-    start, samples = window(of, SONAR, array)
+    start, samples = hearing(of, SONAR, array)[3:]
     go = run(method, array)
     assert error(go(other, start, samples)[[1, 0, 3, 2]], go(of, start, samples)) < 1e-4
 
 
 def test_dead_elements_give_nothing_and_change_no_other() -> None:
     of = target_at(20.0, 50, 15)
-    start, samples = window(of, SONAR, FACES)
+    hears = hearing(of, SONAR, FACES)
     some = elements(Romanis(dead=(0, 200, 507)))
-    alive = GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, None, start, samples)).pressure
-    got = GriddedSynthesis().signals(of, SNAPS, Reception(some, SONAR, None, start, samples)).pressure
+    alive = GriddedSynthesis().signals(of, SNAPS, hears).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, hears._replace(elements=some)).pressure
     assert not got[[0, 200, 507]].any()
     rest = some.gain > 0
     np.testing.assert_array_equal(got[rest], alive[rest])
@@ -509,9 +495,6 @@ def test_dead_elements_give_nothing_and_change_no_other() -> None:
 
 def test_the_same_bits_every_time() -> None:
     of = target_at(20.0, 300, 16)
-    start, samples = window(of, SONAR, FACES)
-    a, b = (
-        GriddedSynthesis().signals(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples)).pressure
-        for _ in range(2)
-    )
+    hears = hearing(of, SONAR, FACES, absorption)
+    a, b = (GriddedSynthesis().signals(of, SNAPS, hears).pressure for _ in range(2))
     np.testing.assert_array_equal(a, b)

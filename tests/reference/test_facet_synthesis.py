@@ -15,13 +15,13 @@ from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.equations.scattering.kirchhoff_integral import shadow_taper
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import LowPass, PositionTable, Sonar, elements
-from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
+from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.pulse_shapes import MOST_PHASE, shape_modes
-from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.snap_models import Ricker
 from sonarsynth.sources.snap_pulses import waveform
+from tests.hearing import hearing
 from tests.laws.test_synthesis import (
     FACES,
     MODEL,
@@ -38,13 +38,6 @@ from tests.laws.test_synthesis import (
 
 LOW = Sonar(filter=LowPass(cutoff=60e3, attenuation=140), sampling_frequency=250e3)
 PRECISE = GriddedSynthesis(precision="float64", width=14, tolerance=1e-10)
-
-
-def window(of: Arrivals, sonar: Sonar, margin: float = 5e-4) -> tuple[float, int]:
-    before, after = pulse_support(waveform(MODEL), sonar.antialias, turned=True, rough=float(of.height_delay_std.max()))
-    reach = FACES.aperture / C + margin
-    start, stop = float(of.delay.min() - before - reach), float(of.delay.max() + after + reach)
-    return start, int((stop - start) * sonar.sampling_frequency) + 1
 
 
 def facets(
@@ -86,13 +79,13 @@ def test_kernel_deposit_is_the_exact_sum(kind: dict[str, float], also: bool, son
     of = facets(target_at(12.0, 20, 1, direct=False), 2, **kind)
     of = shaped(of, 3) if also else of
     array = some_of(FACES, 130)
-    start, samples = window(of, sonar)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, sonar, absorption, start, samples))
-    got, outside = GriddedSynthesis().pressure(of, SNAPS, Reception(array, sonar, absorption, start, samples))
+    hears = hearing(of, sonar, array, absorption, margin=5e-4)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears)
+    got, outside = GriddedSynthesis().pressure(of, SNAPS, hears)
     assert outside == 0
     assert 1e-14 < error(got, exact) < 1e-4
     if sonar is SHARP:
-        got, _ = PRECISE.pressure(of, SNAPS, Reception(array, sonar, absorption, start, samples))
+        got, _ = PRECISE.pressure(of, SNAPS, hears)
         assert error(got, exact) < 1e-9
 
 
@@ -101,9 +94,9 @@ def test_long_facets_of_a_fast_converter_are_taken_up_to_where_the_filter_stops(
     of = facets(target_at(12.0, 6, 1, direct=False), 2, coherent=1.0, corners=1.8e-5)
     array, fast = some_of(FACES, 12), replace(SONAR, sampling_frequency=1e6)
     snaps = (replace(SNAPS[0], model=Ricker(frequency=400e3)),)  # most of it beyond the band
-    start, samples = window(of, fast)
-    exact, _ = DirectSum().pressure(of, snaps, Reception(array, fast, absorption, start, samples))
-    got, _ = GriddedSynthesis().pressure(of, snaps, Reception(array, fast, absorption, start, samples))
+    hears = hearing(of, fast, array, absorption, margin=5e-4)
+    exact, _ = DirectSum().pressure(of, snaps, hears)
+    got, _ = GriddedSynthesis().pressure(of, snaps, hears)
     assert 1e-14 < error(got, exact) < 2e-4
 
 
@@ -123,9 +116,9 @@ def test_any_mixture_is_the_exact_sum(
     of = facets(of, seed, coherent=coherent, corners=corners, share=share, rough=rough)
     of = shaped(of, seed) if also else of
     array = some_of(FACES, 250)
-    start, samples = window(of, SHARP)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(array, SHARP, absorption, start, samples))
-    got, _ = PRECISE.pressure(of, SNAPS, Reception(array, SHARP, absorption, start, samples))
+    hears = hearing(of, SHARP, array, absorption, margin=5e-4)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears)
+    got, _ = PRECISE.pressure(of, SNAPS, hears)
     assert np.isfinite(got).all()
     assert np.abs(got - exact).max() <= 1e-8 * np.abs(exact).max()
 
@@ -159,18 +152,16 @@ def test_a_coherent_body_whose_facets_cancel() -> None:
     of, f = sphere(0.1, 15.0, 45)
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:1], 250)
     part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
-    start, samples = window(of, SONAR)
-    exact, _ = DirectSum().pressure(of, SNAPS, Reception(part, SONAR, absorption, start, samples))
-    got, _ = GriddedSynthesis().pressure(of, SNAPS, Reception(FACES, SONAR, absorption, start, samples))
+    hears = hearing(of, SONAR, part, absorption, margin=5e-4)
+    exact, _ = DirectSum().pressure(of, SNAPS, hears)
+    got, _ = GriddedSynthesis().pressure(of, SNAPS, hears._replace(elements=FACES))
     one = of.select(np.array([int(np.argmax(of.amplitude))]))
-    alone, _ = DirectSum().pressure(one, SNAPS, Reception(part, SONAR, absorption, start, samples))
+    alone, _ = DirectSum().pressure(one, SNAPS, hears)
     assert np.abs(of.amplitude).sum() / one.amplitude[0] * np.abs(alone).max() > 10.0 * np.abs(exact).max()
     assert error(got[some], exact) < 1e-4
     # as loud as the echo of a sphere: half its radius
     point = replace(one, amplitude=one.amplitude * 0.05 / f[np.argmax(of.amplitude)], coherent=np.zeros(1, bool))
-    ball, _ = DirectSum().pressure(
-        replace(point, corner_delays=np.zeros((1, 3))), SNAPS, Reception(part, SONAR, absorption, start, samples)
-    )
+    ball, _ = DirectSum().pressure(replace(point, corner_delays=np.zeros((1, 3))), SNAPS, hears)
     assert np.sqrt((exact**2).sum() / (ball**2).sum()) == pytest.approx(1.0, abs=0.05)
 
 
@@ -196,7 +187,7 @@ def test_facets_of_half_a_wavelength_are_few_modes() -> None:
 
 def test_what_is_no_facet_is_refused() -> None:
     of = target_at(12.0, 4, 8, direct=False)
-    start, samples = window(of, SONAR)
+    hears = hearing(of, SONAR, FACES, margin=5e-4)
     n, third = 4, np.arange(4) == 2
     for columns, message in (
         (
@@ -215,30 +206,26 @@ def test_what_is_no_facet_is_refused() -> None:
     ):
         for method in (DirectSum(), GriddedSynthesis()):
             with pytest.raises(ValueError, match=message):
-                method.signals(replace(of, **columns), SNAPS, Reception(FACES, SONAR, None, start, samples))
+                method.signals(replace(of, **columns), SNAPS, hears)
 
 
 def test_facets_too_large_for_modes_are_refused_and_the_exact_sum_takes_them() -> None:
     array = some_of(FACES, 250)
     of = target_at(12.0, 4, 9, direct=False)
     limit = MOST_PHASE / (2.0 * np.pi * 87.5e3)
-    start, samples = window(of, SONAR)
+    hears = hearing(of, SONAR, array, margin=5e-4)
 
     def of_size(size: float) -> Arrivals:
         return replace(of, corner_delays=size * np.array([[-1.0, 0.0, 1.0]] * 3 + [[-0.5, 0.0, 0.5]]))
 
-    exact, _ = DirectSum().pressure(of_size(0.99 * limit), SNAPS, Reception(array, SONAR, None, start, samples))
-    got, _ = GriddedSynthesis().pressure(of_size(0.99 * limit), SNAPS, Reception(array, SONAR, None, start, samples))
+    exact, _ = DirectSum().pressure(of_size(0.99 * limit), SNAPS, hears)
+    got, _ = GriddedSynthesis().pressure(of_size(0.99 * limit), SNAPS, hears)
     assert error(got, exact) < 1e-4
     with pytest.raises(FieldError, match="direct_sum"):
-        GriddedSynthesis().pressure(of_size(1.1 * limit), SNAPS, Reception(array, SONAR, None, start, samples))
-    assert np.isfinite(
-        DirectSum().pressure(of_size(1.1 * limit), SNAPS, Reception(array, SONAR, None, start, samples))[0]
-    ).all()
+        GriddedSynthesis().pressure(of_size(1.1 * limit), SNAPS, hears)
+    assert np.isfinite(DirectSum().pressure(of_size(1.1 * limit), SNAPS, hears)[0]).all()
     alike = replace(
         of, corner_delays=np.tile([-3e-5, 0.0, 3e-5], (4, 1))
     )  # one shape for all is exact, whatever its size
-    exact, _ = DirectSum().pressure(alike, SNAPS, Reception(array, SONAR, None, start, samples))
-    assert (
-        error(GriddedSynthesis().pressure(alike, SNAPS, Reception(array, SONAR, None, start, samples))[0], exact) < 1e-4
-    )
+    exact, _ = DirectSum().pressure(alike, SNAPS, hears)
+    assert error(GriddedSynthesis().pressure(alike, SNAPS, hears)[0], exact) < 1e-4
