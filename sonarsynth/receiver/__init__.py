@@ -23,10 +23,11 @@ from sonarsynth.conventions import (
     WaterSoundSpeed,
 )
 from sonarsynth.description import BY_KIND, description
-from sonarsynth.receiver.hydrophones import Array, Elements, PlanarLattice, PositionTable, Romanis, elements
+from sonarsynth.receiver.hydrophones import POINT, Array, Elements, PlanarLattice, PositionTable, Romanis, elements
 from sonarsynth.receiver.sensor_errors import Electronics, Overload, SensorErrors
 
 __all__ = [
+    "POINT",
     "Band",
     "BandPass",
     "BeamGrid",

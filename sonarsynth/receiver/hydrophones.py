@@ -154,3 +154,7 @@ def elements(array: Array) -> Elements:
         raise ValueError(f"dead names an element outside 0..{len(gain) - 1}")
     gain[list(array.dead)] = 0.0
     return Elements(position, gain, float(face), float(pitch), column, row, columns, rows)
+
+
+POINT = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
+"""A point hydrophone of gain 1 in the middle of its array."""

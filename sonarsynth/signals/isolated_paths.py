@@ -12,7 +12,7 @@ from scipy.fft import rfft
 
 from sonarsynth.conventions import Floats
 from sonarsynth.products import Arrivals
-from sonarsynth.receiver import Elements, PositionTable, Sonar, elements
+from sonarsynth.receiver import POINT, Sonar
 from sonarsynth.signals.array_paths import array_paths, reach
 from sonarsynth.signals.filtered_pulse import (
     at_longest,
@@ -32,11 +32,6 @@ if TYPE_CHECKING:
 
 STRETCH_TOLERANCE = 1e-6
 """Error of the spectra of pulses that Doppler stretches, relative to their size."""
-
-
-def ideal_hydrophone() -> Elements:
-    """One point hydrophone of gain 1 in the middle of the array."""
-    return elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 
 
 @lru_cache(maxsize=64)
@@ -61,7 +56,7 @@ def measured_levels(
 ) -> Floats:
     """Level (path,) in dB of each path alone, measured in the signals that a method of synthesis makes of it.
 
-    The energy in the band of the sonar at `ideal_hydrophone`, over that of the snap at 1 m, through the same filter and
+    The energy in the band of the sonar at `POINT`, over that of the snap at 1 m, through the same filter and
     stretched by the same Doppler. Paths are moved by whole samples into slots of time of their own, so far apart that
     none is heard in another's, and made about equally loud (exactly: by powers of two), so that single precision rounds
     none away beside another; NaN for a snap that is silent in the band. Raises ValueError as the method does.
@@ -69,10 +64,10 @@ def measured_levels(
     count, fs = len(paths.delay), sonar.sampling_frequency
     if not count:
         return np.zeros(0)
-    hydrophone, alike = ideal_hydrophone(), paths.expansion.without("phase", "delay_variance")
+    alike = paths.expansion.without("phase", "delay_variance")
     paths = replace(paths, expansion=alike)  # that of the centre is heard
-    front = array_paths(paths, snaps, hydrophone)
-    reception = Reception(hydrophone, sonar, absorption, 0.0, 1)
+    front = array_paths(paths, snaps, POINT)
+    reception = Reception(POINT, sonar, absorption, 0.0, 1)
     before, after = layout(paths, front, snaps, reception).support + reach(front)
     lead = int(np.ceil(before.max() * fs)) + GUARD
     slot = fast_length(lead + int(np.ceil(after.max() * fs)) + GUARD)

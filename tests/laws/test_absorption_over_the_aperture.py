@@ -10,12 +10,12 @@ import pytest
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.water.seawater import ainslie_mccolm
 from sonarsynth.products import Arrivals
-from sonarsynth.receiver import Elements, PositionTable, Romanis, elements
+from sonarsynth.receiver import POINT, PositionTable, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.segments import Reception
-from tests.laws.test_synthesis import SNAPS, SONAR, C, arrivals
+from tests.echoes import ROMANIS
+from tests.laws.test_synthesis import SNAPS, SONAR, C, arrivals, some_of
 
-ROMANIS = elements(Romanis())
 FAR = np.argsort(np.linalg.norm(ROMANIS.position, axis=1))[[-1, -2, -200]]
 
 
@@ -40,19 +40,15 @@ def window(distance: float) -> tuple[float, int]:
     return (distance - 2.0) / C, 1024
 
 
-def of_face(position: Floats) -> Elements:
-    return elements(PositionTable(positions=(tuple(map(float, position)),), face=ROMANIS.face))
-
-
 @pytest.mark.parametrize("count", [1, 60])
 @pytest.mark.parametrize("distance", [3.0, 20.0, 300.0])
 def test_an_expansion_absorbs_what_the_way_to_each_hydrophone_does(distance: float, count: int) -> None:
     points, rate, (start, samples) = points_at(distance, count, 0.3), float(sea(SONAR.band.centre)), window(distance)
-    part = elements(PositionTable(positions=tuple(map(tuple, ROMANIS.position[FAR].tolist())), face=ROMANIS.face))
+    part = ROMANIS.select(FAR)
     whole, _ = DirectSum().pressure(
         from_points(points, np.zeros(3), rate), SNAPS, Reception(part, SONAR, sea, start, samples)
     )
-    single = of_face(np.zeros(3))
+    single = replace(POINT, face=ROMANIS.face)
     for row, sensor in zip(whole, FAR, strict=True):
         here = from_points(points, ROMANIS.position[sensor], rate)
         alone, _ = DirectSum().pressure(here, SNAPS, Reception(single, SONAR, sea, start, samples))
@@ -67,7 +63,7 @@ def test_an_expansion_absorbs_what_the_way_to_each_hydrophone_does(distance: flo
 def test_the_fast_synthesis_absorbs_as_the_exact_sum(count: int, face: float) -> None:
     points, rate, (start, samples) = points_at(6.0, count, 0.4), float(sea(SONAR.band.centre)), window(6.0)
     of = from_points(points, np.zeros(3), rate)
-    part = elements(PositionTable(positions=tuple(map(tuple, ROMANIS.position[::16].tolist())), face=face))
+    part = some_of(ROMANIS, 16, face)
     exact, _ = DirectSum().pressure(of, SNAPS, Reception(part, SONAR, sea, start, samples))
     fast = GriddedSynthesis(width=10, precision="float64", tolerance=1e-7)
     got, _ = fast.pressure(of, SNAPS, Reception(part, SONAR, sea, start, samples))
@@ -82,7 +78,7 @@ def test_absorption_that_is_strong_is_absorbed_at_every_hydrophone() -> None:
 
     points, rate, (start, samples) = points_at(6.0, 100, 0.4), float(strong(SONAR.band.centre)), window(6.0)
     of = from_points(points, np.zeros(3), rate)
-    part = elements(PositionTable(positions=tuple(map(tuple, ROMANIS.position[::16].tolist())), face=ROMANIS.face))
+    part = some_of(ROMANIS, 16)
     exact, _ = DirectSum().pressure(of, SNAPS, Reception(part, SONAR, strong, start, samples))
     got, _ = GriddedSynthesis().pressure(of, SNAPS, Reception(part, SONAR, strong, start, samples))
     assert np.abs(got - exact).max() < 1.5e-4 * np.abs(exact).max()

@@ -11,22 +11,22 @@ import pytest
 
 from sonarsynth import planning
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry import Pose
 from sonarsynth.planning import choosing
 from sonarsynth.planning.choosing import PerSensorReference
 from sonarsynth.products import Arrivals
 from sonarsynth.products.array_expansion import aperture_terms
 from sonarsynth.propagation import Refracted
-from sonarsynth.receiver import Elements, Romanis, Sonar, elements
+from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe import reading
 from sonarsynth.signals.array_paths import array_paths, delay_and_gain
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
+from tests.echoes import EAST, ROMANIS
 
-POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
-ROMANIS = elements(Romanis())
+POSE = Pose(np.array([0.0, 0.0, -5.0]), EAST)
 SNAP = Emission(np.array([5.0, -2.0, -9.0]), 0.0, LogarithmicBubble(), None)
 SONAR = Sonar()
 PROFILE = Profile(np.array([0.0, 10.0]), np.array([1500.0, 1700.0]))

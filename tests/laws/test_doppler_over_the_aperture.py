@@ -11,13 +11,13 @@ import pytest
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.boundaries import Rigid, SeaBottom
-from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Straight
-from sonarsynth.receiver import Elements, Romanis, Sonar, elements
+from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.scattering import Isotropic
 from sonarsynth.signals import GriddedSynthesis
@@ -27,11 +27,9 @@ from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerance
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
+from tests.echoes import EAST, PROFILE, ROMANIS, C
 
-C = 1500.0
-PROFILE = Profile(np.array([0.0]), np.array([C]))
-POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
-ROMANIS = elements(Romanis())
+POSE = Pose(np.array([0.0, 0.0, -5.0]), EAST)
 SNAP = Emission(np.array([14.0, -5.0, -9.5]), 0.0, LogarithmicBubble(), None)
 SONAR = Sonar()
 PANEL = mesh_of(Box(size=(0.006, 0.3, 0.2), edge=0.05))

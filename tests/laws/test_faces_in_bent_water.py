@@ -9,11 +9,11 @@ import pytest
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Refracted
-from sonarsynth.receiver import Elements, Romanis, Sonar, elements
+from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths, arrival_directions, towards
@@ -21,10 +21,9 @@ from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
+from tests.echoes import EAST, ROMANIS, C
 
-C = 1500.0
-POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
-ROMANIS = elements(Romanis())
+POSE = Pose(np.array([0.0, 0.0, -5.0]), EAST)
 SNAPS = tuple(Emission(np.array([14.0, y, z]), 0.0, LogarithmicBubble(), None) for y, z in ((-5.0, -9.5), (-4.0, -9.0)))
 SONAR = Sonar()
 FAR = np.array([int(np.argmax(np.linalg.norm(ROMANIS.position, axis=1))), int(np.argmin(ROMANIS.position[:, 2])), 300])

@@ -12,7 +12,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.equations.scattering.facet_pulses import facet_mean, facet_response, mean_powers, rough_factor
 from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude
 from sonarsynth.products import Arrivals
-from sonarsynth.receiver import BandPass, LowPass, PositionTable, Sonar, elements
+from sonarsynth.receiver import POINT, BandPass, LowPass, Sonar
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.sources.snap_pulses import waveform
@@ -20,7 +20,6 @@ from tests.hearing import hearing
 from tests.laws.test_synthesis import FACES, MODEL, SHARP, SNAPS, C, absorption, arrivals, error, some_of, target_at
 
 CENTRE = SHARP.band.centre
-ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 PRECISE = GriddedSynthesis(precision="float64", width=14, tolerance=1e-10)
 METHODS = (DirectSum(), PRECISE)
 
@@ -34,7 +33,7 @@ def paths(delay: list[float] | Floats, amplitude: list[float] | Floats, **column
 
 def heard(of: Arrivals, method: DirectSum | GriddedSynthesis | None = None, margin: float = 1.5e-3) -> Floats:
     """Pressure (sample,) in the window of the arrivals at one hydrophone, in float64."""
-    hears = hearing(of, SHARP, ONE, margin=margin)
+    hears = hearing(of, SHARP, POINT, margin=margin)
     return (method or DirectSum()).pressure(of, SNAPS, hears)[0][0]
 
 
@@ -98,7 +97,7 @@ def test_signals_are_the_kirchhoff_integral_frequency_by_frequency(
     some = np.abs(spectrum) > 0.0
     omega, weight = 2.0 * np.pi * f[some], 2.0 * spectrum[some] * SHARP.sampling_frequency / period
     heard_of_it = weight * facet_amplitude(corners, incident, scattered, omega / C)
-    start, samples = hearing(of, SHARP, ONE, margin=1e-3)[3:]
+    start, samples = hearing(of, SHARP, POINT, margin=1e-3)[3:]
     t = start + np.arange(samples) / SHARP.sampling_frequency - delay
     near = np.abs(t) < 8e-4  # the period of the tones is longer than the echo
     got = heard(of, method=method, margin=1e-3)
@@ -140,7 +139,7 @@ def test_many_tiny_facets_are_one_that_is_large() -> None:
     """Points instead of facets, each a plain derivative: their error falls by 4 with every split."""
     corners, incident, scattered = facet(5, 4e-3)
     exact, parts, errors = heard(echo_of(corners[None], incident, scattered, 0.03)), corners[None], []
-    hears = hearing(echo_of(corners[None], incident, scattered, 0.03), SHARP, ONE, margin=1.5e-3)
+    hears = hearing(echo_of(corners[None], incident, scattered, 0.03), SHARP, POINT, margin=1.5e-3)
     for _ in range(4):
         parts = split(parts)
         points = echo_of(parts, incident, scattered, 0.03)
@@ -161,8 +160,8 @@ def test_a_mirror_differentiates_and_an_edge_repeats(method: DirectSum | Gridded
     # a long strip, one of its ends at 0: what comes from there is the pulse itself, of 1/(pi f_c) over its length
     far = 1e-3
     edge = replace(mirror, delay=np.array([0.03 + far / 3.0]), corner_delays=far * np.array([[-1.0, -1.0, 2.0]]) / 3.0)
-    t = hearing(mirror, SHARP, ONE, margin=1.5e-3).start + np.arange(plain.size) / SHARP.sampling_frequency - 0.03
-    hears = hearing(mirror, SHARP, ONE, margin=1.5e-3)
+    t = hearing(mirror, SHARP, POINT, margin=1.5e-3).start + np.arange(plain.size) / SHARP.sampling_frequency - 0.03
+    hears = hearing(mirror, SHARP, POINT, margin=1.5e-3)
     got = DirectSum().pressure(edge, SNAPS, hears)[0][0]
     first = np.abs(t) < 4e-4
     assert error(got[first], plain[first] / (np.pi * CENTRE * far)) < 0.01
@@ -218,7 +217,7 @@ def test_corners_have_no_order_and_their_middle_is_a_delay(method: DirectSum | G
     off = np.array([7e-6, -3e-6])
     turned = replace(of, corner_delays=corners[:, [2, 0, 1]])
     moved = replace(of, delay=of.delay - off, corner_delays=corners + off[:, None])
-    hears = hearing(of, SHARP, ONE, margin=1.5e-3)
+    hears = hearing(of, SHARP, POINT, margin=1.5e-3)
 
     def one(x: Arrivals) -> Floats:
         return method.signals(x, SNAPS, hears).pressure
@@ -236,7 +235,7 @@ def test_a_reshaped_pulse_is_over_after_its_support(chosen: BandPass | LowPass |
         shape = {"coherent": np.array([sloped]), "coherent_fraction": np.array([1.0 * (rough > 0.0)])}
         of = paths([0.05], [1.0], **shape, height_delay_std=np.array([rough]))
         before, after = pulse_support(waveform(MODEL), sonar.antialias, sloped=sloped, rough=rough)
-        hears = hearing(of, sonar, ONE, margin=0.012)
+        hears = hearing(of, sonar, POINT, margin=0.012)
         got = np.abs(DirectSum().pressure(of, SNAPS, hears)[0][0])
         t = hears.start + np.arange(hears.samples) / sonar.sampling_frequency - 0.05
         assert got[(t < -before) | (t > after)].max() < left * got.max()

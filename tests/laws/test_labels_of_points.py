@@ -21,7 +21,7 @@ from sonarsynth.pipeline.labelling import band_of
 from sonarsynth.planning import plan
 from sonarsynth.products import FAMILIES, ORIGINS, Arrivals, PointCloud, PointLabels
 from sonarsynth.propagation import AutoTracing
-from sonarsynth.receiver import BeamGrid, PlanarLattice
+from sonarsynth.receiver import POINT, BeamGrid, PlanarLattice
 from sonarsynth.receiver import elements as elements_of
 from sonarsynth.receiver.hydrophones import PositionTable
 from sonarsynth.recipe import Recipe
@@ -157,14 +157,14 @@ def test_what_each_group_brings_is_what_its_signals_alone_have_there(crowd: Made
 
 def test_a_beam_holds_the_energy_of_the_signal_that_a_path_brings(crowd: Made) -> None:
     """Of each snap as loud as it is: its direct pulse alone, at one hydrophone, whatever the level of the other."""
-    one, sonar = elements_of(PositionTable(positions=((0.0, 0.0, 0.0),))), crowd.plan.scene.sonar
+    sonar = crowd.plan.scene.sonar
     for row in np.flatnonzero(crowd.arrivals.direct & (crowd.arrivals.surface + crowd.arrivals.bottom == 0)):
         alone, snaps = crowd.arrivals.select(np.array([row])), crowd.frame.moment.snaps
         start, fs = alone.delay[0] - 0.02, sonar.sampling_frequency
-        signals = GriddedSynthesis().signals(alone, snaps, Reception(one, sonar, crowd.plan.absorption, start, 8192))
+        signals = GriddedSynthesis().signals(alone, snaps, Reception(POINT, sonar, crowd.plan.absorption, start, 8192))
         f, wave = np.fft.rfftfreq(8192, 1.0 / fs), np.fft.rfft(signals.pressure[0].astype(float)) / fs
         energy = 2.0 * np.sum(np.abs(wave[(f > sonar.band.low) & (f < sonar.band.high)]) ** 2) * fs / 8192
-        case = crowd._replace(arrivals=alone, listening=replace(crowd.listening, elements=one))
+        case = crowd._replace(arrivals=alone, listening=replace(crowd.listening, elements=POINT))
         found = attribution(
             alone, case.band, case.listening, alone.direction, alone.delay - case.listening.clock, np.full(1, np.inf)
         )

@@ -11,12 +11,12 @@ from sonarsynth.conventions import Floats
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.labels import SLICES, Band, echo_levels, family, link_budget, path_powers
 from sonarsynth.products import LINK_BUDGET, Arrivals, LinkBudget
+from sonarsynth.receiver import POINT, BandPass, Sonar
 from sonarsynth.receiver import Band as SonarBand
-from sonarsynth.receiver import BandPass, Sonar
 from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.direct_sum import DirectSum, relative_absorption
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
-from sonarsynth.signals.isolated_paths import energy_in_slices, ideal_hydrophone, measured_levels
+from sonarsynth.signals.isolated_paths import energy_in_slices, measured_levels
 from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
@@ -233,7 +233,7 @@ def test_the_level_of_coherent_paths_is_the_energy_of_their_signals() -> None:
     zero = np.zeros(80, np.int64)
     of = replace(of, snap=zero, target=zero, surface=zero, bottom=zero)
     fs, samples = SONAR.sampling_frequency, 4096
-    pressure, outside = DirectSum().pressure(of, SNAPS, Reception(ideal_hydrophone(), SONAR, absorption, 0.0, samples))
+    pressure, outside = DirectSum().pressure(of, SNAPS, Reception(POINT, SONAR, absorption, 0.0, samples))
     assert outside == 0
     f, sent = pulse_spectrum(waveform(MODEL), SONAR.antialias, fs, samples)
     inside = (f >= 25e3) & (f <= 85e3)

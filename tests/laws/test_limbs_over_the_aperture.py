@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity
+from sonarsynth.geometry import Pose
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
-from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import POINT, Elements, Sonar
 from sonarsynth.scattering import Kirchhoff, PartlyReflecting
 from sonarsynth.scattering.components import CoherentKirchhoff
 from sonarsynth.scattering.facet_geometry import patches
@@ -24,20 +24,19 @@ from sonarsynth.state import Emission, FrameContext, Medium, OcclusionPoint, Rec
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.tracing.arrivals import trace
+from tests.echoes import EAST, PROFILE, ROMANIS, C
+from tests.laws.test_synthesis import some_of
 
-C = 1500.0
-PROFILE = Profile(np.array([0.0]), np.array([C]))
 WATER = Environment(depth=200.0, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
-PLACE, EAST = np.array([0.0, 0.0, -100.0]), quaternion(0.5 * np.pi)
-SONAR, FACE = Sonar(), Romanis().face
+PLACE = np.array([0.0, 0.0, -100.0])
+SONAR = Sonar()
 BALL = mesh_of(Sphere(radius=0.08, edge=0.008))
 SNAP = Emission(PLACE + [4.0, 6.0, 1.0], 0.0, LogarithmicBubble(), None)
-ARRAY = elements(PositionTable(positions=tuple(map(tuple, elements(Romanis()).position[::6].tolist())), face=FACE))
+ARRAY = some_of(ROMANIS, 6)
 FAR = np.argsort(np.linalg.norm(ARRAY.position, axis=1))[[-1, -2, 30]]
-SINGLE = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=FACE))
+SINGLE = replace(POINT, face=ARRAY.face)
 FLUID = PartlyReflecting(density_ratio=1.5, speed_ratio=1.2)
 LAWS = [(Kirchhoff(), 5.0), (Kirchhoff(edges="sharp"), 50.0), (Kirchhoff(surface=FLUID, roughness=0.001), 4.0)]
-ROWS = ("position", "gain", "column", "row")
 
 
 def traced(law: Kirchhoff, place: Floats, array: Elements, occlusion: OcclusionPoint = "sensors") -> Arrivals:
@@ -62,7 +61,7 @@ def alone(law: Kirchhoff, sensor: int) -> Arrivals:
 @pytest.mark.parametrize(("law", "better"), LAWS)
 def test_one_expansion_hears_what_each_hydrophone_sees(law: Kirchhoff, better: float) -> None:
     found, centre = (traced(law, PLACE, ARRAY, occlusion) for occlusion in ("sensors", "centre"))
-    start, part = found.delay.min() - 2e-4, replace(ARRAY, **{n: getattr(ARRAY, n)[FAR] for n in ROWS})
+    start, part = found.delay.min() - 2e-4, ARRAY.select(FAR)
     assert found.hidden(ARRAY.count)[:, FAR].any()
     exact = np.vstack([heard(alone(law, int(n)), SINGLE, start) for n in FAR])
     mine, plain = (np.linalg.norm(heard(x.for_sensors(FAR, ARRAY.count), part, start) - exact) for x in (found, centre))

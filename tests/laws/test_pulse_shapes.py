@@ -11,7 +11,7 @@ from scipy.signal import hilbert
 from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.equations.bubble.snap_pressure import Bubble
 from sonarsynth.products import Arrivals
-from sonarsynth.receiver import LowPass, PositionTable, Sonar, elements
+from sonarsynth.receiver import POINT, LowPass, Sonar
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.array_paths import array_paths, folded
 from sonarsynth.signals.filtered_pulse import (
@@ -30,7 +30,6 @@ from tests.hearing import hearing
 from tests.laws.test_synthesis import FACES, MODEL, SHARP, SNAPS, SONAR, absorption, arrivals, error, some_of, target_at
 
 LOW = Sonar(filter=LowPass(cutoff=60e3, attenuation=140), sampling_frequency=250e3)
-ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 METHODS = (DirectSum(), GriddedSynthesis(precision="float64", width=14, tolerance=1e-9))
 
 
@@ -52,7 +51,7 @@ def alone(sonar: Sonar, phase: float = 0.0, delay_std: float = 0.0, doppler: flo
     """Times after the collapse (sample,) and the exact pressure (sample,) of one path at one hydrophone."""
     of = arrivals([0.05], [[1.0, 0.0, 0.0]], [10.0], [1.0])
     of = replace(of, phase=np.array([phase]), delay_std=np.array([delay_std]), doppler=np.array([doppler]))
-    hears = hearing(of, sonar, ONE, margin=0.006)
+    hears = hearing(of, sonar, POINT, margin=0.006)
     got, outside = DirectSum().pressure(of, SNAPS, hears)
     assert outside == 0
     return hears.start + np.arange(hears.samples) / sonar.sampling_frequency - 0.05, got[0]
@@ -131,9 +130,8 @@ def test_many_shapes_over_the_whole_array(phase: float, delay_std: float) -> Non
     """Enough paths that nodes pay, in tiles of many modes; looked at where the rim and the middle are."""
     of = shaped(target_at(20.0, 300, 5, direct=False), 6, phase=phase, delay_std=delay_std, doppler=0.0)
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:2], 250)
-    part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
     hears = hearing(of, SONAR, FACES, absorption, margin=4e-4)
-    exact, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=part))
+    exact, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=FACES.select(some)))
     got = GriddedSynthesis().signals(of, SNAPS, hears).pressure
     assert error(got[some], exact) < 1e-4
 
@@ -170,7 +168,7 @@ def test_half_turns_are_signs_and_nothing_is_nothing(method: DirectSum | Gridded
 @pytest.mark.parametrize("method", METHODS)
 def test_a_turn_keeps_the_energy_and_turns_add_up(method: DirectSum | GriddedSynthesis) -> None:
     of = arrivals([0.05, 0.0501], [[1.0, 0.0, 0.0], [1.0, 0.1, 0.0]], [10.0, 11.0], [1.0, 0.4])
-    hears = hearing(of, SHARP, ONE, margin=0.002)
+    hears = hearing(of, SHARP, POINT, margin=0.002)
 
     def heard(*phase: float) -> Floats:
         turned = replace(of, phase=np.array(phase))
@@ -189,7 +187,7 @@ def test_a_turn_keeps_the_energy_and_turns_add_up(method: DirectSum | GriddedSyn
 @pytest.mark.parametrize("method", METHODS)
 def test_blurs_add_by_squares_and_end_in_silence(method: DirectSum | GriddedSynthesis) -> None:
     of = arrivals([0.05, 0.0502], [[1.0, 0.0, 0.0], [1.0, 0.1, 0.0]], [10.0, 11.0], [1.0, 0.4])
-    hears = hearing(of, SHARP, ONE, margin=0.002)
+    hears = hearing(of, SHARP, POINT, margin=0.002)
 
     def heard(*delay_std: float) -> Floats:
         soft = replace(of, delay_std=np.array(delay_std))
@@ -211,7 +209,7 @@ def test_blurs_add_by_squares_and_end_in_silence(method: DirectSum | GriddedSynt
 def test_shared_shapes_cost_no_modes() -> None:
     """Where all paths have one shape, what is deposited is what plain pulses deposit: only their spectrum differs."""
     of = target_at(15.0, 6, 10, direct=False)
-    hears = hearing(of, SHARP, ONE, margin=0.001)
+    hears = hearing(of, SHARP, POINT, margin=0.001)
     once = replace(of, phase=np.full(6, 0.8), delay_std=np.full(6, 4e-6), doppler=np.full(6, 2e-3))
     exact, _ = DirectSum().pressure(once, SNAPS, hears)
     got, _ = GriddedSynthesis(width=14, precision="float64", tolerance=1e-10).pressure(once, SNAPS, hears)
@@ -242,7 +240,7 @@ def test_modes_are_the_definition(tolerance: float, most: int) -> None:
         doppler=rng.uniform(-1e-3, 1e-3, n),
     )
     series = stretched_spectra(waveform(MODEL), SHARP.antialias, SHARP.sampling_frequency, samples, 2.0**-9, 4)
-    front = array_paths(of, SNAPS, ONE)
+    front = array_paths(of, SNAPS, POINT)
     front = replace(front, loss=front.loss - front.loss.mean())
     decay = absorption(f)
     modes = shape_modes(front, f[some], spectrum[some], decay[some], series[:, some], 2.0**-9, tolerance)
@@ -257,7 +255,7 @@ def test_modes_are_the_definition(tolerance: float, most: int) -> None:
 def test_phases_alone_are_two_modes() -> None:
     f, spectrum = pulse_spectrum(waveform(MODEL), SHARP.antialias, SHARP.sampling_frequency, 384)
     of = shaped(target_at(15.0, 50, 13, direct=False), 14, delay_std=0.0, doppler=0.0)
-    none, front = np.zeros((0, 130), complex), array_paths(of, SNAPS, ONE)
+    none, front = np.zeros((0, 130), complex), array_paths(of, SNAPS, POINT)
     modes = shape_modes(front, f[40:170], spectrum[40:170], np.zeros(130), none, 0.0, 1e-9)
     assert modes.weight.shape == (50, 2)
 

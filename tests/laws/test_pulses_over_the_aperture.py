@@ -9,14 +9,14 @@ import pytest
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.boundaries import Rigid, SeaBottom, SeaSurface, Sediment
-from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.products.array_expansion import QUANTITIES
 from sonarsynth.propagation import AutoTracing
-from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import POINT, Elements, Sonar
 from sonarsynth.scattering import FacetLaw, Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.segments import Reception
@@ -25,13 +25,11 @@ from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
+from tests.echoes import EAST, PROFILE, ROMANIS, C
+from tests.laws.test_synthesis import some_of
 
-C = 1500.0
-PROFILE = Profile(np.array([0.0]), np.array([C]))
 PLACE = np.array([0.0, 0.0, -5.0])
-EAST = quaternion(0.5 * np.pi)
-ROMANIS = elements(Romanis())
-FACE = 49.53e-3
+SINGLE = replace(POINT, face=ROMANIS.face)
 SAND = SeaBottom(reflection=Sediment(name="medium sand"))
 HARD = SeaBottom(reflection=Rigid())
 ROUGH = SeaSurface(rms_height=0.006)
@@ -63,11 +61,7 @@ def traced(surface: SeaSurface, bottom: SeaBottom, law: FacetLaw, place: Floats,
 def alone(*scene: object, sensor: int) -> Arrivals:
     """Traced to a single hydrophone in the middle of an array of its own."""
     place = Pose(PLACE, EAST).to_world(ROMANIS.position[sensor][None])[0]
-    return traced(*scene, place, single())  # type: ignore[arg-type]
-
-
-def single() -> Elements:
-    return elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=FACE))
+    return traced(*scene, place, SINGLE)  # type: ignore[arg-type]
 
 
 def heard(found: Arrivals, q: Floats) -> Floats:
@@ -148,7 +142,7 @@ def test_signals_of_one_expansion_are_those_of_each_hydrophone_alone(scene: tupl
         for direct in (True, False):
             some, other = mine.select(mine.direct == direct), theirs.select(theirs.direct == direct)
             got = method.pressure(some, (SNAP,), Reception(ROMANIS, SONAR, None, START, 4000))[0][sensor]
-            want = method.pressure(other, (SNAP,), Reception(single(), SONAR, None, START, 4000))[0][0]
+            want = method.pressure(other, (SNAP,), Reception(SINGLE, SONAR, None, START, 4000))[0][0]
             assert np.linalg.norm(want) > 0.0
             assert np.linalg.norm(got - want) < most * np.linalg.norm(want)
 
@@ -166,7 +160,7 @@ def test_every_edge_of_a_blur_is_within_the_window_or_counted() -> None:
     terms = np.zeros((1, 20))
     terms[0, [1, 4, 7, 9]] = 0.0, 0.0, 4e-10, 4e-10
     one = replace(one, expansion=replace(one.expansion, delay_variance=terms).without("phase"))
-    array = few()
+    array = some_of(ROMANIS, 25)
     exact = DirectSum().signals(one, (SNAP,), Reception(array, SONAR, None, START, 4000)).pressure
     got = GriddedSynthesis(precision="float64", tolerance=1e-6).signals(
         one, (SNAP,), Reception(array, SONAR, None, START, 4000)
@@ -174,12 +168,6 @@ def test_every_edge_of_a_blur_is_within_the_window_or_counted() -> None:
     assert np.abs(got.pressure - exact).max() < 1e-4 * np.abs(exact).max()
     size = np.linalg.norm(exact, axis=1)
     assert size.max() > 2.0 * size.min()
-
-
-def few(count: int = 20) -> Elements:
-    """Some hydrophones of the array, with their face."""
-    chosen = ROMANIS.position[:: len(ROMANIS.position) // count]
-    return elements(PositionTable(positions=tuple(map(tuple, chosen.tolist())), face=FACE))
 
 
 @pytest.mark.parametrize("amplify", [1.0, 4.0])
@@ -190,7 +178,7 @@ def test_the_fast_synthesis_changes_pulses_as_the_exact_one_does(amplify: float)
     over = replace(over, phase=amplify * over.phase, delay_variance=amplify * over.delay_variance)
     found = replace(found, expansion=over)
     found = found.select(np.concatenate([np.flatnonzero(found.direct), np.flatnonzero(~found.direct)[::80]]))
-    array = few()
+    array = some_of(ROMANIS, 25)
     for direct in (True, False):
         part = found.select(found.direct == direct)
         want = DirectSum().signals(part, (SNAP,), Reception(array, SONAR, None, START, 4000)).pressure

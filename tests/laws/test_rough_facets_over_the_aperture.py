@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
-from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import POINT, Elements, Sonar
 from sonarsynth.scattering import Kirchhoff
 from sonarsynth.signals.direct_sum import DirectSum
 from sonarsynth.signals.segments import Reception
@@ -24,17 +24,18 @@ from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
 from sonarsynth.tracing.expansion.probe_sensors import sphere
+from tests.echoes import EAST, ROMANIS
+from tests.laws.test_synthesis import some_of
 
 C, DEPTH = 1500.0, 40.0
 EVEN = Profile(np.array([0.0, DEPTH]), np.array([C, C]))
 BENT = Profile(np.array([0.0, 18.0, 22.0, DEPTH]), np.array([1500.0, 1500.0, 1490.0, 1490.0]))
 WATER = Environment(depth=DEPTH, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
-PLACE, EAST = np.array([0.0, 0.0, -20.5]), quaternion(0.5 * np.pi)
-SONAR, FACE = Sonar(), Romanis().face
-SHAPE = elements(Romanis()).position[::6]
-FAR = np.argsort(np.linalg.norm(SHAPE, axis=1))[[-1, -2, -9, 30]]
+PLACE = np.array([0.0, 0.0, -20.5])
+SONAR, ARRAY = Sonar(), some_of(ROMANIS, 6)
+FAR = np.argsort(np.linalg.norm(ARRAY.position, axis=1))[[-1, -2, -9, 30]]
 """Hydrophones that are traced alone, the outmost one among them, which the aperture is measured by."""
-SINGLE = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=FACE))
+SINGLE = replace(POINT, face=ARRAY.face)
 PANEL = mesh_of(Box(size=(0.02, 0.2, 0.2), edge=0.025))
 
 
@@ -53,12 +54,7 @@ GRAZING = View((12.0, -2.2, 0.2), np.radians(4.0), (24.0, 0.5, 1.0))
 
 
 def array_of(scale: float) -> Elements:
-    return elements(PositionTable(positions=tuple(map(tuple, (scale * SHAPE).tolist())), face=FACE))
-
-
-def some_of(array: Elements, sensors: Ints) -> Elements:
-    names = ("position", "gain", "column", "row")
-    return replace(array, **{name: getattr(array, name)[sensors] for name in names})
+    return replace(ARRAY, position=scale * ARRAY.position)
 
 
 def traced(
@@ -100,7 +96,7 @@ def errors(
         bounced(traced(x, view, PLACE, array, profile, bounces), bounces) for x in (law, replace(law, roughness=1.0))
     )
     assert len(found.delay) == len(plain.delay) > 50
-    start, part = found.delay.min() - 2e-4, some_of(array, FAR)
+    start, part = found.delay.min() - 2e-4, array.select(FAR)
     place = Pose(PLACE, EAST).to_world(array.position[FAR])
     alone = [bounced(traced(law, view, at, SINGLE, profile, bounces), bounces) for at in place]
     shared = replace(found, expansion=replace(found.expansion, amplitude=plain.expansion.amplitude))

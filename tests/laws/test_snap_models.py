@@ -11,7 +11,7 @@ import pytest
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble import pulses
 from sonarsynth.equations.noise import filters
-from sonarsynth.receiver import LowPass, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import POINT, LowPass, Romanis, Sonar, elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.signals import GriddedSynthesis, pulse_support
 from sonarsynth.signals.direct_sum import DirectSum
@@ -42,7 +42,6 @@ MODELS: tuple[SnapModel, ...] = (
 EVERY = pytest.mark.parametrize("model", MODELS, ids=lambda m: m.kind)
 SONAR = Sonar()
 LOW = LowPass(cutoff=60e3)
-ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 TIME = np.arange(-300, 301) / 500e3
 
 
@@ -124,7 +123,7 @@ def test_a_path_gives_the_pulse_itself(width: float) -> None:
     start, samples = 0.047, 1200
     for model in MODELS:
         got, _ = DirectSum().pressure(
-            of, (snap(model, gain=1.5, width=width),), Reception(ONE, SONAR, None, start, samples)
+            of, (snap(model, gain=1.5, width=width),), Reception(POINT, SONAR, None, start, samples)
         )
         made = pulses.scaled(model.pulse(0.0, 2.0 * pulses.reach(fir(SONAR.antialias))), 1.5, width)
         t = start + np.arange(samples) / SONAR.sampling_frequency - 0.05

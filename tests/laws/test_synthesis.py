@@ -11,7 +11,7 @@ import pytest
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind
-from sonarsynth.receiver import Band, BandPass, Elements, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import POINT, Band, BandPass, Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.signals.gridded.nodes import chebyshev, interpolation, nodes_for
@@ -40,8 +40,7 @@ def absorption(frequency: Floats) -> Floats:
 
 
 def some_of(array: Elements, step: int, face: float | None = None) -> Elements:
-    positions = tuple((float(x), float(y), float(z)) for x, y, z in array.position[::step])
-    return elements(PositionTable(positions=positions, face=array.face if face is None else face))
+    return replace(array.select(np.arange(0, array.count, step)), face=array.face if face is None else face)
 
 
 def arrivals(
@@ -147,9 +146,8 @@ def test_exact_sum_is_the_filtered_snap_at_the_exact_delays() -> None:
 
 
 def test_exact_sum_with_the_default_filter_leaves_out_what_would_fold() -> None:
-    array = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
     of = arrivals([0.01], [[1.0, 0.2, 0.0]], [10.0], [1.0])
-    hears = hearing(of, SONAR, array)
+    hears = hearing(of, SONAR, POINT)
     got, _ = DirectSum().pressure(of, SNAPS, hears)
     t = hears.start + np.arange(hears.samples) / SONAR.sampling_frequency - 0.01
     exact = filtered_pulse(t, MODEL.bubble, fir(SONAR.antialias))
@@ -162,8 +160,7 @@ def test_element_face_is_the_mean_of_points_over_it() -> None:
     offset = (np.arange(n) + 0.5) / n * face - 0.5 * face
     points = tuple((0.0, float(y), float(z)) for y in offset for z in offset)
     of = arrivals([0.01], [[1.0, 0.35, -0.2]], [np.inf], [1.0])
-    one = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=face))
-    hears = hearing(of, SONAR, one)
+    hears = hearing(of, SONAR, replace(POINT, face=face))
     got, _ = DirectSum().pressure(of, SNAPS, hears)
     mean, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=elements(PositionTable(positions=points))))
     assert error(got[0], mean.mean(axis=0)) < 3e-3
@@ -172,9 +169,8 @@ def test_element_face_is_the_mean_of_points_over_it() -> None:
 
 def test_absorption_is_relative_to_the_band_centre() -> None:
     """A path of 40 dB at the centre: each frequency is as loud as its own absorption says."""
-    array = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
     of = arrivals([0.01], [[1.0, 0.0, 0.0]], [10.0], [10 ** (-40 / 20)], loss=np.array([40.0]))
-    hears = hearing(of, SONAR, array, absorption)
+    hears = hearing(of, SONAR, POINT, absorption)
     lost, _ = DirectSum().pressure(of, SNAPS, hears)
     plain, _ = DirectSum().pressure(of, SNAPS, hears._replace(absorption=None))
     f = np.fft.rfftfreq(hears.samples, 1 / SONAR.sampling_frequency)
@@ -309,8 +305,7 @@ def test_lobes_that_vary_over_the_aperture(size: float) -> None:
     hears = hearing(of, SONAR, FACES, absorption)
     got = GriddedSynthesis().signals(of, SNAPS, hears).pressure
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:4], 250)  # rim and middle
-    part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
-    exact, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=part))
+    exact, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=FACES.select(some)))
     assert error(got[some], exact) < 1e-4
 
 

@@ -14,7 +14,7 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing, Refracted, Straight
-from sonarsynth.receiver import PositionTable, Romanis, elements
+from sonarsynth.receiver import POINT, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
@@ -24,7 +24,6 @@ BOTTOM_DEPTH, C = 12.0, 1530.0
 SOURCE, ARRAY = np.array([6.0, 5.0, -9.0]), np.array([0.0, 0.0, -5.0])
 SONAR = Pose(ARRAY, quaternion(0.5 * np.pi))
 ROMANIS = elements(Romanis())
-ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 UNIFORM = Profile(np.array([0.0, BOTTOM_DEPTH]), np.array([C, C]))
 THERMOCLINE = Profile(np.array([0.0, 7.0, 8.5, BOTTOM_DEPTH]), np.array([1541.0, 1541.0, 1534.6, 1534.5]))
 RIGID = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), bottom=SeaBottom(reflection=Rigid()))
@@ -41,7 +40,7 @@ def snap(time: float = 0.0) -> Emission:
 
 
 def run(
-    bodies=None, profile=UNIFORM, environment=RIGID, bounces=2, law=None, array=ONE, tracing=None, source=SOURCE,
+    bodies=None, profile=UNIFORM, environment=RIGID, bounces=2, law=None, array=POINT, tracing=None, source=SOURCE,
     sonar=SONAR,
 ) -> Arrivals:  # fmt: skip
     snaps = (Emission(source, 0.0, LogarithmicBubble(), None),)

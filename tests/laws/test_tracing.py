@@ -15,7 +15,7 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing, Refracted, Straight
-from sonarsynth.receiver import Elements, PositionTable, Romanis, elements
+from sonarsynth.receiver import POINT, Elements, PositionTable, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe, Scatterers
 from sonarsynth.scattering.scatterers import PointScatterer
 from sonarsynth.sources.shrimp import LogarithmicBubble
@@ -204,10 +204,9 @@ def compose(outer: Pose, inner: Pose) -> Floats:
 
 @pytest.mark.parametrize("profile", [UNIFORM, LAYERED])
 def test_source_and_array_may_change_places(profile: Profile) -> None:
-    point = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
     here, there = (0.0, 0.0, -10.0), (3.0, 6.0, -28.0)
-    forth = run(snaps=(snap(there),), profile=profile, array=point)
-    back = run(snaps=(snap(here),), profile=profile, array=point, sonar=Pose(np.array(there), SONAR.orientation))
+    forth = run(snaps=(snap(there),), profile=profile, array=POINT)
+    back = run(snaps=(snap(here),), profile=profile, array=POINT, sonar=Pose(np.array(there), SONAR.orientation))
     assert np.array_equal(forth.facet, back.facet)
     np.testing.assert_allclose(forth.delay, back.delay, rtol=1e-13)
     np.testing.assert_allclose(forth.amplitude, back.amplitude, rtol=1e-9)
@@ -286,7 +285,7 @@ def test_probes_spread_over_the_aperture_and_small_arrays_use_what_they_have() -
     assert len(set(probe.sensor)) == len(probe.sensor) == 15
     assert np.linalg.norm(probe.position, axis=1).max() == ROMANIS.aperture
     line = elements(PositionTable(positions=tuple((0.0, 0.1 * i, 0.0) for i in range(5))))
-    for array in (line, elements(PositionTable(positions=((0.0, 0.0, 0.0),)))):
+    for array in (line, POINT):
         found = run(profile=LAYERED, array=array)
         assert np.isfinite(found.wavefront_error)
         assert np.isfinite(found.expansion.delay).all()

@@ -14,7 +14,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.equations.scattering.kirchhoff_integral import shadow_taper
 from sonarsynth.products import Arrivals
-from sonarsynth.receiver import LowPass, PositionTable, Sonar, elements
+from sonarsynth.receiver import POINT, LowPass, Sonar
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
@@ -151,7 +151,7 @@ def test_a_coherent_body_whose_facets_cancel() -> None:
     """The echo of a sphere of 0.1 m is a hundredth of the sum of its facets': its error is small beside the echo."""
     of, f = sphere(0.1, 15.0, 45)
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:1], 250)
-    part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
+    part = FACES.select(some)
     hears = hearing(of, SONAR, part, absorption, margin=5e-4)
     exact, _ = DirectSum().pressure(of, SNAPS, hears)
     got, _ = GriddedSynthesis().pressure(of, SNAPS, hears._replace(elements=FACES))
@@ -171,10 +171,7 @@ def test_facets_of_half_a_wavelength_are_few_modes() -> None:
     f, spectrum = f[40:170], spectrum[40:170]
     of = facets(target_at(15.0, n, 6, direct=False), 7, corners=6e-6)
     of = replace(of, amplitude=rng.uniform(0.5, 1.0, n), absorption=np.zeros(n))
-    front, none = (
-        array_paths(of, SNAPS, elements(PositionTable(positions=((0.0, 0.0, 0.0),)))),
-        np.zeros((0, f.size), complex),
-    )
+    front, none = array_paths(of, SNAPS, POINT), np.zeros((0, f.size), complex)
     modes = shape_modes(front, f, spectrum, np.zeros(f.size), none, 0.0, 3e-6)
     exact = (
         facet_response(f, np.zeros(n, bool), front.corner_delays, of.coherent_fraction, of.height_delay_std, 1.0)

@@ -19,7 +19,7 @@ from sonarsynth.pipeline import trace_frame
 from sonarsynth.planning import plan
 from sonarsynth.products import Arrivals, View
 from sonarsynth.propagation import Straight
-from sonarsynth.receiver import BeamGrid, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import POINT, BeamGrid, Romanis, Sonar, elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import FacetLaw, Isotropic, Kirchhoff, MirrorLobe, Scatterer
 from sonarsynth.scattering.law_validity import OFF
@@ -32,7 +32,6 @@ from sonarsynth.validation.extremes.extreme_chains import recipe
 from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, refused, together
 from sonarsynth.validation.extremes.plain_scenes import POSE, PROFILE, WATER, C, body, snap, traced, transfer
 
-ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 BESIDE = np.array([0.0, 1e-6, 0.0])
 """A source so near the array that what it hears is backscatter."""
 SPHERES = ((1e-3, 25e3), (1e-2, 25e3), (0.1, 25e3), (1.0, 4e3), (10.0, 400.0))
@@ -52,7 +51,7 @@ def echo(law: FacetLaw, mesh: Mesh, radius: float, frequency: Floats) -> Floats:
     """Target strength (frequency,) in dB re 1 m2 of what a frame has of a sphere 200 radii off."""
     far = 200.0 * radius
     band = float(frequency[0]), float(frequency[-1])
-    arrivals = traced([snap(BESIDE)], ONE, [body(mesh, (far, 0.0, 0.0))], [law], band)
+    arrivals = traced([snap(BESIDE)], POINT, [body(mesh, (far, 0.0, 0.0))], [law], band)
     arrivals = arrivals.select(~arrivals.direct)
     if law.coherent:
         return np.asarray(20.0 * np.log10(np.abs(transfer(arrivals, frequency)) * far**2))

@@ -10,7 +10,7 @@ from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 from sonarsynth.equations.scattering.modal_series import sphere_amplitude
 from sonarsynth.equations.scattering.roughness import coherent_factor, incoherent_power, roughness_parameter
 from sonarsynth.geometry.surfaces import volume
-from sonarsynth.receiver import PositionTable, elements
+from sonarsynth.receiver import POINT
 from sonarsynth.scattering.kirchhoff import Kirchhoff
 from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.targets.generated.generation import sphere
@@ -21,7 +21,6 @@ from sonarsynth.targets.target_strength import target_strength
 from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, refused, together
 from sonarsynth.validation.extremes.plain_scenes import C, body, snap, synthesised, traced, transfer
 
-ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 TRIANGLE = np.array([[0.2, -0.1, 0.0], [-0.15, 0.25, 0.0], [-0.05, -0.15, 0.0]])
 
 
@@ -61,7 +60,9 @@ def _rough() -> CaseResult:
     mesh, band = mesh_of(Box(size=(0.1, 0.3, 0.3), edge=0.02)), (40e3, 80e3)
     f = np.array(band)
     smooth, rough = (
-        transfer(traced([snap((0.0, 0.1, 0.0))], ONE, [body(mesh, (5.0, 0.0, 0.0))], [Kirchhoff(roughness=h)], band), f)
+        transfer(
+            traced([snap((0.0, 0.1, 0.0))], POINT, [body(mesh, (5.0, 0.0, 0.0))], [Kirchhoff(roughness=h)], band), f
+        )
         for h in (0.0, 1e-15)
     )
     down, up = np.array([0.0, 0, -1.0]), np.array([0.0, 0, 1.0])
@@ -78,7 +79,7 @@ def _rough_frame() -> CaseResult:
     """So rough that nothing is coherent: the powers of the facets are the lobe of the slopes, times their area."""
     mesh, at = mesh_of(Box(size=(0.1, 0.2, 0.2), edge=0.02)), 30.0
     law = Kirchhoff(roughness=0.3, slope=0.2)
-    arrivals = traced([snap((0.0, 1e-6, 0.0))], ONE, [body(mesh, (at, 0.0, 0.0))], [law])
+    arrivals = traced([snap((0.0, 1e-6, 0.0))], POINT, [body(mesh, (at, 0.0, 0.0))], [law])
     arrivals = arrivals.select(~arrivals.direct)
     power = float((arrivals.amplitude[~arrivals.coherent] ** 2 * arrivals.coherent_fraction[~arrivals.coherent]).sum())
     exact = 0.2 * 0.2 / (8.0 * np.pi * 0.2**2) / (at - 0.05) ** 4
@@ -108,8 +109,10 @@ def _large() -> CaseResult:
     """Facets too long for their echo to be a pulse in a window are refused; and a body of one huge facet a side."""
     plate = mesh_of(Box(size=(1.0, 2e3, 2e3)))
     snaps = [snap((1.0, 900.0, 0.0))]
-    paths = traced(snaps, ONE, [body(plate, (3e3, 0.0, 0.0))], [Kirchhoff()])
-    return refused(lambda: synthesised(GriddedSynthesis(), paths, snaps, ONE, 3.9, 100), "corners that are not within")
+    paths = traced(snaps, POINT, [body(plate, (3e3, 0.0, 0.0))], [Kirchhoff()])
+    return refused(
+        lambda: synthesised(GriddedSynthesis(), paths, snaps, POINT, 3.9, 100), "corners that are not within"
+    )
 
 
 def _smoothing() -> CaseResult:

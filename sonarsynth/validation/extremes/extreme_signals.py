@@ -14,7 +14,7 @@ from sonarsynth.ranging import IsovelocityPlacing, Peaks, SensorDelays
 from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.location.locating import unlocatable
 from sonarsynth.ranging.received_window import ReceivedWindow
-from sonarsynth.receiver import Band, BeamGrid, LowPass, PlanarLattice, PositionTable, Sonar, elements
+from sonarsynth.receiver import POINT, Band, BeamGrid, LowPass, PlanarLattice, PositionTable, Sonar, elements
 from sonarsynth.scattering.boundaries import BoundarySite, WindySurface
 from sonarsynth.scattering.isotropic import Isotropic
 from sonarsynth.signals import DirectSum, GriddedSynthesis
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from sonarsynth.products import Signals
     from sonarsynth.signals import SignalSynthesis
 
-ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 TWO = elements(PositionTable(positions=((0.0, 0.2, 0.1),) * 2))
 FEW = elements(PlanarLattice(columns=4, rows=4, pitch=0.1, face=0.0))
 FINE = 1e-4
@@ -68,9 +67,9 @@ def _delays() -> CaseResult:
         position = (delay * C, 0.0, 0.0)
         snaps = (snap(position),)
         start, samples = delay - 4e-4, 200
-        arrivals = traced(snaps, ONE)
-        exact = direct(ONE, position, times(start, samples))
-        results += [_against(synthesised(m, arrivals, snaps, ONE, start, samples), exact) for m in methods()]
+        arrivals = traced(snaps, POINT)
+        exact = direct(POINT, position, times(start, samples))
+        results += [_against(synthesised(m, arrivals, snaps, POINT, start, samples), exact) for m in methods()]
     return together(results)
 
 
@@ -79,7 +78,7 @@ def _long() -> CaseResult:
     places = (1e-6 * C, 0.0, 0.0), (0.0, 100.0 * C, 0.0)
     snaps = tuple(snap(p, gain=float(np.linalg.norm(p))) for p in places)
     start, samples = -4e-4, round((100.0 + 8e-4) * RATE)
-    signals = synthesised(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
+    signals = synthesised(methods()[0], traced(snaps, POINT), snaps, POINT, start, samples)
     results = []
     for delay in (1e-6, 100.0):
         first = max(round((delay - 4e-4 - start) * RATE), 0)
@@ -126,7 +125,7 @@ def _narrow() -> CaseResult:
     snaps = (snap(position, model=Gabor(frequency=f, cycles=cycles)),)
     r, samples = float(np.linalg.norm(position)), 60_000
     start = r / C - 0.5 * samples / RATE
-    signals = synthesised(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
+    signals = synthesised(methods()[0], traced(snaps, POINT), snaps, POINT, start, samples)
     t = times(start, samples) - r / C
     exact = np.exp(-4.0 * np.log(2.0) * (t * f / cycles) ** 2) * np.cos(2.0 * np.pi * f * t) / r
     return _against(signals, exact)
@@ -169,7 +168,7 @@ def _silence() -> CaseResult:
 def _few_sensors() -> CaseResult:
     position, results = (9.0, 2.0, -3.0), []
     snaps, start = (snap(position),), 0.004
-    for array, reason in ((ONE, "1 live hydrophone"), (TWO, "2 live hydrophones")):
+    for array, reason in ((POINT, "1 live hydrophone"), (TWO, "2 live hydrophones")):
         signals = synthesised(methods()[0], traced(snaps, array), snaps, array, start, 1000)
         results.append(_against(signals, direct(array, position, times(start, 1000))))
         estimates = SensorDelays().locate(signals, Receiver(POSE, array, SONAR), Survey(100.0, PROFILE), 1)

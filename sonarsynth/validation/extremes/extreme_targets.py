@@ -17,7 +17,7 @@ from sonarsynth.equations.scattering.modal_series import sphere_amplitude
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.pipeline import render
 from sonarsynth.planning import plan
-from sonarsynth.receiver import PositionTable, elements
+from sonarsynth.receiver import POINT
 from sonarsynth.recipe import Recipe, reading
 from sonarsynth.recipe.populations.population import BodyModel, Population
 from sonarsynth.recipe.populations.regions import BoxRegion
@@ -33,7 +33,6 @@ from sonarsynth.validation.extremes.extreme_chains import recipe
 from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, refused, together
 from sonarsynth.validation.extremes.plain_scenes import C, body, snap, traced, transfer
 
-ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 BESIDE = np.array([0.0, 1e-6, 0.0])
 """A source so near the array that what it hears is backscatter."""
 
@@ -42,7 +41,7 @@ def echo(shape: Shape, far: float, band: tuple[float, float]) -> Floats:
     """The coherent echo (frequency,) at the ends of a band of a body whose middle is so far ahead (m)."""
     law = Kirchhoff()
     mesh = base_mesh(shape, law, C / band[1])
-    arrivals = traced([snap(BESIDE)], ONE, [body(mesh, (far, 0.0, 0.0))], [law], band)
+    arrivals = traced([snap(BESIDE)], POINT, [body(mesh, (far, 0.0, 0.0))], [law], band)
     return transfer(arrivals.select(~arrivals.direct), np.array(band))
 
 
@@ -143,10 +142,10 @@ def _many(facets: int, *, framed: bool) -> CaseResult:
         off(np.abs(amplitude / lit_sphere(radius, k) - 1.0), 20.0 / np.sqrt(count), what="Kirchhoff's integral"),
     ]
     if framed:
-        arrivals = traced([snap(BESIDE)], ONE, [body(mesh, (8.0, 0.0, 0.0))], [Kirchhoff()], band)
+        arrivals = traced([snap(BESIDE)], POINT, [body(mesh, (8.0, 0.0, 0.0))], [Kirchhoff()], band)
         echoed = transfer(arrivals.select(~arrivals.direct), np.array(band))
         results.append(off(np.abs(echoed / mirrored(radius, 8.0, band) - 1.0), 0.01, what="echo in a frame"))
-        lobe = traced([snap(BESIDE)], ONE, [body(mesh, (8.0, 0.0, 0.0))], [MirrorLobe(width=0.1)], band)
+        lobe = traced([snap(BESIDE)], POINT, [body(mesh, (8.0, 0.0, 0.0))], [MirrorLobe(width=0.1)], band)
         power = float((lobe.amplitude[~lobe.direct] ** 2).sum()) / (radius / (2.0 * 7.5 * 8.0)) ** 2
         results.append(off(10.0 * np.log10(power), 0.3, "dB", "power of lobes"))
     return together(*results, holds(peak < 6.0, f"at most {peak:.2g} GB"))
@@ -156,11 +155,11 @@ def _between() -> CaseResult:
     """A plate half way: blocked without a word too many; or scattered forward, by Fresnel's integrals."""
     plate, half, f = Box(size=(0.01, 0.6, 0.6), edge=0.02), 0.3, np.linspace(40e3, 80e3, 5)
     mesh, source = mesh_of(plate), (20.0, 0.0, 0.0)
-    blocked = traced([snap(source)], ONE, [body(mesh, (10.0, 0.0, 0.0))], [Kirchhoff()])
+    blocked = traced([snap(source)], POINT, [body(mesh, (10.0, 0.0, 0.0))], [Kirchhoff()])
     results = [holds(len(blocked.delay) == 0, "blocked: no path")]
     for aside in (0.0, 0.1, 0.25, 0.4, 0.8):
         law = Kirchhoff(forward="scattered", edges="sharp")
-        arrivals = traced([snap(source)], ONE, [body(mesh, (10.0, aside, 0.0))], [law])
+        arrivals = traced([snap(source)], POINT, [body(mesh, (10.0, aside, 0.0))], [law])
         pressure = transfer(arrivals, f) * 20.0 * np.exp(2j * np.pi * f * 20.0 / C)
         w = np.sqrt(2.0 * 20.0 * f / C / 100.0)
         spans = []
@@ -177,7 +176,7 @@ def _isotropic() -> CaseResult:
     results, ball = [], mesh_of(Sphere(radius=1e-3))
     for far in (1.0, 30.0, 1e3, 1e4):
         source = np.array([0.3 * far, 0.4 * far, 0.0])
-        arrivals = traced([snap(source)], ONE, [body(ball, (far, 0.0, 0.0))], [Isotropic(strength=0.01)])
+        arrivals = traced([snap(source)], POINT, [body(ball, (far, 0.0, 0.0))], [Isotropic(strength=0.01)])
         arrivals = arrivals.select(~arrivals.direct)
         out = float(np.linalg.norm(source - [far, 0.0, 0.0]))
         results.append(off(arrivals.delay * C - out - far, 2.1e-3, "m", f"{far:g} m: path"))
