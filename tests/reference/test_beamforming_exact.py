@@ -122,16 +122,6 @@ def test_beam_spectra_equal_direct_sums_for_any_array():
             np.testing.assert_allclose(beams, exact, atol=2e-6 * np.abs(exact).max())
 
 
-def test_beams_and_image_have_the_same_energy():
-    array, grid = elements(Romanis()), BeamGrid(azimuths=3, elevations=3)
-    spectra = random_spectra(508, 70)
-    frequencies = 30e3 + 500.0 * np.arange(70)
-    image = axial_energies(spectra, array, array.gain / 508, frequencies, grid, SPEED, None)
-    u = direction(grid.azimuth, grid.elevation[:, None]).reshape(-1, 3)
-    beams = beam_spectra(spectra, frequencies, array.position, array.gain, u, SPEED, None)
-    np.testing.assert_allclose(np.sum(np.abs(beams.astype(complex)) ** 2, axis=-1), image.ravel(), rtol=5e-6)
-
-
 @pytest.mark.parametrize("focus", [0.7, 20.0, 1e7])
 def test_focus_delay_to_the_last_digits(focus):
     """sqrt(R^2 - 2 R u.q + q^2) - R in 50 digits, from the near field to 10 000 km."""

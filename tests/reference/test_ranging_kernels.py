@@ -8,13 +8,11 @@ from scipy.fft import ifft, next_fast_len
 
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import element_directivity, focus_delay
-from sonarsynth.equations.arrays.beams import beam_spectra
 from sonarsynth.imaging.delay_and_sum.lattice_beams import LatticeBeams
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location.pulse_times import in_band
 from sonarsynth.ranging.range_profiles import HALFWAY, template_spectrum
-from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, Romanis, elements
-from tests.axial import axial_energies
+from sonarsynth.receiver import Band, PlanarLattice, Romanis, elements
 
 SPEED = 1540.0
 AXIS = np.array([1.0, 0.0, 0.0])
@@ -57,25 +55,6 @@ def test_beams_of_a_lattice_equal_direct_sums(array, focus):
         assert beams.shape == (9, bins)
         error = max(2e-6, 5e-8 * max(heard.columns, heard.rows))
         np.testing.assert_allclose(beams, exact, atol=error * np.abs(exact).max())
-
-
-def test_beams_of_a_lattice_are_those_of_its_image():
-    array, grid = elements(Romanis()), BeamGrid(azimuths=5, elevations=4)
-    spectra = random_spectra(508, 70)
-    frequencies = 30e3 + 500.0 * np.arange(70)
-    image = axial_energies(spectra, array, array.gain / 508, frequencies, grid, SPEED, 8.0)
-    u = direction(grid.azimuth, grid.elevation[:, None]).reshape(-1, 3)
-    beams = lattice_beams(spectra, frequencies, array, u, 8.0).astype(complex)
-    np.testing.assert_allclose(np.sum(np.abs(beams) ** 2, axis=-1), image.ravel(), rtol=5e-6)
-
-
-def test_plane_waves_need_no_focus():
-    array = elements(Romanis())
-    u = direction(np.linspace(-0.4, 0.4, 6), 0.2)
-    frequencies = 30e3 + 500.0 * np.arange(40)
-    spectra = random_spectra(508, 40)
-    any_array = beam_spectra(spectra, frequencies, array.position, array.gain, u, SPEED, None)
-    np.testing.assert_allclose(lattice_beams(spectra, frequencies, array, u, None), any_array, atol=3e-6)
 
 
 @pytest.mark.parametrize("sine", [0.0, 1e-300, 1e-12, 0.3, -0.9])
