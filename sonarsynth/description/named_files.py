@@ -27,6 +27,15 @@ class FileError(ValueError):
     """A file that cannot be read; str() is the reason, without the name of the file."""
 
 
+@contextmanager
+def errors_as(refusal: type[Exception], path: Path | str) -> Iterator[None]:
+    """FileErrors of what is done meanwhile are raised as `refusal`, with the name of the file."""
+    try:
+        yield
+    except FileError as error:
+        raise refusal(f"{path}: {error}") from None
+
+
 def stamp(path: Path | str) -> tuple[int, int]:
     """What changes when a file does: when it was written (ns), and its size. Raises FileError without a plain file."""
     try:

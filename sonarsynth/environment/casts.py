@@ -54,10 +54,8 @@ def profile_of(sound_speed: SoundSpeed) -> Profile:
     `CastError` in one line that names file, line and column, ImportError where a formula needs what is not installed.
     """
     if isinstance(sound_speed, Cast):
-        try:
+        with named_files.errors_as(CastError, sound_speed.path):
             return _profile_of(sound_speed, tuple(map(named_files.stamp, files_of(Path(sound_speed.path)))))
-        except named_files.FileError as error:
-            raise CastError(f"{sound_speed.path}: {error}") from None
     return _profile_of(sound_speed, None)
 
 

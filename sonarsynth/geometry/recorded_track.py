@@ -11,7 +11,7 @@ from typing import Annotated, Final, Literal
 import numpy as np
 from annotated_types import Ge, Le
 
-from sonarsynth.conventions import Floats, NonNegativeMetres, Position, Radians, Seconds
+from sonarsynth.conventions import Floats, Latitude, NonNegativeMetres, Position, Radians, Seconds
 from sonarsynth.description import description, named_files
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.track_files import TrackError, TrackTable, read_track
@@ -50,7 +50,6 @@ def _from_centre(phi: Floats, lam: Floats) -> Floats:
 AT_REST = 1e-3
 """m/s: slower than this a body has no course, and keeps the one that it had."""
 
-Latitude = Annotated[Radians, Ge(-0.5 * np.pi), Le(0.5 * np.pi)]
 Longitude = Annotated[Radians, Ge(-2 * np.pi), Le(2 * np.pi)]
 
 
@@ -138,10 +137,8 @@ def track_span(track: RecordedTrack) -> tuple[float, float]:
 
 
 def _of(track: RecordedTrack) -> _Curve:
-    try:
+    with named_files.errors_as(TrackError, track.path):
         return _curve(track, named_files.stamp(track.path))
-    except named_files.FileError as error:
-        raise TrackError(f"{track.path}: {error}") from None
 
 
 @lru_cache(maxsize=16)

@@ -51,10 +51,8 @@ def read_track(path: Path) -> TrackTable:
 
     Raises TrackError in one line that names the file.
     """
-    try:
+    with named_files.errors_as(TrackError, path):
         data = named_files.read(path, MAX_BYTES)
-    except named_files.FileError as error:
-        raise TrackError(f"{path}: {error}") from None
     start = data[:400].lstrip(b"\xef\xbb\xbf \t\r\n")
     table = _gpx(path, data) if start[:1] == b"<" or data[:2] in (b"\xff\xfe", b"\xfe\xff") else _csv(path, data)
     if len(table.lines) < 2:
@@ -170,10 +168,8 @@ def _instant(text: str) -> float | None:
 
 def _gpx(path: Path, data: bytes) -> TrackTable:
     """The points of the first track that has any, segment after segment (Topografix, GPX 1.1)."""
-    try:
+    with named_files.errors_as(TrackError, path):
         root = parsed_xml(data)
-    except named_files.FileError as error:
-        raise TrackError(f"{path}: {error}") from None
     if _name(root) != "gpx":
         raise TrackError(f"{path}: is no GPX file")
     track = next((t for t in root if _name(t) == "trk" and any(_name(p) == "trkpt" for p in t.iter())), None)

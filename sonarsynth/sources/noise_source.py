@@ -13,13 +13,10 @@ from pydantic import model_validator
 from sonarsynth.conventions import Floats, Number, PositiveHertz, PositiveMetres, Seconds
 from sonarsynth.description import BY_KIND, description, named_files, waveform_files
 from sonarsynth.environment.noise import Noise
-from sonarsynth.equations.noise.filters import kaiser_bessel
+from sonarsynth.equations.noise.filters import TAPS, windowed_sinc
 from sonarsynth.geometry.motion import Motion
 from sonarsynth.sources.pulse_model import Stamp
 from sonarsynth.sources.recordings import RecordingError
-
-TAPS, SHAPE = 64, 10.0
-"""Of the interpolation between samples of a recording, and of its Kaiser window."""
 
 
 @description
@@ -54,14 +51,14 @@ class NoiseRecording:
         pressures = np.zeros(samples)
         for tap in range(1 - reach, reach + 1):
             away = cut * (position - first - tap)
-            pressures += np.sinc(away) * kaiser_bessel(away, TAPS, SHAPE) * pressure[(first + tap) % pressure.size]
+            pressures += windowed_sinc(away) * pressure[(first + tap) % pressure.size]
         return cut * pressures
 
 
 @lru_cache(maxsize=4)
 def _read(recording: NoiseRecording, changed: Stamp) -> tuple[float, Floats]:
     """Sampling frequency (Hz), and the pressure (sample,) at 1 m."""
-    try:
+    with named_files.errors_as(RecordingError, recording.path):
         data = named_files.read(recording.path, waveform_files.MOST_BYTES)
         rate, values = waveform_files.waveform(
             data,
@@ -70,8 +67,6 @@ def _read(recording: NoiseRecording, changed: Stamp) -> tuple[float, Floats]:
             dataset=recording.dataset,
             long=True,
         )
-    except named_files.FileError as error:
-        raise RecordingError(f"{recording.path}: {error}") from None
     if values.size < 2:
         raise RecordingError(f"{recording.path}: holds one sample")
     return rate, values * (recording.pascals * recording.distance)

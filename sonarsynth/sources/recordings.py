@@ -85,10 +85,8 @@ def read_recording(snap: RecordedSnap) -> Recording:
 
 def stamp(snap: RecordedSnap) -> Stamp:
     """What changes when the file does: when it was written, and its size. Raises RecordingError without a file."""
-    try:
+    with named_files.errors_as(RecordingError, snap.path):
         return named_files.stamp(snap.path)
-    except named_files.FileError as error:
-        raise RecordingError(f"{snap.path}: {error}") from None
 
 
 @lru_cache(maxsize=32)
@@ -129,11 +127,9 @@ def _gate(size: int, fraction: float) -> Floats:
 def _instrument(path: Path, data: bytes, snap: RecordedSnap) -> tuple[float, float, Floats]:
     """Start (s), sampling frequency (Hz) and numbers (sample,) of a WAV or an HDF5."""
     rate, name = snap.sampling_frequency, snap.dataset
-    try:
+    with named_files.errors_as(RecordingError, path):
         sound = waveform_files.waveform(data, snap.channel, sampling_frequency=rate, dataset=name, limit=MOST_NUMBERS)
         return 0.0, *sound
-    except named_files.FileError as error:
-        raise RecordingError(f"{path}: {error}") from None
 
 
 def _text(path: Path, data: bytes, snap: RecordedSnap) -> tuple[float, float, Floats]:
@@ -182,10 +178,8 @@ def _rows(path: Path, data: bytes) -> tuple[Floats, list[int], list[str]]:
 
 
 def _bytes(path: Path) -> bytes:
-    try:
+    with named_files.errors_as(RecordingError, path):
         return named_files.read(path, MOST_BYTES)
-    except named_files.FileError as error:
-        raise RecordingError(f"{path}: {error}") from None
 
 
 def _cells(line: str) -> list[str]:

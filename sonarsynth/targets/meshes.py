@@ -57,10 +57,8 @@ def file_stamp(shape: Shape) -> tuple[int, int] | None:
     """When the file of a shape was changed (ns) and its size, for caches; None for other shapes. Raises MeshError."""
     if not isinstance(shape, MeshFile):
         return None
-    try:
+    with named_files.errors_as(MeshError, shape.path):
         return named_files.stamp(shape.path)
-    except named_files.FileError as error:
-        raise MeshError(f"{shape.path}: {error}") from None
 
 
 def refined_mesh(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) -> Mesh:

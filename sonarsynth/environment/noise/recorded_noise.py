@@ -82,10 +82,8 @@ class RecordedNoise(NoiseField):
         return tuple(lines)
 
     def _spectrum(self) -> tuple[Floats, Floats, float | None]:
-        try:
+        with named_files.errors_as(ValueError, self.path):
             return _spectrum_of(self, named_files.stamp(self.path))
-        except named_files.FileError as error:
-            raise ValueError(f"{self.path}: {error}") from None
 
 
 @lru_cache(maxsize=8)

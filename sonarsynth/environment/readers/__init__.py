@@ -47,10 +47,8 @@ def read_cast(
     ------
     CastError in one line that names the file, and says what is read where it is none of that.
     """
-    try:
+    with named_files.errors_as(CastError, path):
         data = _unpacked(named_files.read(path, MAX_BYTES))
-    except named_files.FileError as error:
-        raise CastError(f"{path}: {error}") from None
     if data[:3] == b"CDF" or data[:4] == b"\x89HDF":
         table = read_netcdf(path, data, profile, latitude, longitude)
     elif is_sea_bird(data):

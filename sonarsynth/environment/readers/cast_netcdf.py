@@ -31,11 +31,8 @@ def read_netcdf(
 
     Raises CastError.
     """
-    try:
-        with netcdf_files.netcdf(data, CastError) as dataset:
-            return _table(path, dataset, _columns(path, dataset), profile, (latitude, longitude))
-    except named_files.FileError as error:
-        raise CastError(f"{path}: {error}") from None
+    with named_files.errors_as(CastError, path), netcdf_files.netcdf(data, CastError) as dataset:
+        return _table(path, dataset, _columns(path, dataset), profile, (latitude, longitude))
 
 
 def _columns(path: Path, dataset: xr.Dataset) -> dict[str, list[tuple[str, Meaning]]]:

@@ -34,7 +34,7 @@ class SeaRecording:
 def recorded_sound(recording: SeaRecording, sonar: Sonar) -> Sound:
     """A channel of a recording behind the filter of a sonar, as far as it goes. Raises RecordingError."""
     path, pascals = recording.path, recording.pascals
-    try:
+    with named_files.errors_as(RecordingError, path):
         rate, values = waveform_files.waveform(
             named_files.read(path, waveform_files.MOST_BYTES),
             recording.channel,
@@ -43,8 +43,6 @@ def recorded_sound(recording: SeaRecording, sonar: Sonar) -> Sound:
             long=True,
             longest=MOST_SAMPLES + 1,
         )
-    except named_files.FileError as error:
-        raise RecordingError(f"{path}: {error}") from None
     notes = [] if pascals is not None else ["levels of the recording are relative: its sensitivity is not given"]
     if len(values) > MOST_SAMPLES:
         values = values[:MOST_SAMPLES]

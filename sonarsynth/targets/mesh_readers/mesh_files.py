@@ -49,10 +49,8 @@ def read_surface(path: Path) -> Surface:
     kind = path.suffix.lower().removeprefix(".")
     if kind not in READERS:
         raise MeshError(f"{path}: is not one of {', '.join(k.upper() for k in READERS)} (by its ending)")
-    try:
+    with named_files.errors_as(MeshError, path):
         data = _content(path, kind)
-    except named_files.FileError as error:
-        raise MeshError(f"{path}: {error}") from None
     if not data.strip():
         raise MeshError(f"{path}: is empty")
     try:

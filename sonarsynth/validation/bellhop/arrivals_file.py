@@ -53,10 +53,8 @@ class BellhopArrivals:
 
 def read_arrivals(path: Path) -> ArrivalsFile:
     """A file of arrivals. Raises ArrivalsError in one line where it cannot be read, or is cut off."""
-    try:
+    with named_files.errors_as(ArrivalsError, path):
         data = named_files.read(path, MAX_BYTES)
-    except named_files.FileError as error:
-        raise ArrivalsError(f"{path}: {error}") from None
     try:
         text = data.decode("ascii")
     except UnicodeDecodeError:
