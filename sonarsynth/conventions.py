@@ -16,7 +16,7 @@ Instrument       the sample grid, the beam grid and the assumed sound speed belo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
@@ -32,8 +32,12 @@ Floats = npt.NDArray[np.float64]
 
 Complexes = npt.NDArray[np.complex128]
 Ints = npt.NDArray[np.int64]
+Int32s = npt.NDArray[np.int32]
 Bools = npt.NDArray[np.bool_]
 Bytes = npt.NDArray[np.uint8]
+
+Progress = Callable[[int, int, int], None]
+"""Is told how many frames are done, of how many, and how many failed."""
 
 REFERENCE_PRESSURE: Final = 1e-6  # Pa: levels are dB re 1 uPa
 SLOWEST, FASTEST = 100.0, 10e3
@@ -185,6 +189,7 @@ PositiveSeconds = Annotated[Seconds, Gt(0)]
 PositiveHertz = Annotated[Hertz, Gt(0)]
 PositiveSpeed = Annotated[MetresPerSecond, Gt(0)]
 PositiveRadians = Annotated[Radians, Gt(0)]
+Latitude = Annotated[Radians, Ge(-0.5 * np.pi), Le(0.5 * np.pi)]
 WaterSoundSpeed = Annotated[PositiveSpeed, Ge(SLOWEST), Le(FASTEST)]
 
 Position = tuple[Metres, Metres, Metres]

@@ -10,16 +10,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from sonarsynth.casting.facet_tree import LEVELS
 from sonarsynth.casting.ray_casting import casting_mesh
 from sonarsynth.casting.shadows import nearest_first
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Floats, Int32s, Ints
 from sonarsynth.geometry.placed_target import PlacedTarget
 
-Int32s = npt.NDArray[np.int32]
 EMPTY, CLOSED, UNKNOWN = range(3)
 """No facet is in a cone; one piece of surface closes it from side to side; neither is certain."""
 TRIED = 3

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from sonarsynth.casting.intersections import EDGE, distance_to_facet, to_sphere
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Int32s, Ints
 
-Int32s = npt.NDArray[np.int32]
 LEAF = 4
 """Facets in a leaf, at least: fewer than twice as many."""
 LEVELS = 64

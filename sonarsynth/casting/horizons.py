@@ -8,13 +8,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from sonarsynth.casting.facet_tree import LEVELS
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Int32s, Ints
 
-Int32s = npt.NDArray[np.int32]
 LOWEST = 0.1
 """Sine of the lowest elevation that is told from others."""
 MARGIN = 1e-3

@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Int32s, Ints
 
-Int32s = npt.NDArray[np.int32]
 EDGE = 1e-14  # of the square of the body's size: rays this close to an edge hit either facet, never neither
 SPHERE = 1.0 + 1e-5  # square of the radius of a sphere a little over the unit sphere
 

@@ -13,15 +13,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from sonarsynth.columns import alike
-from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
+from sonarsynth.conventions import NO_TARGET, Bools, Floats, Int32s, Ints
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 
-Int32s = npt.NDArray[np.int32]
 OFFSET = 1e-6
 """Of the body's size: how far off a facet, along its normal, a ray starts so as not to meet it."""
 ROUNDS = 8

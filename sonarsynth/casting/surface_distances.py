@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from sonarsynth.casting.ray_casting import casting_mesh, first_hit
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Bools, Floats
+from sonarsynth.conventions import Bools, Floats, Int32s
 from sonarsynth.geometry.placed_target import PlacedTarget
 
-Int32s = npt.NDArray[np.int32]
 TOUCHING = 1e-6
 """m from the surface of a body: what is no farther touches it."""
 UP = np.array([1e-3, 2e-3, 1.0])

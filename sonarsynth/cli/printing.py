@@ -15,9 +15,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from sonarsynth.conventions import counted, format_bytes
 
 if TYPE_CHECKING:
+    from sonarsynth.conventions import Progress as Report
     from sonarsynth.planning import Plan
     from sonarsynth.schedule import BuildReport, Prediction
-    from sonarsynth.schedule import Progress as Report
     from sonarsynth.store import Report as StoreReport
 
 SECONDS_BETWEEN_LINES: Final = 10.0

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import TypeAdapter
 
+from sonarsynth.conventions import Progress
 from sonarsynth.description import BY_KIND, FieldError
 from sonarsynth.detection.cell_averaging import CellAveraging
 from sonarsynth.detection.detection_method import DetectionMethod, Region, detections_of
@@ -44,7 +44,7 @@ def detect(
     method: DetectionMethod | str = "peaks",
     *,
     split: str | None = None,
-    progress: Callable[[int, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Detections:
     """Detections in the images of a store, without a look at its truth.
 

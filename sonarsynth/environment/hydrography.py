@@ -35,7 +35,6 @@ def _in_celsius(value: Any) -> Any:
 
 WaterTemperature = Annotated[DegreesCelsius, Ge(COLDEST), Le(HOTTEST), BeforeValidator(_in_celsius)]
 WaterSalinity = Annotated[PracticalSalinity, Ge(0), Le(100)]
-Latitude = Annotated[Radians, Ge(-0.5 * np.pi), Le(0.5 * np.pi)]
 Longitude = Annotated[Radians, Ge(-np.pi), Le(2.0 * np.pi)]
 
 SpeedFormula = Literal["mackenzie", "medwin", "chen_millero", "del_grosso", "teos10"]

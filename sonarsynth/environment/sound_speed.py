@@ -13,6 +13,7 @@ from pydantic import ValidationInfo, field_validator, model_validator
 
 from sonarsynth.conventions import (
     Floats,
+    Latitude,
     MetresPerSecond,
     NonNegativeMetres,
     Number,
@@ -21,7 +22,7 @@ from sonarsynth.conventions import (
     WaterSoundSpeed,
 )
 from sonarsynth.description import BY_KIND, description
-from sonarsynth.environment.hydrography import Latitude, Longitude, SpeedFormula, WaterSalinity, WaterTemperature
+from sonarsynth.environment.hydrography import Longitude, SpeedFormula, WaterSalinity, WaterTemperature
 from sonarsynth.environment.profiles import carried_on, catenary_nodes, munk_nodes
 from sonarsynth.environment.speed_model import SpeedModel
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sonarsynth.conventions import Progress
 from sonarsynth.description import FieldError
 from sonarsynth.evaluation.detectors import true_objects
 from sonarsynth.evaluation.detectors.true_objects import TrueObjects, category_names
@@ -32,7 +33,7 @@ def write_coco(
     tree: xr.DataTree,
     folder: Path,
     frames: np.ndarray,
-    progress: Callable[[int, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Path, ...]:
     """Write images and annotations of some frames of a store: `images/<frame>.png` and, of each split, `<split>.json`
     (train.json of a recipe without splits).

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, Progress
 from sonarsynth.description import FieldError
 from sonarsynth.detection import beam_width
 from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll
@@ -63,7 +63,7 @@ def write_sonar_netcdf(
     tree: xr.DataTree,
     folder: Path,
     frames: np.ndarray,
-    progress: Callable[[int, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Path, ...]:
     """Write some frames of a store, `sequence_<number>.nc` for each sequence of frames.
 

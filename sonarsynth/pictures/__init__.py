@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, Progress
 from sonarsynth.pictures.figures.frame_figure import FramePicture, View, window
 from sonarsynth.pictures.figures.sheet import Errors, sheet
 from sonarsynth.pictures.figures.style import decibels
-from sonarsynth.pictures.film import Progress, thinned, write_film
+from sonarsynth.pictures.film import thinned, write_film
 from sonarsynth.pictures.steered_beams import beams
 from sonarsynth.pictures.store_reading import (
     NothingToDraw,

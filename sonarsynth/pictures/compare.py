@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonarsynth.conventions import Progress
 from sonarsynth.pictures.figures.compared_images import BesidePicture, Column, Moment, Panel
 from sonarsynth.pictures.figures.style import decibels
-from sonarsynth.pictures.film import Progress, thinned, write_film
+from sonarsynth.pictures.film import thinned, write_film
 from sonarsynth.pictures.recipe_diff import names_of
 from sonarsynth.pictures.scores import LEVEL, EchoEnergies, as_table, echo_energies, scores_of
 from sonarsynth.pictures.store_reading import (

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
+from sonarsynth.conventions import Progress
 from sonarsynth.pictures.figures.style import BACKDROP, ENERGY_MAP, OUTLINES
 
 if TYPE_CHECKING:
@@ -44,10 +45,6 @@ class Picture(Protocol[View_contra]):
 def thinned(frames: Sequence[Item]) -> list[Item]:
     """The frames of a film: all, or of more than `LONGEST` every second, third ... of them."""
     return list(frames[:: -(-len(frames) // LONGEST) or 1])
-
-
-Progress: TypeAlias = Callable[[int, int, int], None]
-"""Is told how many frames are drawn, of how many, and how many failed (none does)."""
 
 
 def write_film(

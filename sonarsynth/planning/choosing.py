@@ -17,7 +17,7 @@ from sonarsynth.conventions import Floats, Ints, evenly
 from sonarsynth.description.method import Demand
 from sonarsynth.planning import kept_choices
 from sonarsynth.planning.choices import OF_BEAMS, OWN_VIEW, Choices
-from sonarsynth.planning.measured.image_errors import beamformer
+from sonarsynth.planning.measured.image_errors import SAFETY, beamformer
 from sonarsynth.planning.measured.ray_bending import ranging_error
 from sonarsynth.planning.measured.sampled_arrivals import pressures, sampled_arrivals
 from sonarsynth.planning.measured.sampled_frames import SampledScene
@@ -38,8 +38,6 @@ SEEN_AT = 64
 """Hydrophones, at most, whose views of the targets are compared with that of the middle of the array."""
 MEASURED = 3
 """Frames of a dataset that expansions are measured in."""
-SAFETY = 1.25
-"""What was measured at some hydrophones of some frames may be so much more at others."""
 PER_SENSOR_TOLERANCE = 1e-3
 """Share of the paths left out that are left out where errors are measured: 3 % of what that errs by."""
 LARGE_MESH_FACETS = 1_000_000

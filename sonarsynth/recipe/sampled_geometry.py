@@ -5,14 +5,13 @@ Straight lines from the array centre to the targets, at the instant of the frame
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, azimuth_elevation, counted, evenly
+from sonarsynth.conventions import Bools, Floats, Ints, Progress, azimuth_elevation, counted, evenly
 from sonarsynth.description import FieldError
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -37,9 +36,6 @@ QUANTITIES = {
     "visible": ("1", "share of the area facing the array that is in the field of view and not behind another's box"),
 }
 """Unit and meaning of what is known of each target in each frame."""
-
-Progress = Callable[[int, int, int], None]
-"""Called with frames done, frames in all, and 0."""
 
 
 def group_of(target: Target) -> str:

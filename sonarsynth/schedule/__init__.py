@@ -7,12 +7,12 @@ from dataclasses import asdict, fields, replace
 from typing import Final
 
 from sonarsynth import planning, store
-from sonarsynth.conventions import format_bytes
+from sonarsynth.conventions import Progress, format_bytes
 from sonarsynth.description.memory import free_bytes
 from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.reading import Source
-from sonarsynth.schedule.build_report import BuildProgress, BuildReport, Progress
+from sonarsynth.schedule.build_report import BuildProgress, BuildReport
 from sonarsynth.schedule.disk_space import DiskRoom, TooLarge, check_space, told_when_full
 from sonarsynth.schedule.making import brief, job_of, make_shards, reachable_by_workers, usable_cores, with_shards_of
 from sonarsynth.schedule.predicting import Prediction, predict
@@ -21,7 +21,7 @@ from sonarsynth.store import Damage, Folder, Mismatch, cards, provenance
 from sonarsynth.store.creating import plain_recipe, spelled
 from sonarsynth.store.files.json_lines import append_lines, read_lines, write_lines
 
-__all__ = ["BuildReport", "Prediction", "Progress", "TooLarge", "brief", "build", "predict", "usable_cores"]
+__all__ = ["BuildReport", "Prediction", "TooLarge", "brief", "build", "predict", "usable_cores"]
 
 LEAST_MEMORY: Final = 300_000_000
 """Bytes that a worker needs before it has done anything."""

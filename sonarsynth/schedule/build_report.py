@@ -13,15 +13,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from sonarsynth import store
+from sonarsynth.conventions import Progress
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import tasks
 from sonarsynth.schedule.tasks import Failure, WrittenShard
 from sonarsynth.store import Folder
 from sonarsynth.store.files.json_lines import append_lines
-
-Progress = Callable[[int, int, int], None]
-"""Called with the frames done, the frames to do, and the frames that failed, as shards are written."""
-
 
 PROGRESS_EVERY: Final = 10.0
 """Seconds between two events `progress` of the log."""

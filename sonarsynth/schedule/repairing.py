@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from sonarsynth import planning, store
+from sonarsynth.conventions import Progress
 from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, choices_from
-from sonarsynth.schedule.build_report import Progress
 from sonarsynth.schedule.making import job_of, make_shards, reachable_by_workers, with_shards_of
 from sonarsynth.schedule.tasks import Failure, WrittenShard
 from sonarsynth.store import Findings, Folder, Mismatch, Problem, Remote, cards, provenance

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from sonarsynth.conventions import Bools
-from sonarsynth.equations.noise.filters import kaiser_bessel
+from sonarsynth.equations.noise.filters import TAPS, windowed_sinc
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.sensor_errors import DrawnErrors, Overload, SensorErrors, SensorState
@@ -23,8 +23,6 @@ BLEND = 256
 """Samples over which the end of a window goes over into its start, so that a filter finds no step there."""
 TOGETHER = 32
 """Sensors at once."""
-TAPS, SHAPE = 64, 10.0
-"""Of the interpolation from the samples of an even clock to those of a real one, and of its Kaiser window."""
 
 
 def respond(signals: Signals, drawn: DrawnErrors, sound_speed: float) -> Signals:
@@ -115,7 +113,7 @@ def sampled(signals: Signals, jitter: float, clock_rate: float, random: np.rando
     position = np.arange(samples) * (1.0 + clock_rate) + fs * jitter * random.standard_normal(samples)
     tap = np.floor(position).astype(int)[:, None] + np.arange(1 - TAPS // 2, TAPS // 2 + 1)
     away = position[:, None] - tap
-    weight = np.sinc(away) * kaiser_bessel(away, TAPS, SHAPE)
+    weight = windowed_sinc(away)
     inside = (tap >= 0) & (tap < samples)
     at = np.broadcast_to(np.arange(samples)[:, None], tap.shape)
     matrix = csr_array((weight[inside].astype(np.float32), (at[inside], tap[inside])), shape=(samples, samples))

@@ -26,6 +26,8 @@ SUPPORT_TOLERANCE = 1e-7
 
 FINER = 64
 """Steps of a table of an impulse response a step of a filtered snap; it is linear between, to 1e-5 of it."""
+TAPS = 64
+"""Samples that `windowed_sinc` weighs."""
 
 
 class Fir(NamedTuple):
@@ -116,6 +118,11 @@ def kaiser_bessel(x: npt.ArrayLike, width: float, beta: float) -> Floats:
     inside = 1.0 - (2.0 * np.asarray(x, float) / width) ** 2
     root = beta * np.sqrt(np.maximum(inside, 0.0))
     return np.where(inside >= 0.0, i0e(root) * np.exp(root - beta) / i0e(beta), 0.0)
+
+
+def windowed_sinc(x: Floats) -> Floats:
+    """Weights of samples at distances x (samples) from a time, of the `TAPS` round it, that interpolate there."""
+    return np.asarray(np.sinc(x) * kaiser_bessel(x, TAPS, 10.0))
 
 
 def kaiser_bessel_transform(cycles: npt.ArrayLike, width: float, beta: float) -> Floats:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from sonarsynth.casting.intersections import EDGE, distance_to_facet
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import NO_TARGET, Floats, Ints, direction
+from sonarsynth.conventions import NO_TARGET, Floats, Int32s, Ints, direction
 from sonarsynth.labels.views.view_kernels import shows_outer_side
 from sonarsynth.receiver import BeamGrid
 
@@ -31,7 +31,6 @@ MARGIN = 1e-9
 
 Words = npt.NDArray[np.uint64]
 """Bits of the directions of a cell, 64 a word."""
-Int32s = npt.NDArray[np.int32]
 
 
 class Cells(NamedTuple):

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, Progress
 from sonarsynth.environment.casts import profile_of
 from sonarsynth.equations.rays.ray_solutions import water
 from sonarsynth.pictures.preview_figures.distribution_figure import distribution_figure
@@ -50,7 +49,7 @@ def preview(recipe: Recipe, out: Path | str = "preview", sequences: int = SEQUEN
 
 
 def draw_preview(
-    recipe: Recipe, out: Path, sequences: int = SEQUENCES, progress: Callable[[int, int, int], None] = lambda *_: None
+    recipe: Recipe, out: Path, sequences: int = SEQUENCES, progress: Progress = lambda *_: None
 ) -> tuple[list[Path], dict[str, Any]]:
     """Write `scene-<sequence>.png`, `distributions.png` and `preview.json`; their paths, and the numbers of the last.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Floats, Ints, Progress
 from sonarsynth.detection import Detections, ImagePeaks, by_kind, detections_of, from_rows, views
 from sonarsynth.evaluation import cloud_scores, points
 from sonarsynth.evaluation.detectors import DetectorReport, TrueObjects, true_objects
@@ -21,7 +21,6 @@ from sonarsynth.store import built_frames, splits_of
 if TYPE_CHECKING:
     import xarray as xr
 
-Progress = Callable[[int, int, int], None]
 BASELINES: Final = ("peaks", "cfar")
 MOST_JUDGED: Final = 2000
 """Frames that clouds and baselines are judged in; of more, even steps."""

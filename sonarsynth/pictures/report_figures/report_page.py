@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from sonarsynth.conventions import finite_json
+from sonarsynth.conventions import Progress, finite_json
 from sonarsynth.evaluation import warnings as warnings_of
 from sonarsynth.evaluation.detectors.detector_scores import words_of
 from sonarsynth.pictures.figures.style import PAGE_CONFIG
@@ -39,7 +38,7 @@ def report(
     store: str | Folder,
     out: str | Path | None = None,
     *,
-    progress: Callable[[int, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Path, dict[str, Any]]:
     """Write a page about a store: film, what is in it by split, whether splits are apart, errors against predicted
     errors, baseline detectors, the hardest frames.

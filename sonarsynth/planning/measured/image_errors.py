@@ -23,7 +23,7 @@ WITHIN = 20.0
 COMPARED = 250
 """Beams that are, at most: the error of six shipped recipes came out as of a thousand, to 4 %."""
 SAFETY = 1.25
-"""What was measured in some frames may be so much more in others."""
+"""What was measured in some frames, or at some hydrophones, may be so much more in others."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -138,7 +138,7 @@ def dump(recipe: Recipe) -> str:
     yaml.sort_base_mapping_type_on_output = False
     yaml.width = 4096
     yaml.allow_unicode = True
-    yaml.dump(_ADAPTER.dump_python(recipe, mode="json"), text)
+    yaml.dump(recipe.as_json(), text)
     return text.getvalue()
 
 

@@ -18,6 +18,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.signals.filtered_pulse import fir
+from sonarsynth.signals.noise.point_sources import MARGIN, QUIETEST
 from sonarsynth.signals.segments import fast_length
 from sonarsynth.sources.noise_source import NoiseRecording
 
@@ -28,10 +29,6 @@ CROSSFADE: Final = 1e-4
 different times, off the middle of the array, a quarter of the power is missing meanwhile: 0.05 dB in all."""
 ENDS: Final = 4.0
 """Durations of the filter over which what is played fades in before the window, and out after it."""
-MARGIN: Final = 8
-"""Samples of the period beyond window, filter and delays."""
-QUIETEST: Final = 1e-7
-"""Bins that the filter passes less of are left empty."""
 
 
 def add_played_noise(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
+from sonarsynth.conventions import Progress
 from sonarsynth.store.files.place import FileRecord, Folder, entries, is_folder, read_json, records, there
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.scratch import PARTIAL
@@ -26,8 +27,6 @@ from sonarsynth.store.marks import (
 )
 from sonarsynth.store.opening import check_format, must_be_folder, root_attributes
 
-Progress = Callable[[int, int, int], None]
-"""What is told of frames: how many are done, of how many, and how many failed."""
 MOST_FRAMES: Final = 1_000_000
 """Frames of a shard that are counted, whatever a store says of itself."""
 

@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from sonarsynth.conventions import Progress
 from sonarsynth.store.checking.check_rows import Check
-from sonarsynth.store.checking.examining import Findings, Problem, Progress, by_shard, examine, frame_count, ranges
+from sonarsynth.store.checking.examining import Findings, Problem, by_shard, examine, frame_count, ranges
 from sonarsynth.store.checking.reading_back import read_back, structure
 from sonarsynth.store.files.lock import held_by
 from sonarsynth.store.files.place import Folder, absolute, opens, stamps
