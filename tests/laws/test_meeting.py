@@ -19,12 +19,12 @@ from sonarsynth.planning import Choices, plan
 from sonarsynth.planning.measured.sampled_arrivals import context_of
 from sonarsynth.planning.notes.scene_checks import check_frame
 from sonarsynth.propagation import AutoTracing, Refracted, Straight
-from sonarsynth.receiver import BeamGrid, PlanarLattice, Sonar
+from sonarsynth.receiver import POINT, BeamGrid, PlanarLattice, Sonar
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Physics
 from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
-from tests.laws.test_traced_families import BOTTOM_DEPTH, ONE, RIGID, SONAR, THERMOCLINE, UNIFORM, C, ball
+from tests.laws.test_traced_families import BOTTOM_DEPTH, RIGID, SONAR, THERMOCLINE, UNIFORM, C, ball
 from tests.laws.test_traced_families import snap as snap_at
 from tests.scenes import remus
 
@@ -50,7 +50,7 @@ def truth(motion, straight: bool = True, doppler: bool = True):
     rays, water = (Straight(), UNIFORM) if straight else (Refracted(), THERMOCLINE)
     beams = BeamGrid(azimuth_span=0.2, azimuths=3, elevation_span=0.2, elevations=3)
     track = Track(SONAR, np.zeros(3)) if doppler else None
-    receiver, snaps = Receiver(SONAR, ONE, Sonar(beams=beams), track), tuple(snap_at(time) for time in TIMES)
+    receiver, snaps = Receiver(SONAR, POINT, Sonar(beams=beams), track), tuple(snap_at(time) for time in TIMES)
     context = FrameContext(NOW, (body,), snaps, Medium(RIGID, water), receiver)
     return label(context, rays, np.zeros(len(TIMES)))
 

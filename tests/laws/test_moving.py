@@ -12,13 +12,13 @@ from sonarsynth.geometry.motion import Circle, Motion, Track, Waypoint, Waypoint
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
+from sonarsynth.receiver import POINT
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
 from tests.laws.test_traced_families import (
     ARRAY,
     BOTTOM_DEPTH,
-    ONE,
     RIGID,
     ROMANIS,
     SONAR,
@@ -34,7 +34,9 @@ from tests.laws.test_traced_families import (
 STILL = np.zeros(3)
 
 
-def run(v=STILL, u=STILL, *times: float, bodies=None, bounces=0, array=ONE, law=None, sonar=SONAR, **more) -> Arrivals:
+def run(
+    v=STILL, u=STILL, *times: float, bodies=None, bounces=0, array=POINT, law=None, sonar=SONAR, **more
+) -> Arrivals:
     """Arrivals at an array that moves at u m/s of snaps at some times, from bodies that move at v."""
     bodies = (ball(),) if bodies is None else bodies
     bodies = tuple(b if b.motion else replace(b, velocity=np.array(v)) for b in bodies)
@@ -161,7 +163,7 @@ def test_a_body_hides_another_where_it_is_when_the_sound_passes() -> None:
 
     def lit(time: float) -> int:
         moved = tuple(replace(b, velocity=w) for b, w in zip(bodies, (STILL, v), strict=True))
-        receiver, laws = Receiver(SONAR, ONE, track=Track(SONAR, STILL)), (Isotropic(strength=1.0),) * 2
+        receiver, laws = Receiver(SONAR, POINT, track=Track(SONAR, STILL)), (Isotropic(strength=1.0),) * 2
         context = FrameContext(0.0, moved, (snap(time),), Medium(RIGID, UNIFORM), receiver, laws)
         found = trace(context, AutoTracing(bounces=0))
         return int((found.target == 0).sum())
@@ -197,7 +199,7 @@ def test_families_that_are_traced_apart_are_all_of_those_together_and_each_once(
         own = replace(TURNING, speed=1e-3)
         track = Track(pose(own, 0.0), velocity(own, 0.0), own)
     water, laws = Medium(RIGID, THERMOCLINE), (Isotropic(strength=1.0),) * 2
-    context = FrameContext(0.0, bodies, (lit,), water, Receiver(track.pose, ONE, track=track), laws)
+    context = FrameContext(0.0, bodies, (lit,), water, Receiver(track.pose, POINT, track=track), laws)
     together, *apart = (
         trace(replace(context, tolerances=replace(context.tolerances, shared=shared)), AutoTracing(bounces=3))
         for shared in (1e3, 1e-9, 0.0)
