@@ -96,7 +96,7 @@ def show(
             replace(_view(tree, stored, common or _reference([stored])), earlier=before) for stored, before in histories
         ]
         of = "all frames" if common else "each frame"
-        picture = FramePicture(*beam_grid(tree), views, f"beams and points: energy re the brightest beam of {of} (dB)")
+        picture = FramePicture(*beam_grid(tree), views, f"beams: energy re the brightest beam of {of} (dB)")
         files.append(write_film(picture, views, folder, frames_per_second, progress))
     return files
 

@@ -7,10 +7,11 @@ import pytest
 
 from sonarsynth.equations.bubble.pulses import filtered
 from sonarsynth.equations.noise.filters import Fir
-from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View
+from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View, darkest
 from sonarsynth.pictures.figures.outlines import CELLS, union_outline, view_outline
 from sonarsynth.pictures.figures.snap_comparison import compare_snaps
 from sonarsynth.pictures.figures.snap_figure import bandwidth, half_width, snap_figure
+from sonarsynth.pictures.figures.style import DYNAMIC_RANGE
 from sonarsynth.pictures.ray_figures.ray_figure import section_figure, space_figure
 from sonarsynth.pictures.ray_figures.ray_styles import Look
 from sonarsynth.pictures.ray_figures.scene_geometry import SceneGeometry
@@ -210,3 +211,13 @@ def test_rays_in_space_keep_one_scale_on_all_axes_or_say_what_heights_have(deep:
     spans = np.array([np.ptp(limits) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())])
     spans[2] = min(spans[2], spans[:2].max())
     assert spans / np.linalg.norm(spans) == pytest.approx(axes._box_aspect / np.linalg.norm(axes._box_aspect), rel=1e-6)
+
+
+def test_the_scale_of_an_image_begins_under_its_noise_and_no_deeper() -> None:
+    """Noise 12 dB under the brightest beam is dark, not the middle of 50 dB; silence is no level."""
+    noise = -12.0 + 0.3 * np.sin(np.arange(2000.0)).reshape(40, 50)
+    assert darkest([noise]) == darkest([None, noise]) == -15.0
+    assert darkest([noise, np.minimum(noise, -23.0)]) == -25.0
+    noise[0, :10] = -np.inf
+    assert darkest([noise]) == -15.0
+    assert darkest([noise - 80.0]) == darkest([None]) == darkest([]) == -DYNAMIC_RANGE

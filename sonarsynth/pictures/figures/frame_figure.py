@@ -95,6 +95,14 @@ def window(views: list[View], margin: float = 0.35) -> Window:
     return Window(half=half + margin)
 
 
+def darkest(levels: list[Floats | None]) -> float:
+    """Where the scale of some levels (dB) begins: a multiple of 5 under nearly all of each, so that noise is dark, but
+    no less than `DYNAMIC_RANGE` below the reference."""
+    heard = [level[np.isfinite(level)] for level in levels if level is not None]
+    faint = min((float(np.percentile(level, 1)) for level in heard if level.size), default=-DYNAMIC_RANGE)
+    return float(max(5.0 * np.floor(min(faint, -5.0) / 5.0), -DYNAMIC_RANGE))
+
+
 class FramePicture:
     """A figure laid out once, in which `show` draws one frame after another."""
 
@@ -105,14 +113,15 @@ class FramePicture:
         self._title: Text = self.figure.suptitle(" ", x=0.01, y=0.99, ha="left", fontsize=11, color=INK)
         self._moment: Text = self.figure.text(0.0, 0.0, "", fontsize=11, color=INK, va="top")
         sky = placed(self.figure, 0.77, 0.45, 4.6, 4.6)
-        self._image: AxesImage = image_axes(sky, azimuth, elevation)
+        self._image: AxesImage = image_axes(sky, azimuth, elevation, darkest([view.level for view in views]))
         self._outlines: PolyCollection = outline_artist(sky)
         self._ghosts = GhostMarks(sky)
         legend(sky, *(any(getattr(view, of) for view in views) for of in ("hulls", "ghosts", "lobes")))
         colour_bar(sky, self._image, unit)
+        least = darkest([np.concatenate([view.point_level for view in views]) - 10.0])  # no point is black
         self._clouds = [
-            CloudPanel(placed(self.figure, 7.17, 3.1, 3.13, 1.95), PLAN, "from above"),
-            CloudPanel(placed(self.figure, 7.17, 0.45, 3.13, 1.95), SIDE, "from starboard"),
+            CloudPanel(placed(self.figure, 7.17, 3.1, 3.13, 1.95), PLAN, "from above", least),
+            CloudPanel(placed(self.figure, 7.17, 0.45, 3.13, 1.95), SIDE, "from starboard", least),
         ]
         self._blitting: Blitting | None = None
 
@@ -148,21 +157,21 @@ class FramePicture:
 class CloudPanel:
     """A cloud and the targets' true hulls, projected along one axis of the sonar frame."""
 
-    def __init__(self, axes: Axes, plane: tuple[int, int], name: str) -> None:
-        """Set up the axes; `plane` is `PLAN` or `SIDE`."""
+    def __init__(self, axes: Axes, plane: tuple[int, int], name: str, least: float) -> None:
+        """Set up the axes; `plane` is `PLAN` or `SIDE`, least (dB) the beginning of the scale of levels."""
         from matplotlib.collections import PolyCollection
 
         names = ("beyond the target (m)", "port of the target (m)", "above the target (m)")
         self.axes, self.plane = axes, plane
         axes.set_facecolor(BACKDROP)
         axes.set_aspect("equal", adjustable="box")
-        label(axes, names[plane[0]], names[plane[1]], f"point cloud {name}")
+        label(axes, names[plane[0]], names[plane[1]], f"points {name}, energy of {least:.0f} to 0 dB")
         self._hulls: PolyCollection = PolyCollection([], linewidths=1.0)
         axes.add_collection(self._hulls, autolim=False)
         self._bodies: list[Floats] = []  # hulls (vertex, 2) as they are drawn
         self._earlier: PathCollection = axes.scatter([], [], s=4, linewidths=0, color=EARLIER)
         self._points: PathCollection = axes.scatter(
-            [], [], c=[], s=9, linewidths=0, cmap=ENERGY_MAP, vmin=-DYNAMIC_RANGE, vmax=0
+            [], [], c=[], s=9, linewidths=0, cmap=ENERGY_MAP, vmin=least, vmax=0
         )
         self._note: Text = axes.text(0.02, 0.04, "", transform=axes.transAxes, fontsize=8, color="#e8e8e8")
 
@@ -199,8 +208,9 @@ def clipped(level: Floats) -> Floats:
     return np.where(np.isneginf(level), -10.0 * DYNAMIC_RANGE, level)
 
 
-def image_axes(axes: Axes, azimuth: Floats, elevation: Floats) -> AxesImage:
-    """Axes of an energy image over a beam grid (deg, ascending), port on the left; returns the empty image."""
+def image_axes(axes: Axes, azimuth: Floats, elevation: Floats, least: float = -DYNAMIC_RANGE) -> AxesImage:
+    """Axes of an energy image over a beam grid (deg, ascending), port on the left, of levels from least (dB) to 0;
+    returns the empty image."""
     from matplotlib import colormaps
 
     colours = colormaps[ENERGY_MAP].with_extremes(bad=ABSENT)
@@ -211,7 +221,7 @@ def image_axes(axes: Axes, azimuth: Floats, elevation: Floats) -> AxesImage:
         extent=(right, left, low, high),
         origin="lower",
         cmap=colours,
-        vmin=-DYNAMIC_RANGE,
+        vmin=least,
         vmax=0.0,
         interpolation="nearest",
     )

@@ -13,6 +13,7 @@ from sonarsynth.pictures.figures.frame_figure import (
     Window,
     clipped,
     colour_bar,
+    darkest,
     image_axes,
     outline_artist,
     set_outlines,
@@ -92,7 +93,7 @@ def sheet(
 
 def draw_image(axes: Axes, azimuth: Floats, elevation: Floats, view: View, unit: str) -> list[Floats]:
     """The energy image over the beam grid (deg), with its scale and the outlines of targets, which are returned."""
-    image = image_axes(axes, azimuth, elevation)
+    image = image_axes(axes, azimuth, elevation, darkest([view.level]))
     if view.level is not None:
         image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
     outlines = set_outlines(outline_artist(axes), view.hulls)
