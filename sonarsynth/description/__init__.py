@@ -9,6 +9,8 @@ which is the registry, and `kind:` in YAML is the tag.
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from typing import Any, TypeVar, cast, dataclass_transform
 
 from pydantic import ConfigDict, Discriminator, Field
@@ -42,6 +44,13 @@ class FieldError(ValueError):
 
     def __reduce__(self) -> tuple[type[FieldError], tuple[tuple[str | int, ...], str]]:
         return type(self), (self.path, self.message)
+
+
+def unknown(name: str, names: Iterable[str], noun: str = "field") -> str:
+    """That there is no such name, and which one it may be."""
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(names)}"
+    return f"'{name}' is not a {noun} here; {hint}"
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(Field,))

@@ -10,7 +10,6 @@ at 50 kHz.
 
 from __future__ import annotations
 
-import difflib
 from itertools import pairwise
 from typing import Annotated, Any, Literal, get_args
 
@@ -19,7 +18,7 @@ from annotated_types import Ge, Le, MinLen
 from pydantic import ValidationInfo, field_validator
 
 from sonarsynth.conventions import Complexes, Decibels, Floats, MetresPerSecond, NonNegativeMetres, Number, Radians
-from sonarsynth.description import BY_KIND, description
+from sonarsynth.description import BY_KIND, description, unknown
 from sonarsynth.equations.water.boundary_reflection import SEDIMENTS, pressure_release, rayleigh
 
 SedimentName = Literal[
@@ -132,9 +131,7 @@ class Sediment(ReflectionModel):
     def _known(cls, name: Any) -> Any:
         names = get_args(SedimentName)
         if isinstance(name, str) and name not in names:
-            close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-            hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(names)}"
-            raise ValueError(f"'{name}' is not a sediment here; {hint}")
+            raise ValueError(unknown(name, names, "sediment"))
         return name
 
     @property

@@ -76,14 +76,18 @@ def catenary(axis_depth: float, scale: float, axis_speed: float) -> Curve:
     )
 
 
+def _check_of_water(z: float, c: float) -> None:
+    if not SLOWEST <= c <= FASTEST:
+        raise ValueError(f"the sound speed at {z:g} m is {c:g} m/s; it must be {SLOWEST:g} to {FASTEST:g} m/s")
+
+
 def carried_on(depth: list[float], speed: list[float], gradient: float) -> tuple[Floats, Floats]:
     """Nodes (m, m/s) with one more, on a gradient (1/s), far below or where no water is as slow or fast.
 
     Raises ValueError where a node is not of a sound speed of water.
     """
     for z, c in zip(depth, speed, strict=True):
-        if not SLOWEST <= c <= FASTEST:
-            raise ValueError(f"the sound speed at {z:g} m is {c:g} m/s; it must be {SLOWEST:g} to {FASTEST:g} m/s")
+        _check_of_water(z, c)
     end = max(STRAIGHT_TO, depth[-1])
     limit = FASTEST if gradient > 0 else SLOWEST
     last = speed[-1] + gradient * (end - depth[-1])
@@ -141,9 +145,7 @@ def deepest(curve: Curve, axis: float) -> float:
     """
     with np.errstate(over="ignore", invalid="ignore"):
         for z in (0.0, axis):
-            c = float(curve.speed(np.asarray(z)))
-            if not SLOWEST <= c <= FASTEST:
-                raise ValueError(f"the sound speed at {z:g} m is {c:g} m/s; it must be {SLOWEST:g} to {FASTEST:g} m/s")
+            _check_of_water(z, float(curve.speed(np.asarray(z))))
         low, high = axis, max(axis, DEEPEST)
         if curve.speed(np.asarray(high)) <= FASTEST:
             return high

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import types
-from collections.abc import Iterable
 from dataclasses import is_dataclass
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic_core import ErrorDetails
 
+from sonarsynth.description import unknown
 from sonarsynth.recipe.variation.values import Where
 from sonarsynth.targets.target import NAME
 
@@ -61,13 +60,6 @@ def _text(details: ErrorDetails) -> str:
             return f"must have at least {context['min_length']} entries, not {context['actual_length']}"
     text = details["msg"].replace("Input should be", "must be").replace("String should", "must")
     return f"{text[0].lower()}{text[1:]}, not {value}"
-
-
-def unknown(name: str, names: Iterable[str], noun: str = "field") -> str:
-    """That there is no such name, and which one it may be."""
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(names)}"
-    return f"'{name}' is not a {noun} here; {hint}"
 
 
 def _shown(value: Any) -> str:

@@ -12,9 +12,9 @@ from typing import Any, get_args, get_type_hints
 from pydantic import TypeAdapter, ValidationError
 
 from sonarsynth.conventions import Unit
-from sonarsynth.description import FieldError, named_files
+from sonarsynth.description import FieldError, named_files, unknown
 from sonarsynth.receiver import Sonar
-from sonarsynth.recipe.field_messages import error_message, error_path, unknown
+from sonarsynth.recipe.field_messages import error_message, error_path
 from sonarsynth.recipe.scene import Scene, Trajectory, World
 from sonarsynth.recipe.variation.values import Plain, Where, put, where
 
