@@ -23,6 +23,7 @@ from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing import echoes
 from sonarsynth.tracing.arrivals import trace
 from sonarsynth.tracing.pruning import EchoLevels, loud_ones
+from tests.bodies import mesh_from
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))
 UNIFORM = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1540.0]))
@@ -32,8 +33,7 @@ ROMANIS = elements(Romanis())
 
 
 def hull(subdivisions: int) -> Mesh:
-    shape = trimesh.creation.icosphere(subdivisions=subdivisions)
-    return Mesh(np.asarray(shape.vertices) * [0.8, 0.2, 0.2], np.asarray(shape.faces, np.int32))
+    return mesh_from(trimesh.creation.icosphere(subdivisions=subdivisions), [0.8, 0.2, 0.2])
 
 
 BODIES = tuple(

@@ -9,19 +9,15 @@ import trimesh
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion, unit
-from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation import AutoTracing, Refracted
 from sonarsynth.scattering import MirrorLobe
 from sonarsynth.state import Medium
 from sonarsynth.tracing.ray_fan import EVENTS, RayFan, fan
+from tests.bodies import mesh_from
 
 TANK = Environment(depth=0.3, sound_speed=Isovelocity(speed=1480.0))
 TANK_PROFILE = Profile(np.array([0.0, 0.1, 0.2, 0.3]), np.array([1482.0, 1481.0, 1478.0, 1477.5]))
-
-
-def mesh_from(shape: trimesh.Trimesh) -> Mesh:
-    return Mesh(np.asarray(shape.vertices, float), np.asarray(shape.faces, np.int32))
 
 
 def cylinder() -> PlacedTarget:

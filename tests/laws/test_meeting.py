@@ -24,7 +24,8 @@ from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Physics
 from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
-from tests.laws.test_traced_families import BOTTOM_DEPTH, RIGID, SONAR, THERMOCLINE, UNIFORM, C, ball
+from tests.bodies import ball
+from tests.laws.test_traced_families import BOTTOM_DEPTH, RIGID, SONAR, THERMOCLINE, UNIFORM, C
 from tests.laws.test_traced_families import snap as snap_at
 from tests.scenes import remus
 

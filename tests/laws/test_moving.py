@@ -16,6 +16,7 @@ from sonarsynth.receiver import POINT
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
+from tests.bodies import ball
 from tests.laws.test_traced_families import (
     ARRAY,
     BOTTOM_DEPTH,
@@ -26,7 +27,6 @@ from tests.laws.test_traced_families import (
     THERMOCLINE,
     UNIFORM,
     C,
-    ball,
     images,
     snap,
 )  # fmt: skip

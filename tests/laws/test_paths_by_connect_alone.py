@@ -6,15 +6,12 @@ from typing import Literal
 
 import numpy as np
 import pytest
-import trimesh
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description import description
 from sonarsynth.environment.boundaries import Rigid, SeaBottom
 from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals, Paths
 from sonarsynth.propagation import PathModel, Refracted, Straight
 from sonarsynth.propagation.bounces import Bounces
@@ -24,6 +21,7 @@ from sonarsynth.scattering import Isotropic
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.tracing.arrivals import trace
+from tests.bodies import ball
 
 DEPTH = 12.0
 SONAR = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
@@ -49,13 +47,10 @@ class Joined(PathModel):
 
 
 def traced(model: PathModel, profile: Profile) -> Arrivals:
-    shape = trimesh.creation.icosphere(subdivisions=2, radius=0.3)
-    mesh = Mesh(np.asarray(shape.vertices), np.asarray(shape.faces, np.int32))
-    ball = PlacedTarget("ball", mesh, Pose(np.array([15.0, 1.0, -6.0]), quaternion(0.0)), np.zeros(3))
     snap = Emission(np.array([6.0, 5.0, -9.0]), 0.0, LogarithmicBubble(), None)
     law, all_of_it = (Isotropic(strength=1.0),), Tolerances(negligible=0.0)
     water, receiver = Medium(WATER, profile), Receiver(SONAR, ARRAY)
-    return trace(FrameContext(0.0, (ball,), (snap,), water, receiver, law, all_of_it), model)
+    return trace(FrameContext(0.0, (ball(),), (snap,), water, receiver, law, all_of_it), model)
 
 
 def wavefronts(found: Arrivals) -> Floats:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 
 import sonarsynth as ss
 from sonarsynth.conventions import NO_TARGET
@@ -15,7 +14,6 @@ from sonarsynth.description import FieldError
 from sonarsynth.environment.scatterers import BottomPatch, Net, Stones, Swarm
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import ORIGINS, Arrivals, Kind
@@ -25,6 +23,7 @@ from sonarsynth.scattering import Isotropic
 from sonarsynth.sources.snap_models import Gabor
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.tracing.arrivals import trace
+from tests.bodies import ball
 
 ROOT = Path(__file__).resolve().parents[2]
 C, BOTTOM = 1500.0, 12.0
@@ -36,12 +35,6 @@ ARRAY = elements(PositionTable(positions=((0.0, -0.1, 0.0), (0.0, 0.1, 0.1), (0.
 POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
 SOURCE = np.array([6.0, -4.0, -7.0])
 SNAP = Emission(SOURCE, 0.0, Gabor(frequency=50e3, cycles=8.0), None)
-
-
-def ball(place: list[float], radius: float = 0.3) -> PlacedTarget:
-    shape = trimesh.creation.icosphere(subdivisions=1, radius=radius)
-    mesh = Mesh(np.asarray(shape.vertices), np.asarray(shape.faces, np.int32))
-    return PlacedTarget("ball", mesh, Pose(np.array(place), quaternion(0.0)), np.zeros(3))
 
 
 def traced(
@@ -131,7 +124,7 @@ def test_pieces_of_the_bottom_bring_the_integral_of_lamberts_law_over_it() -> No
 def test_bodies_hide_scatterers_and_are_not_hidden_by_them() -> None:
     stones = Stones(positions=((8.0, 0.0), (8.0, 6.0)), radius=0.1)
     middle = 0.5 * (np.array([8.0, 0.0, 0.1 - BOTTOM]) + POSE.position)
-    body = ball(middle.tolist())
+    body = ball(middle, subdivisions=1)
     alone, both = traced(bodies=(body,)), traced(stones, bodies=(body,))
     loose = both.kind == Kind.REVERBERATION
     assert both.facet[loose].tolist() == [1], "the ball stands between the first stone and the array"

@@ -6,14 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-import trimesh
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Track
-from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import LowPass, PositionTable, Sonar, elements
@@ -23,6 +20,7 @@ from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.snap_models import Gabor
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.tracing.arrivals import trace
+from tests.bodies import ball
 
 C, RATE, STILL = 1500.0, 400e3, np.zeros(3)
 WATER = Medium(
@@ -36,16 +34,13 @@ POSE = Pose(np.array([0.0, 0.0, -100.0]), quaternion(0.5 * np.pi))
 SOURCE, PLACE = np.array([3.0, 6.0, -103.0]), np.array([12.0, -1.0, -99.0])
 
 
-def ball() -> PlacedTarget:
-    shape = trimesh.creation.icosphere(subdivisions=1, radius=0.05)
-    mesh = Mesh(np.asarray(shape.vertices), np.asarray(shape.faces, np.int32))
-    return PlacedTarget("ball", mesh, Pose(PLACE, quaternion(0.0)), STILL)
-
-
 def traced(snap: Emission, sonar: Floats = STILL) -> Arrivals:
     receiver = Receiver(POSE, ARRAY, SONAR, Track(POSE, sonar))
     laws, none = (Isotropic(strength=1.0),), Tolerances(negligible=0.0, quadratic=0.0)
-    return trace(FrameContext(0.0, (ball(),), (snap,), WATER, receiver, laws, none), AutoTracing(bounces=0))
+    return trace(
+        FrameContext(0.0, (ball(PLACE, 0.05, subdivisions=1),), (snap,), WATER, receiver, laws, none),
+        AutoTracing(bounces=0),
+    )
 
 
 def heard(found: Arrivals, snap: Emission, start: float, samples: int) -> Floats:

@@ -10,7 +10,6 @@ from sonarsynth.environment.boundaries import FluidHalfSpace, Rigid, SeaBottom, 
 from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.equations.water.boundary_reflection import rayleigh
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing, Refracted, Straight
@@ -19,6 +18,7 @@ from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
+from tests.bodies import ball, mesh_from
 
 BOTTOM_DEPTH, C = 12.0, 1530.0
 SOURCE, ARRAY = np.array([6.0, 5.0, -9.0]), np.array([0.0, 0.0, -5.0])
@@ -27,12 +27,6 @@ ROMANIS = elements(Romanis())
 UNIFORM = Profile(np.array([0.0, BOTTOM_DEPTH]), np.array([C, C]))
 THERMOCLINE = Profile(np.array([0.0, 7.0, 8.5, BOTTOM_DEPTH]), np.array([1541.0, 1541.0, 1534.6, 1534.5]))
 RIGID = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), bottom=SeaBottom(reflection=Rigid()))
-
-
-def ball(place=(15.0, 1.0, -6.0), radius: float = 0.3, subdivisions: int = 2) -> PlacedTarget:
-    shape = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
-    mesh = Mesh(np.asarray(shape.vertices), np.asarray(shape.faces, np.int32))
-    return PlacedTarget("ball", mesh, Pose(np.array(place), quaternion(0.0)), np.zeros(3))
 
 
 def snap(time: float = 0.0) -> Emission:
@@ -156,8 +150,7 @@ def plate(centre, half, normal_axis: int) -> PlacedTarget:
     """A thin board across one axis."""
     size = np.full(3, 2.0 * half)
     size[normal_axis] = 0.02
-    box = trimesh.creation.box(size)
-    mesh = Mesh(np.asarray(box.vertices), np.asarray(box.faces, np.int32))
+    mesh = mesh_from(trimesh.creation.box(size))
     return PlacedTarget("board", mesh, Pose(np.array(centre), quaternion(0.0)), np.zeros(3))
 
 

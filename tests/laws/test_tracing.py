@@ -23,6 +23,7 @@ from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace, trace_each
 from sonarsynth.tracing.expansion.probe_sensors import probes
 from sonarsynth.tracing.facet_paths import way_to_array
+from tests.bodies import mesh_from
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))
 UNIFORM = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1540.0]))
@@ -32,8 +33,7 @@ SONAR = Pose(np.array([0.0, 0.0, -10.0]), quaternion(0.5 * np.pi))
 
 
 def hull(subdivisions: int = 3) -> Mesh:
-    shape = trimesh.creation.icosphere(subdivisions=subdivisions)
-    return Mesh(np.asarray(shape.vertices) * [0.8, 0.1, 0.1], np.asarray(shape.faces, np.int32))
+    return mesh_from(trimesh.creation.icosphere(subdivisions=subdivisions), [0.8, 0.1, 0.1])
 
 
 HULL = hull()
@@ -237,12 +237,7 @@ def test_the_lobe_varies_over_the_aperture_as_the_terms_say() -> None:
 
 
 def test_a_body_in_between_hides_facets_and_the_direct_snap() -> None:
-    screen = Mesh(
-        *(
-            np.asarray(a)
-            for a in (trimesh.creation.box((0.1, 3.0, 3.0)).vertices, trimesh.creation.box((0.1, 3.0, 3.0)).faces)
-        )
-    )
+    screen = mesh_from(trimesh.creation.box((0.1, 3.0, 3.0)))
     wall = PlacedTarget("wall", screen, Pose(np.array([10.0, 0.5, -10.5]), quaternion(0.5 * np.pi)), np.zeros(3))
     for profile in (UNIFORM, LAYERED):
         alone, shielded = run(profile=profile), run((body((20.0, 1.0, -11.0)), wall), profile=profile)

@@ -13,11 +13,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
-
-
-def mesh_from(shape: trimesh.Trimesh, scale: float = 1.0) -> Mesh:
-    return Mesh(np.asarray(shape.vertices, float) * scale, np.asarray(shape.faces, np.int32))
-
+from tests.bodies import mesh_from
 
 SPHERE = mesh_from(trimesh.creation.icosphere(subdivisions=3), 0.5)
 RING = mesh_from(trimesh.creation.torus(0.8, 0.3))  # concave
