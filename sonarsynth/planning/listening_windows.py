@@ -20,7 +20,7 @@ from sonarsynth.planning.plans import Plan, PulseDurations, Windows
 from sonarsynth.planning.pulse_durations import blur_of, supports_of
 from sonarsynth.products import Paths
 from sonarsynth.propagation import Straight
-from sonarsynth.receiver import elements
+from sonarsynth.receiver import Band, elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.filtered_pulse import snap_levels
@@ -28,6 +28,13 @@ from sonarsynth.signals.filtered_pulse import snap_levels
 MARGIN = 0.1e-3
 """Seconds added at both ends of every window. Covers what straight rays leave out of an arrival time: under 2 us at
 20 m in a gradient of 4 per second. Arrivals that still fall outside are counted in `/signals/outside`."""
+
+SHORTEST = 1e-3
+"""s: no echo window is shorter."""
+IN_LOBES, IN_BANDWIDTHS, IN_PULSES = 2.0, 40.0, 12.0
+"""An echo window opens so many inverses of the bandwidth before the first echo, and lasts so many, or so many pulses,
+at least: echoes are told from noise by the median of a beam over the window. In a shorter one that is the echo's own:
+in a band of 3 kHz it was 60 dB over the noise, and in one of 2 kHz no echo was ever picked."""
 
 UNSAMPLED_MARGIN = 0.1
 """Windows of datasets of which not every frame is looked at are wider by this part of themselves."""
@@ -55,7 +62,7 @@ def listening_windows(recipe: Recipe, looks: Sequence[SampledScene]) -> Windows:
     latest = longest + supports.echo_after + MARGIN + unseen
     if not echoes:  # listen for a moment after the snap
         latest = supports.after + 2e-3
-    stop = gate.stop if gate.stop is not None else max(latest, start + 1e-3)
+    stop = gate.stop if gate.stop is not None else max(latest, start + _shortest(sonar.band, supports.direct))
     if stop <= start:
         raise FieldError(("scene", "processing", "echo_window", "stop"), f"must be after start ({start:g} s)")
     rate = sonar.sampling_frequency
@@ -68,6 +75,11 @@ def listening_windows(recipe: Recipe, looks: Sequence[SampledScene]) -> Windows:
     cut = echoes and (start > shortest - supports.foot or stop < longest + supports.foot)
     tight = tuple(int(n) for n in dict.fromkeys(real[[*_first(first_echo, real), *_first(-last_echo, real)]]))
     return Windows(starts, samples, float(start), float(stop), supports, disturbed, removed, cut, tight)
+
+
+def _shortest(band: Band, pulse: float) -> float:
+    """How long (s) an echo window is at least; pulse (s): how long either side of its peak a direct one is heard."""
+    return max(SHORTEST, IN_BANDWIDTHS / (band.high - band.low), IN_PULSES * pulse)
 
 
 def _first(times: Floats, real: Ints, count: int = 2) -> Ints:
@@ -83,7 +95,8 @@ def _opening(scene: Scene, first_echo: float, supports: PulseDurations, margin: 
     the feet of an echo the direct pulse is taken out, and the window opens with the echoes, which never come before it.
     """
     gate, chosen = scene.processing.echo_window.start, scene.processing.direct_pulse
-    earliest, unclipped = first_echo - supports.echo_before - margin, first_echo - supports.foot - margin
+    before = max(supports.echo_before, IN_LOBES / (scene.sonar.band.high - scene.sonar.band.low))
+    earliest, unclipped = first_echo - before - margin, first_echo - supports.foot - margin
     overlap = (unclipped if gate is None else gate) < supports.clear
     removed = chosen == "remove" or (chosen == "auto" and overlap)
     if gate is not None:

@@ -176,7 +176,7 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
     wave = direct_spectrum(received.direct, received.estimates, elements, sonar, samples, received.pulse)
     wave = wave[lowest : lowest + len(f)]
     density = np.abs(wave) ** 2
-    low, high = _own_band(f, density, sonar.band)
+    low, high = _own_band(f, density, spacing, sonar.band)
     taper = np.sin(np.pi * np.clip((f - low) / (high - low), 0.0, 1.0)) ** 2
     matched = wave.conj() * taper / (density + WHITENING * density.max()) if density.max() > 0 else 0 * wave
     share = np.abs(wave * matched) + np.finfo(float).tiny
@@ -205,10 +205,10 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
     )
 
 
-def _own_band(f: Floats, density: Floats, band: Band) -> tuple[float, float]:
-    """Ends (Hz) of what a pulse has of the band, by its power densities (bin,) at frequencies (bin,); those of the band
-    where it ends next to them, and a taper over the band is small there."""
-    loud, spacing, beside = f[density >= OWN * density.max()], f[1] - f[0], EDGE * (band.high - band.low)
+def _own_band(f: Floats, density: Floats, spacing: float, band: Band) -> tuple[float, float]:
+    """Ends (Hz) of what a pulse has of the band, by its power densities (bin,) at frequencies (bin,) so far (Hz) apart;
+    those of the band where it ends next to them, and a taper over the band is small there."""
+    loud, beside = f[density >= OWN * density.max()], EDGE * (band.high - band.low)
     low = band.low if loud[0] < band.low + beside else float(loud[0] - spacing)
     return low, band.high if loud[-1] > band.high - beside else float(loud[-1] + spacing)
 

@@ -149,7 +149,8 @@ class Physics:
 class EchoWindow:
     """When the sonar listens for echoes, in seconds after the direct arrival of the snap.
 
-    Left out, the planner takes the shortest window that holds the echoes of every frame.
+    Left out, the planner takes the shortest window that holds the echoes of every frame, and in narrow bands and of
+    long pulses noise to tell them from.
     """
 
     start: Annotated[Seconds, Ge(0)] | None = None
