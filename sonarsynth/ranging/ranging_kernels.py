@@ -143,7 +143,7 @@ def _face_response(across: float, up: float, first: float, spacing: float, turns
             response[low + k] = over_y * over_z / ((x if x != 0.0 else 1.0) * (w if w != 0.0 else 1.0))
 
 
-@compiled
+@compiled(forceinline=True)
 def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int) -> Any:
     """sinc(f across) sinc(f up): (row, bin) at f = first + spacing * bin (Hz); across, up (row,) s: face times sine/c.
 

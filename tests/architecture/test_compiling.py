@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
+from numba.core.dispatcher import Dispatcher
 
 PACKAGE = Path(__file__).resolve().parents[2] / "sonarsynth"
 CALLED = """
@@ -59,3 +62,45 @@ def test_what_a_kernel_calls_and_the_constants_it_takes_are_those_of_today(produ
 def test_kernels_are_compiled_in_this_one_way() -> None:
     apart = {PACKAGE / "compiling.py", *(PACKAGE / "validation" / "references").rglob("*.py")}
     assert [file.name for file in PACKAGE.rglob("*.py") if "njit" in file.read_text() and file not in apart] == []
+
+
+ROUNDED_FREELY = {"sonarsynth.equations.kernels.lanes", "sonarsynth.equations.kernels.vectors"}
+"""Their instructions may be fused or put in another order, as the compiler finds best where they stand."""
+
+
+def kernels() -> dict[str, Dispatcher]:
+    """All kernels of the package, by module and name."""
+    files = [file for file in PACKAGE.rglob("*.py") if "@compiled" in file.read_text()]
+    modules = [import_module(".".join(("sonarsynth", *f.relative_to(PACKAGE).with_suffix("").parts))) for f in files]
+    values = [value for module in modules for value in vars(module).values() if isinstance(value, Dispatcher)]
+    return {f"{kernel.py_func.__module__}.{kernel.py_func.__name__}": kernel for kernel in values}
+
+
+def called(kernel: Dispatcher) -> list[Any]:
+    """What a kernel names."""
+    function = kernel.py_func
+    return [function.__globals__.get(name) for name in function.__code__.co_names]
+
+
+def rounded_freely(kernel: Dispatcher) -> bool:
+    """Whether the bits of a kernel depend on what stands about it."""
+    return bool(kernel.targetoptions.get("fastmath")) or any(
+        rounded_freely(value) if isinstance(value, Dispatcher) else getattr(value, "__module__", "") in ROUNDED_FREELY
+        for value in called(kernel)
+    )
+
+
+def test_bits_do_not_depend_on_which_kernel_a_process_loads_first() -> None:
+    """Two kernels that call a third have a copy of it each, and a process runs the copy that it loads first: one in
+    which the compiler may choose how numbers are rounded must be part of those that call it."""
+    every = kernels()
+    callers = {
+        name: [value for value in called(kernel) if isinstance(value, Dispatcher)] for name, kernel in every.items()
+    }
+    apart = {
+        f"{value.py_func.__name__}, which {name} calls"
+        for name, values in callers.items()
+        for value in values
+        if rounded_freely(value) and not value.targetoptions.get("forceinline")
+    }
+    assert len(every) > 100 and not apart

@@ -83,7 +83,7 @@ def weighted(pairs: Any, at: int, weight: float) -> Any:
     return splat(weight) * x, splat(weight) * y
 
 
-@compiled
+@compiled(forceinline=True)
 def group_steps(delays: Any, spacing: float, cosines: Any, sines: Any) -> None:
     """Fill cosines, sines (float32) with half phasors of 2 pi delay * 16 spacing: one group of frequencies on.
 

@@ -35,7 +35,7 @@ def _add_turned(beams: Any, at: int, sums: Any, c: Any, s: Any, sign: Any) -> No
     store(beams, at + 3 * LANES, load(beams, at + 3 * LANES) + q)
 
 
-@compiled
+@compiled(forceinline=True)
 def _add_beams(
     lines: Any, start: int, columns: int, odd: bool, across: Any, turns: Any, middle: Any, steps: Any, at: int,
     stop: int, sign: Any, frequency: float, spacing: float, groups: int, beams: Any, first_beam: int,
@@ -82,7 +82,7 @@ def _put_powers(energy: Any, mirror: int, row: int, column: int, powers: Any, sh
         energy[3, row, column] += total(powers[3])
 
 
-@compiled
+@compiled(forceinline=True)
 def _add_powers(
     lines: Any, start: int, columns: int, odd: bool, across: Any, turns: Any, at: int, frequency: float, spacing: float,
     groups: int, energy: Any, mirror: int, row: int, shared: bool,
@@ -106,7 +106,7 @@ def _add_powers(
             _put_powers(energy, mirror, row, j, far, shared)
 
 
-@compiled
+@compiled(forceinline=True)
 def _add_powers_of_beams(beams: Any, groups: int, energy: Any, mirror: int) -> None:
     """Add |B|^2 (elevation, azimuth) of a chunk."""
     _, elevations, azimuths = energy.shape

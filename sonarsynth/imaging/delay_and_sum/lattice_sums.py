@@ -112,7 +112,7 @@ def _focused(pairs: Any, at: int, weight: float, delay: float, frequency: float,
     return turned(x, y, c, s)
 
 
-@compiled
+@compiled(forceinline=True)
 def focus(
     pairs: Any, bins: int, low: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float,
     sides: int, folded: Any,
@@ -136,7 +136,7 @@ def focus(
                 _fold(folded, ((side * columns + n) * rows + m) * TERM, above, below)
 
 
-@compiled
+@compiled(forceinline=True)
 def group_turns(delays: Any, spacing: float) -> Any:
     """Cosines and sines (float32, flat) of 2 pi delay * 16 spacing: one group of frequencies on."""
     count = delays.size
@@ -176,7 +176,7 @@ def _put_line(lines: Any, at: int, sums: Any, side: int, sides: int) -> None:
         _fold(lines, at, port, (x, y, p, q))
 
 
-@compiled
+@compiled(forceinline=True)
 def sums_over_rows(
     folded: Any, rows: int, heights: Any, sides: int, odd: bool, rise: Any, turns: Any, inner: int, outer: int,
     frequency: float, spacing: float, groups: int, lines: Any,
