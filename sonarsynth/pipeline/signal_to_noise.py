@@ -141,7 +141,8 @@ class _Look:
         return np.asarray(snapshots.unit * np.sum(np.abs(steered).astype(float) ** 2, axis=1))
 
     def _gate(self, pressure: Pressure) -> tuple[float, float]:
-        """The part (s) of the window that pressure sounds in, as beams delay it: an echo is over soon."""
+        """Start and stop (s) of the part of the window in which pressure (sensor, sample) is heard, with what steering
+        shifts it by: an echo is over soon, and the transform of the whole window takes three times as long."""
         (start, stop), rate, band = self.window, self.signals.sampling_frequency, self.sonar.band
         first, count = gate_samples(start, stop, self.signals.start, rate, pressure.shape[1])
         inside = pressure[:, first : first + count]

@@ -92,9 +92,9 @@ class Receiver:
         """Of sound at the middle of the array, m/s."""
         return float(medium.profile.at(depth(self.pose.position)))
 
-    def seen(self, towards: Floats, time: Floats) -> Floats:
-        """Directions (path, xyz) of the world in the frame of the array, at times (path,) s after the instant of the
-        frame, by when it has turned on as it then does."""
+    def turn_to_array(self, towards: Floats, time: Floats) -> Floats:
+        """Unit vectors (path, xyz) of the world in the frame of the array at times (path,), s after the instant of the
+        frame: by then it has turned at its spin of that instant (Rodrigues' rotation formula)."""
         direction = towards @ self.pose.rotation
         if self.track is None or not (spin := self.pose.turn_to_body(self.track.spin)).any():
             return np.asarray(direction)

@@ -387,6 +387,8 @@ def test_positions_in_a_table_are_those_written_in_a_list(home: Path, array: str
         ("x,y,z\n0,1,2\n0,b,2\n", "array.csv, line 3: y: 'b' is not a number"),
         ("x,y,z\n0,nan,2\n", "array.csv, line 2: y: 'nan' is not a number"),
         ("x,y,z\n0,1\n", "array.csv, line 2: must have 3 values"),
+        ("x [mm],y,z\n,1,2\n", "array.csv, line 2: x: '' is not a number"),
+        ("x,y,z,x\n0,1,2,3\n", "array.csv: has column 'x' twice"),
         ("x,y,z\n", "array.csv: has no rows under its column names"),
         ("", "array.csv: has no column 'x'; known: x, y, z"),
         ("x,y [furlong],z\n0,1,2\n", "has unit 'furlong'"),

@@ -77,19 +77,20 @@ def _listed(
         raise source.error(at, "a table is named in the recipe itself: paths in it are relative to that")
     rows = csv.DictReader(io.StringIO(_text(source, at, name)), skipinitialspace=True)
     columns, units = _columns(rows.fieldnames or [])
-    unknown = [column for column in columns if column not in known]
-    missing = [column for column in needed if column not in columns]
-    if unknown or missing:
-        problem = f"'{unknown[0][:40]}' is no column" if unknown else f"has no column '{missing[0]}'"
-        raise source.error(at, f"{name}: {problem}; known: {', '.join(known)}")
+    problems = [f"'{column[:40]}' is no column" for column in columns if column not in known]
+    problems += [f"has no column '{column}'" for column in needed if column not in columns]
+    problems += [f"has column '{column}' twice" for column in known if columns.count(column) > 1]
+    if problems:
+        raise source.error(at, f"{name}: {problems[0]}; known: {', '.join(known)}")
     rows.fieldnames = columns
     listed = []
     for row in rows:
         where = f"{name}, line {rows.line_num}"
         if None in row or None in row.values():
             raise source.error(at, f"{where}: must have {len(columns)} values")
+        cells = [str(row[column]).strip() for column in columns]
         texts = {
-            column: f"{str(row[column]).strip()} {unit}".strip() for column, unit in zip(columns, units, strict=True)
+            c: f"{cell} {unit}".strip() if cell else "" for c, cell, unit in zip(columns, cells, units, strict=True)
         }
         try:
             listed.append(of_row(name, texts))

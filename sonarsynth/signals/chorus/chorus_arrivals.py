@@ -184,7 +184,7 @@ def chorus_arrivals(
     used, number = np.unique(snap, return_inverse=True)
     chorus = ChorusArrivals(
         delay=delay,
-        direction=receiver.seen(towards, delay),
+        direction=receiver.turn_to_array(towards, delay),
         length=length,
         gain=np.where(lost, sign, 1.0) * louder[snap] * bounced.modulus / np.maximum(length, CAVITY),
         phase=np.where(lost, 0.0, bounced.phase),

@@ -83,7 +83,7 @@ def scattered_paths(
     if back.own:
         factor = factor * _with_own_image(medium, back.own, sine_out, receiver.centre, 1.0, 1.0)
     if receiver.sonar.baffle:
-        factor = factor * np.where(receiver.seen(towards, late)[:, 0] < 0.0, receiver.sonar.behind, 1.0)
+        factor = factor * np.where(receiver.turn_to_array(towards, late)[:, 0] < 0.0, receiver.sonar.behind, 1.0)
     factor = (
         factor * _reflected(medium, out, sine_in, receiver.centre) * _reflected(medium, back, sine_out, receiver.centre)
     )

@@ -167,7 +167,7 @@ def _joined(
     none = np.zeros(len(delay))
     return ReverberationArrivals(
         delay=delay,
-        direction=receiver.seen(joined([p.towards for p in paths], (3,)), delay),
+        direction=receiver.turn_to_array(joined([p.towards for p in paths], (3,)), delay),
         length=joined([p.back for p in paths]),
         gain=joined([p.gain for p in drawn]),
         phase=none,
