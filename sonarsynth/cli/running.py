@@ -1,4 +1,4 @@
-"""Running a command: its exit status, and its error as one line."""
+"""Running a command: its exit status, and its error as one line, those of a recipe as a line each."""
 
 from __future__ import annotations
 
@@ -16,6 +16,12 @@ if TYPE_CHECKING:
     import typer
 
 OURS, INPUT, STORE, INTERRUPTED = 1, 2, 4, 130
+STATUS = dict.fromkeys(("StoreLocked", "BuildEnded", "Damage", "DamagedFile"), STORE) | dict.fromkeys(
+    ("RecipeError", "Mismatch", "NothingToDraw", "TooLarge", "Unreachable", "NoScheduler")
+    + ("RecordingError", "TrackError", "DetectionsError"),
+    INPUT,
+)
+"""Of errors that say all there is to say, by name: what raises them may not be imported yet."""
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -56,23 +62,17 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _explain(error: Exception, shown: bool) -> int:
-    """Say an error in one line; returns the exit status."""
+    """Say an error in one line, those of a recipe in a line each; returns the exit status."""
     if hasattr(error, "format_message") and hasattr(error, "exit_code"):  # typer's own: wrong usage
         return _say(error.format_message() or "no command: sonarsynth --help lists them", INPUT)
     from sonarsynth.description import FieldError
 
-    match type(error).__name__:
-        case "StoreLocked" | "BuildEnded" | "Damage":
-            return _say(str(error), STORE)
-        case "DamagedFile":
-            logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # other files that were read are of no interest
-            return _say(str(error), STORE)
-        case "RecipeError" | "Mismatch" | "NothingToDraw" | "TooLarge" | "Unreachable" | "NoScheduler":
-            return _say(str(error), INPUT)
-        case "RecordingError" | "TrackError" | "DetectionsError":
-            return _say(str(error), INPUT)
-    if isinstance(error, (BadOption, FieldError)):
-        return _say(str(error), INPUT)
+    name = type(error).__name__
+    if name == "DamagedFile":
+        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # other files that were read are of no interest
+    if name in STATUS or isinstance(error, (BadOption, FieldError)):
+        lines = str(error).split("\n") if name == "RecipeError" else [str(error)]
+        return max(_say(line, STATUS.get(name, INPUT)) for line in lines)
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""
         return _say(f"{file}{error.strerror}", OURS)

@@ -23,7 +23,7 @@ from sonarsynth.receiver import (
     Sonar,
 )
 from sonarsynth.recipe import Recipe, reading
-from sonarsynth.recipe.reading import RecipeError
+from sonarsynth.recipe.reading import RecipeError, messages
 from sonarsynth.recipe.scene import Scene, Trajectory, World
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets import shapes
@@ -55,7 +55,7 @@ WRONG = [
     ("seed: 3", "seed: [", "4: is not YAML"),
     ("seed: 3", "seed: -3", "2: seed: must be greater than or equal to 0, not -3"),
     ("seed: 3", "? [a]\n: 3", "2: a key must be a text"),
-    ("scene:", "scene: []\nscenery:", "3: scene: must be a mapping of fields, not a list (and 1 more)"),
+    ("scene:", "scene: []\nscenery:", "3: scene: must be a mapping of fields, not a list"),
     (
         "pitch: 5 cm}",
         "pitch: 5 cm}\n    sampling_frequency: 150 kHz",
@@ -78,8 +78,7 @@ def refused(file: Path, sets: tuple[str, ...] = ()) -> str:
     with pytest.raises(RecipeError) as caught:
         reading.load(file, sets)
     message = str(caught.value)
-    assert "\n" not in message
-    assert message.startswith(str(file))
+    assert all(line.startswith(str(file)) for line in message.split("\n"))
     return message.removeprefix(f"{file}:")
 
 
@@ -91,6 +90,24 @@ def test_what_is_wrong_is_named_with_file_line_and_field(
     assert right in text
     small_file.write_text(text.replace(right, wrong))
     assert message in refused(small_file)
+
+
+def test_all_that_is_wrong_is_named_a_line_each(small_file: Path) -> None:
+    """Of as many errors as a page holds; of what a misspelt field brings about, the field comes first."""
+    text, wrong = small_file.read_text(), (("seed: 3", "seed: -3"), ("pitch: 5 cm", "pich: 5 cm"), ("1540}", "x}"))
+    for right, other in wrong:
+        assert right in text
+        text = text.replace(right, other)
+    small_file.write_text(text)
+    lines = refused(small_file).split("\n")
+    fields = ("seed: must be", "array.pich: 'pich' is not", "array.pitch: is required", "sound_speed.speed: must be")
+    assert sorted(field for field in fields for line in lines if field in line) == sorted(fields)
+    assert len(lines) == len(fields)
+    names = "".join(f"word{i}: 3\n" for i in range(50))
+    small_file.write_text(small_file.read_text() + names)
+    lines = refused(small_file).split("\n")
+    assert lines[-1].endswith(f"and {len(fields) + 50 - messages.MOST_SHOWN} more")
+    assert len(lines) == messages.MOST_SHOWN + 1
 
 
 @pytest.mark.parametrize(
@@ -158,9 +175,9 @@ def test_what_is_wrong_in_a_setting_is_named_with_its_field(small_file: Path, se
 
 def test_a_kind_set_over_the_fields_of_another_says_how_to_replace_them(small_file: Path) -> None:
     message = refused(small_file, ("scene.sonar.array.kind=romanis",))
-    (hint,) = message.split("--set ")[1:]
+    (hint,) = message.partition("\n")[0].split("--set ")[1:]
     assert "columns" in message
-    assert hint == "scene.sonar.array='{kind: romanis}' (and 1 more)"
+    assert hint == "scene.sonar.array='{kind: romanis}'"
     assert "--set" not in refused(small_file, ("scene.sonar.array={kind: romanis, columns: 2}",)).removeprefix("--set")
 
 

@@ -1,4 +1,5 @@
-"""Whatever a file holds, it is read, or refused in one line that names it: recipes, casts, recordings, meshes."""
+"""Whatever a file holds, it is read, or refused in a line that names it, of recipes a line for each thing that is
+wrong: recipes, casts, recordings, meshes."""
 
 from __future__ import annotations
 
@@ -39,8 +40,9 @@ plain = st.recursive(
 
 
 def one_line(error: ValueError, name: object) -> None:
-    text = str(error)
-    assert "\n" not in text and text.startswith(str(name)) and len(text) > len(str(name)) + 3, text
+    lines = str(error).split("\n") if isinstance(error, RecipeError) else [str(error)]
+    for text in lines:
+        assert "\n" not in text and text.startswith(str(name)) and len(text) > len(str(name)) + 3, text
 
 
 @few

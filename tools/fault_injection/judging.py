@@ -84,7 +84,7 @@ def judge(folder: Path, *, must_refuse: bool = False, whole: bool = False) -> Ou
         verdict, printed = "something written", f"{changed[:5]} {printed}"
     if verdict == ACCEPTED and must_refuse:
         verdict = "not refused"
-    found = LINE.fullmatch(printed.rstrip("\n"))
+    found = LINE.fullmatch(printed.partition("\n")[0])
     return Outcome(verdict, (found and found["field"]) or "", printed, memory)
 
 
@@ -110,8 +110,8 @@ def _verdict(status: int, out: str, err: str, memory: int, checked: bool) -> str
         return ACCEPTED if not err else "accepted with words on stderr"
     if status != 2 or "Traceback" in err:
         return UNEXPECTED.get(status, f"status {status}")
-    found = LINE.fullmatch(err.rstrip("\n"))
-    if out or err.count("\n") != 1 or found is None:
+    found, *others = (LINE.fullmatch(line) for line in err.splitlines() or [""])
+    if out or found is None or None in others:
         return "refused, not in one line"
     return REFUSED if found["line"] or found["what"].startswith(PLACELESS) else "refused without a line"
 

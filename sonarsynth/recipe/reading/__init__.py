@@ -57,7 +57,7 @@ def load(path: Path | str, sets: Sequence[str] = ()) -> Recipe:
 
     Raises
     ------
-    RecipeError, one line that names file, line and field.
+    RecipeError, a line for each error that names file, line and field.
     """
     return recipe_of(read(path, sets))
 
@@ -78,7 +78,7 @@ def loads(text: str, name: str = "recipe", folder: Path | str = ".", *, resolved
 
     Raises
     ------
-    RecipeError, one line that names text, line and field.
+    RecipeError, a line for each error that names text, line and field.
     """
     return recipe_of(read_text(text, name, Path(folder).absolute()), check_files=False, resolved=resolved)
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from pydantic import ValidationError
 
 from sonarsynth.recipe.field_messages import error_message, error_path
 from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, dotted
 from sonarsynth.recipe.variation.values import Where
 
+MOST_SHOWN: Final = 20
+"""Errors that are told of a recipe."""
+
 
 def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
-    """The first error of a validation, with its place in the file, and how many more there are."""
+    """The errors of a validation, each with its place in the file: of a misspelt field first, at most `MOST_SHOWN`."""
     texts: dict[Where, str] = {}
     for details in error.errors(include_url=False):
         keys, message = error_message(details, error_path(details, source.data), root, source.data)
@@ -21,12 +26,14 @@ def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
     for keys in words:  # of a word or a mapping, it is the mapping that was meant
         if any(len(longer) > len(keys) and longer[: len(keys)] == keys for longer in texts):
             del texts[keys]
-    guessed = [item for item in texts.items() if "did you mean" in item[1]]  # a misspelt field explains a missing one
-    keys, message = next(iter(texts.items()))
-    if guessed and message == "is required":
-        keys, message = guessed[0]
-    more = f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
-    return source.error(keys, message + _of_another_kind(keys, source) + more)
+    items = list(texts.items())
+    if items[0][1] == "is required":  # which a misspelt field explains
+        items.sort(key=lambda item: "did you mean" not in item[1])
+    (keys, message), *others = items
+    lines = [source.error(*other) for other in others[: MOST_SHOWN - 1]]
+    if len(items) > MOST_SHOWN:
+        lines.append(RecipeError(source.name, "", "", f"and {len(items) - MOST_SHOWN} more"))
+    return source.error(keys, message + _of_another_kind(keys, source), lines)
 
 
 def _of_another_kind(keys: Where, source: Source) -> str:

@@ -7,7 +7,7 @@ mappings; sizes, depth and aliases are bounded, so a file can be wrong but not d
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -31,16 +31,18 @@ _TAG: Final = "tag:yaml.org,2002:"
 
 
 class RecipeError(ValueError):
-    """A recipe that cannot be used; str() is one line: file, line (or --set), field, and what is wrong."""
+    """A recipe that cannot be used; str() is a line for it and each of `others` that are wrong too: file, line (or
+    --set), field, and what is wrong."""
 
-    def __init__(self, file: str, place: str, field: str, message: str) -> None:
-        self.file, self.place, self.field = file, place, field
+    def __init__(self, file: str, place: str, field: str, message: str, others: Sequence[RecipeError] = ()) -> None:
+        self.file, self.place, self.field, self.others = file, place, field, tuple(others)
         self.message = " ".join(message.split())
         head = f"{file}:{place}" if place else file
-        super().__init__(": ".join(text for text in (head, field, self.message) if text))
+        line = ": ".join(text for text in (head, field, self.message) if text)
+        super().__init__("\n".join((line, *map(str, self.others))))
 
-    def __reduce__(self) -> tuple[type[RecipeError], tuple[str, str, str, str]]:
-        return type(self), (self.file, self.place, self.field, self.message)
+    def __reduce__(self) -> tuple[type[RecipeError], tuple[str, str, str, str, tuple[RecipeError, ...]]]:
+        return type(self), (self.file, self.place, self.field, self.message, self.others)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +68,9 @@ class Source:
             keys = keys[:-1]
         return self.places.get(keys, "1")
 
-    def error(self, keys: Where, message: str) -> RecipeError:
+    def error(self, keys: Where, message: str, others: Sequence[RecipeError] = ()) -> RecipeError:
         """The error of the value at a path."""
-        return RecipeError(self.name, self.place(keys), dotted(keys), message)
+        return RecipeError(self.name, self.place(keys), dotted(keys), message, others)
 
 
 def dotted(keys: Where) -> str:
