@@ -34,6 +34,8 @@ WIDEST_DEFOCUS = 40
 """Tables either side of the focus: what is further out of focus is taken for as far."""
 WHITENING = 0.03
 """Share of the pulse's largest power density below which ranging flattens it no more (`ranging.range_profiles`)."""
+SHIFTED = 0.05
+"""Of 1/bandwidth: by how much pulses that motion makes longer may be sooner or later without a word."""
 FAINT = 1e-4
 """Of the power of all paths of a snap, target and way that the faintest may bring together, and are left out: 40 dB
 under echoes of which the loudest 25 dB are picked."""
@@ -110,9 +112,9 @@ def attribution(
     """
     elements, width = listening.elements, band.high - band.low
     gate, reach = GATE / width, elements.aperture / listening.sound_speed
-    clock = _clock(arrivals, listening.clock, gate)
-    moment = clock + late
-    longer = kernels.largest(arrivals.corner_delays)
+    clock, doppler = _clock(arrivals, listening.clock, gate)
+    stretch, shift = _stretches(arrivals, doppler, band)
+    moment, longer = clock + late, kernels.largest(arrivals.corner_delays) + shift
     slowness = listening.sound_speed / arrivals.sound_speed
     across = gate + reach * kernels.farthest(arrivals.direction, slowness, beam)
     window = np.array([[-1.0], [1.0]]) * (across + longer.max(initial=0.0))
@@ -148,7 +150,7 @@ def attribution(
         longer[rows],
         group,
         arrivals.direct[example],
-        _spectra(arrivals, rows, longer > 0.0, elements, fine),
+        _spectra(arrivals, rows, stretch, elements, fine),
         _matched(fine)[groups[1]],
         pulse,
         fine.frequency,
@@ -178,19 +180,38 @@ def _loud(power: Floats, code: Ints) -> Bools:
     return loud
 
 
-def _clock(arrivals: Arrivals, clock: float, gate: float) -> float:
-    """When (s) the direct pulse that delays are counted from arrives: as traced, where one does at that time."""
+def _clock(arrivals: Arrivals, clock: float, gate: float) -> tuple[float, float]:
+    """When (s) the direct pulse that delays are counted from arrives, and its Doppler: as traced, where one does at
+    that time."""
     rows = np.flatnonzero(arrivals.direct)
-    direct = arrivals.delay[rows[(arrivals.surface[rows] == 0) & (arrivals.bottom[rows] == 0)]]
-    if not len(direct):
-        return clock
-    near = float(direct[np.argmin(np.abs(direct - clock))])
-    return near if abs(near - clock) < gate else clock
+    rows = rows[(arrivals.surface[rows] == 0) & (arrivals.bottom[rows] == 0)]
+    if not len(rows):
+        return clock, 0.0
+    near = rows[np.argmin(np.abs(arrivals.delay[rows] - clock))]
+    heard, doppler = float(arrivals.delay[near]), float(arrivals.doppler[near])
+    return (heard, doppler) if abs(heard - clock) < gate else (clock, 0.0)
 
 
-def _spectra(arrivals: Arrivals, rows: Ints, wide: Bools, elements: Elements, band: Band) -> Complexes:
-    """Spectra (path, bin) that elements hear of some paths (path,), over that of the snap at 1 m, without delay; wide
-    (path of all,): whose facets are heard for some time."""
+def _stretches(arrivals: Arrivals, doppler: float, band: Band) -> tuple[Floats, Floats]:
+    """By what part (path,) pulses last longer than the direct one, of this Doppler; and by how much (path,) s they are
+    ranged sooner or later for it, at the most: where that is nothing, 0."""
+    loud = band.weight > WHITENING * band.weight.max(axis=1, keepdims=True)
+    late = np.gradient(band.frequency * band.late, band.frequency, axis=1)
+    by_stretch = np.where(loud, np.abs(late), 0.0).max(axis=1)
+    stretch = arrivals.doppler - doppler
+    shift = np.abs(stretch) * by_stretch[arrivals.snap]
+    told = shift.max(initial=0.0) * (band.high - band.low) > SHIFTED
+    return (stretch, shift) if told else (np.zeros(len(shift)), np.zeros(len(shift)))
+
+
+def _spectra(arrivals: Arrivals, rows: Ints, stretch: Floats, elements: Elements, band: Band) -> Complexes:
+    """Spectra (path, bin) that elements hear of some paths (path,), over that of the snap at 1 m, without delay;
+    stretch (path of all,): by what part pulses last longer.
+
+    P(f (1 + s)) = P(f) exp(-2 pi i s f tau), tau the group delay of the pulse: where frequencies come one after the
+    other a shift of frequency is one of time. Source: Woodward (1953), Probability and Information Theory, with
+    Applications to Radar, chapter 7.
+    """
     amplitude = arrivals.amplitude[rows]
     if arrivals.occluded.shape[1]:  # of the array, as much as sees it
         occluded = arrivals.occluded[rows]
@@ -203,6 +224,9 @@ def _spectra(arrivals: Arrivals, rows: Ints, wide: Bools, elements: Elements, ba
     if delay_std.any():
         decay -= np.outer(0.5 * (2.0 * np.pi * delay_std) ** 2, frequency**2)
     spectra = kernels.path_spectra(amplitude, arrivals.phase[rows], np.exp(decay), sine, frequency)
+    if stretch.any():
+        spectra *= np.exp(-2j * np.pi * stretch[rows, None] * (frequency * band.late)[arrivals.snap[rows]])
+    wide = arrivals.corner_delays.any(axis=1)
     shaped = (arrivals.coherent | wide | (arrivals.coherent_fraction > 0.0))[rows]
     if shaped.any():
         echo = arrivals.select(rows[shaped])

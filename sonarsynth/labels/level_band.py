@@ -25,6 +25,7 @@ class Band:
     high: float  # Hz
     energy: Floats  # (snap, slice) Pa2 s of the filtered snap at 1 m, at positive frequencies, in equal slices
     relative: Floats  # (slice,) absorption in the middle of each over that at the centre of the band, less one
+    late: Floats  # (snap, slice) s: group delay of the filtered snap, after the time that delays of paths count from
 
     @property
     def frequency(self) -> Floats:
@@ -42,8 +43,11 @@ class Band:
     def sliced(self, wanted: float) -> Band:
         """The same band in as many slices as are wanted, or somewhat more; no more than it has."""
         count = next((n for n in DIVISORS if n >= wanted), SLICES)
-        energy = self.energy.reshape(len(self.energy), count, SLICES // count).sum(axis=2)
-        return Band(self.low, self.high, energy, self.relative.reshape(count, SLICES // count).mean(axis=1))
+        slices = (len(self.energy), count, SLICES // count)
+        energy = self.energy.reshape(slices).sum(axis=2)
+        weight = self.weight.reshape(slices) + np.finfo(float).tiny
+        late = (weight * self.late.reshape(slices)).sum(axis=2) / weight.sum(axis=2)
+        return Band(self.low, self.high, energy, self.relative.reshape(slices[1:]).mean(axis=1), late)
 
     @property
     def pulse(self) -> float:

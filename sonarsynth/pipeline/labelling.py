@@ -15,7 +15,7 @@ from sonarsynth.products import Arrivals, LinkBudget, PointCloud, PointLabels, S
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import snap_gains
-from sonarsynth.signals.isolated_paths import energy_in_slices, measured_levels
+from sonarsynth.signals.isolated_paths import energy_in_slices, lateness_in_slices, measured_levels
 from sonarsynth.state import Emission
 
 
@@ -35,7 +35,8 @@ def band_of(plan: Plan, snaps: tuple[Emission, ...]) -> Band:
     sonar = plan.scene.sonar
     alike = np.array([energy_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)
     energy = alike * snap_gains(snaps)[:, None] ** 2
-    band = Band(sonar.band.low, sonar.band.high, energy, np.zeros(SLICES))
+    late = np.array([lateness_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)
+    band = Band(sonar.band.low, sonar.band.high, energy, np.zeros(SLICES), late)
     return replace(band, relative=relative_absorption(plan.absorption, band.frequency, sonar.band.centre))
 
 

@@ -16,6 +16,7 @@ from scipy.fft import ifft, irfft, next_fast_len, rfft
 from sonarsynth.conventions import Complexes, Floats, Ints, direction
 from sonarsynth.equations.arrays.apertures import live_gain
 from sonarsynth.equations.arrays.gates import fast_length
+from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage, Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
@@ -175,10 +176,7 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
     samples = fast_length(window.samples)
     wave = direct_spectrum(received.direct, received.estimates, elements, sonar, samples, received.pulse)
     wave = wave[lowest : lowest + len(f)]
-    density = np.abs(wave) ** 2
-    low, high = _own_band(f, density, spacing, sonar.band)
-    taper = np.sin(np.pi * np.clip((f - low) / (high - low), 0.0, 1.0)) ** 2
-    matched = wave.conj() * taper / (density + WHITENING * density.max()) if density.max() > 0 else 0 * wave
+    taper, matched = matched_filter(f, wave, spacing, sonar.band)
     share = np.abs(wave * matched) + np.finfo(float).tiny
     share /= share.sum()
     length = next_fast_len(OVERSAMPLING // 2 * len(f))
@@ -188,8 +186,8 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
     echoes = EchoFilter(received, share, matched, length, min(int(window.duration / step) + 1, 2 * length))
     spectra, power = echoes.profiles(u)
     spread = np.sum(taper**2)
-    centre = f @ taper**2 / spread
-    beta = np.sqrt(max((f - centre) ** 2 @ taper**2 / spread, spacing**2))
+    centre = float(f @ taper**2 / spread)
+    beta = np.sqrt(max(float((f - centre) ** 2 @ taper**2 / spread), spacing**2))
     return Profiles(
         row=row,
         column=column,
@@ -203,6 +201,29 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
         moments=_moments(f, share, np.abs(matched) ** 2, spacing),
         filter=echoes,
     )
+
+
+def matched_filter(f: Floats, wave: Complexes, spacing: float, band: Band) -> tuple[Floats, Complexes]:
+    """Taper (bin,) of a pulse's own part of the band, and what takes its waveform out of echoes (bin,): of its spectrum
+    (bin,) at frequencies (bin,) so far (Hz) apart."""
+    density = np.abs(wave) ** 2
+    low, high = _own_band(f, density, spacing, band)
+    taper = np.asarray(np.sin(np.pi * np.clip((f - low) / (high - low), 0.0, 1.0)) ** 2)
+    return taper, wave.conj() * taper / (density + WHITENING * density.max()) if density.max() > 0 else 0 * wave
+
+
+def stretched_echo(f: Floats, wave: Complexes, stretched: Complexes, band: Band) -> tuple[float, float]:
+    """How late (s) the profile of an echo is largest, and its power there over that of one like the direct pulse.
+
+    wave, stretched (bin,): spectra of the direct pulse, and of an echo that motion made longer, at frequencies (bin,).
+    """
+    _, matched = matched_filter(f, wave, f[1] - f[0], band)
+    count = 8 * next_fast_len(len(f))
+    plain, profile = (np.abs(ifft(of * matched, count)) for of in (wave, stretched))
+    top = int(profile.argmax())
+    offset, height = parabola(*profile[[top - 1, top, (top + 1) % count]])
+    late = top + float(offset) - count * (top > count / 2)
+    return late / (count * (f[1] - f[0])), float((height / plain[0]) ** 2)
 
 
 def _own_band(f: Floats, density: Floats, spacing: float, band: Band) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.fft import rfft
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import POINT, Sonar
 from sonarsynth.signals.array_paths import array_paths, reach
@@ -37,14 +37,36 @@ STRETCH_TOLERANCE = 1e-6
 @lru_cache(maxsize=64)
 def energy_in_slices(waveform: Waveform, sonar: Sonar, count: int) -> Floats:
     """Energy (slice,) in Pa2 s, at positive frequencies, of the filtered snap at 1 m in equal slices of the band."""
-    fs, band = sonar.sampling_frequency, sonar.band
-    samples = fast_length(int(np.ceil(2.0 * sum(pulse_support(at_longest(waveform), sonar.antialias)) * fs)))
-    f, spectrum = pulse_spectrum(waveform, sonar.antialias, fs, samples)
+    f, spectrum = whole_spectrum(waveform, sonar)
     power = np.abs(spectrum) ** 2
-    up_to = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) * (fs / samples)])
-    energy = np.diff(np.interp(np.linspace(band.low, band.high, count + 1), f, up_to))
-    energy.setflags(write=False)
-    return np.asarray(energy)
+    return _in_slices(f, 0.5 * (power[1:] + power[:-1]), sonar, count)
+
+
+@lru_cache(maxsize=64)
+def lateness_in_slices(waveform: Waveform, sonar: Sonar, count: int) -> Floats:
+    """Group delay (slice,) in s, after its time 0, of the filtered snap in equal slices of the band, by its energy."""
+    f, spectrum = whole_spectrum(waveform, sonar)
+    beside = spectrum[:-1] * spectrum[1:].conj()  # turned by the delay from bin to bin
+    late, power = (
+        _in_slices(f, np.angle(beside) * np.abs(beside), sonar, count),
+        _in_slices(f, np.abs(beside), sonar, count),
+    )
+    return np.asarray(late / (2.0 * np.pi * f[1] * np.where(power > 0.0, power, np.inf)))
+
+
+def whole_spectrum(waveform: Waveform, sonar: Sonar, doppler: float = 0.0) -> tuple[Floats, Complexes]:
+    """`pulse_spectrum` of a snap that lasts 1 + doppler times as long, in a window with room for all of it."""
+    fs = sonar.sampling_frequency
+    samples = fast_length(int(np.ceil(2.0 * sum(pulse_support(at_longest(waveform), sonar.antialias)) * fs)))
+    return pulse_spectrum(waveform, sonar.antialias, fs, samples, doppler)
+
+
+def _in_slices(f: Floats, density: Floats, sonar: Sonar, count: int) -> Floats:
+    """Integrals (slice,) over equal slices of the band of a density (bin - 1,) between frequencies (bin,)."""
+    up_to = np.concatenate([[0.0], np.cumsum(density) * f[1]])
+    total = np.diff(np.interp(np.linspace(sonar.band.low, sonar.band.high, count + 1), f, up_to))
+    total.setflags(write=False)
+    return np.asarray(total)
 
 
 def measured_levels(

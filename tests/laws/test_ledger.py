@@ -33,7 +33,7 @@ LOSSES = ("transmission_loss_out", "transmission_loss_in", "absorption_loss", "b
 def the_band(snaps: int = 2) -> Band:
     """That of SONAR, with sea water."""
     energy = np.array([energy_in_slices(waveform(MODEL), SONAR, SLICES)] * snaps).reshape(-1, SLICES)
-    band = Band(25e3, 85e3, energy, np.zeros(SLICES))
+    band = Band(25e3, 85e3, energy, np.zeros(SLICES), 0.0 * energy)
     return replace(band, relative=relative_absorption(absorption, band.frequency, 55e3))
 
 

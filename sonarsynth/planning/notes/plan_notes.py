@@ -12,6 +12,7 @@ from sonarsynth.planning.measured.lost_echoes import lost_echoes
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.clipping_notes import clipping_notes
 from sonarsynth.planning.notes.formula_validity import validity
+from sonarsynth.planning.notes.motion_rows import stretch_notes
 from sonarsynth.planning.notes.population_notes import once, population_notes
 from sonarsynth.planning.notes.source_notes import (
     assumed_speed_notes,
@@ -61,6 +62,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         lines.append("reflections of the snap itself enter the image: processing.cancelling removes them")
     if plan.products & OF_BEAMS:
         lines += view_notes(noted(looks)) + steering_notes(noted(looks))
+        lines += stretch_notes(noted(looks), recipe.accuracy.range_m)
     lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene) + clipping_notes(plan, looks)
     if plan.sizes["emission"] and plan.products & OF_BEAMS:
         lines += unlocated(scene) or lobe_notes(noted(looks)) + assumed_speed_notes(noted(looks))
