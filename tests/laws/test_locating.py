@@ -11,6 +11,7 @@ from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.environment.sea import Profile
 from sonarsynth.environment.sound_speed import mean_gradient
 from sonarsynth.equations.arrays.spherical_wave import envelope_peak, tangent_plane
+from sonarsynth.equations.arrays.wavefront_errors import bending_covariance
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.motion import Track
@@ -18,7 +19,7 @@ from sonarsynth.planning.notes.source_notes import OBLIQUE, oblique_error
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.refraction import first_rays
-from sonarsynth.ranging.location.source_position import ACCEPTED, UNRESOLVED, bending_covariance
+from sonarsynth.ranging.location.source_position import ACCEPTED, UNRESOLVED
 from sonarsynth.ranging.location.triggered import Triggered
 from sonarsynth.receiver import Band, PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.state import Receiver, Survey, Trigger

@@ -82,7 +82,7 @@ def test_a_source_on_the_bottom_is_heard_with_its_reflection(speed: float, densi
         heard = np.real(factor[:, None] * hilbert(signals.pressure.astype(float), axis=1))
         signals = replace(signals, pressure=heard.astype(np.float32))
         for reflects in (True, False):
-            found = locate(signals, 40.0 - source[2], method=SensorDelays(bottom_reflects=reflects))
+            found = locate(signals, 40.0 - source[2], method=SensorDelays(reflected=reflects))
             error = found.position[0] - source
             off.append(np.sqrt(error @ np.linalg.solve(found.position_covariance[0], error)))
     assert max(off[::2]) < 3.0

@@ -83,7 +83,7 @@ def locate(
     gradient: float = 0.0,
     kink: float = 0.0,
     on_bottom: bool = True,
-    bottom_reflects: bool = False,
+    reflected: bool = False,
 ) -> SourceEstimates:
     """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`. bottom: its depth (m).
 
@@ -106,7 +106,7 @@ def locate(
     quiet = quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
     velocity = np.zeros(3) if receiver.track is None else receiver.pose.turn_to_body(receiver.track.velocity)
     knowledge = SonarKnowledge(
-        elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, bottom_reflects, velocity
+        elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, reflected, velocity
     )
     track, candidates = loud.track.copy(), Candidates(knowledge)
     for _ in range(4 * snaps):

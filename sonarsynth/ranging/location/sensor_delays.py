@@ -36,16 +36,17 @@ class SensorDelays(LocatingMethod):
     """Whether sources are known to be on the bottom. True: its depth is used where the wavefront agrees;
     false (pingers, vehicles, fish): places are those of the wavefront alone. Left out: as the sources of the recipe."""
 
-    bottom_reflects: bool | None = None
-    """Whether a source on the bottom is heard with its reflection there, which turns its phase by its angle and so
-    moves where the source is heard, up or down, by about half a wavelength (Goos and Haenchen 1947): predicted errors
-    then hold that. Left out: as the paths of the recipe."""
+    reflected: bool | None = None
+    """Whether sources are heard with their reflections at surface and bottom: predicted errors then hold what these
+    do. That of a source on the bottom turns the phase by its angle and so moves where it is heard, up or down, by about
+    half a wavelength (Goos and Haenchen 1947); a source that is elsewhere, and so close to surface or bottom that its
+    pulse overlaps the reflection, is heard between it and its image. Left out: as the paths of the recipe."""
 
     def resolve(self, demand: Demand) -> tuple[SensorDelays, float]:
         """With what the recipe says of its sources and paths, where this is left out."""
         on_bottom = not demand.off_bottom if self.on_bottom is None else self.on_bottom
-        reflects = demand.reflected if self.bottom_reflects is None else self.bottom_reflects
-        return replace(self, on_bottom=on_bottom, bottom_reflects=reflects), UNSTATED
+        reflects = demand.reflected if self.reflected is None else self.reflected
+        return replace(self, on_bottom=on_bottom, reflected=reflects), UNSTATED
 
     def nearest(self, elements: Elements) -> float:
         """As `LocatingMethod.nearest`: there is no wavefront over an array that its source is in."""
@@ -78,5 +79,5 @@ class SensorDelays(LocatingMethod):
         return locate(
             signals, receiver, survey.bottom, snaps, bend=bend, gradient=0.0 if bend else gradient,
             kink=kink(profile, own, aperture) if aperture else 0.0, on_bottom=self.on_bottom is not False,
-            bottom_reflects=self.bottom_reflects is True,
+            reflected=self.reflected is True,
         )  # fmt: skip

@@ -10,6 +10,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, azimuth_elevation
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, envelope_peak
+from sonarsynth.equations.arrays.wavefront_errors import bending_covariance, image_covariance
 from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS, SourceEstimates
 from sonarsynth.ranging.location.pulse_times import Pulse, half_length, lag_variance
@@ -74,7 +75,7 @@ class SonarKnowledge:
     quiet: float  # (Pa s)^2: power in a bin of the noise at a sensor
     on_bottom: bool = True  # whether sources may be taken to be on the bottom, where the wavefront agrees
     kink: float = 0.0  # 1/s: change of the gradient of the sound speed over the array
-    bottom_reflects: bool = False  # whether a source on the bottom is heard with its reflection there
+    reflected: bool = False  # whether sources are heard with their reflections at surface and bottom
     velocity: Floats = field(default_factory=lambda: np.zeros(3))  # (xyz) m/s of the array, sonar frame
 
 
@@ -86,24 +87,6 @@ class Fix:
     curvature: float
     covariance: Floats  # (3, 3) of (along tangents, curvature)
     used: bool  # whether the bottom was
-
-
-def bending_covariance(
-    by_angle: Floats, slope: float, distance: float, gradient: float, sound_speed: float, aperture: float
-) -> Floats:
-    """Covariance (4, 4) of a wavefront's parameters where rays are taken for straight in a gradient (1/s).
-
-    A ray of grazing angle a is an arc of curvature g cos a/c: over a distance r it arrives r g cos a/(2c) beside its
-    chord, in the vertical plane. Where the gradient is that of a layer on the way, rays spread there by more or less,
-    and the curvature of the wavefront over the array is off by up to g cos^2 a/(c sin a), half of it on the mean; where
-    it is the same all the way, by g sin a/(2c): together g/(2c sin a), and never more than that of a source in the
-    array (1/aperture). slope is sin a; by_angle (2,) its derivatives along the tangents, of size cos a.
-    """
-    half = 0.5 * gradient / sound_speed
-    covariance = np.zeros((4, 4))
-    covariance[:2, :2] = np.outer(by_angle, by_angle) * (half * distance) ** 2
-    covariance[2, 2] = (half / max(abs(slope), half * aperture)) ** 2
-    return covariance
 
 
 def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefront | None = None) -> SourceFix:
@@ -118,7 +101,7 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
     fall = -knowledge.bottom_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
     slope, by_angle = float(pose.rotation[2] @ wave.direction), wave.tangents @ pose.rotation[2]
     from_depth = fall / slope if slope * fall > 0 else np.nan
-    full = _straight_covariance(wave, timing, by_angle / from_depth, knowledge)
+    full = _straight_covariance(wave, timing, by_angle / from_depth, pulse.window, knowledge)
     tilt = by_angle * (KINKED * knowledge.kink * elements.aperture / sonar.assumed_sound_speed)
     straight, spread = full, full[:2, :2] + np.outer(tilt, tilt)
     from_pole = float(np.hypot(*bent.direction[:2]))  # its azimuth is anybody's guess where it may be beyond
@@ -161,21 +144,28 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
     )
 
 
-def _straight_covariance(wave: Wavefront, timing: Floats, by_height: Floats, knowledge: SonarKnowledge) -> Floats:
+def _straight_covariance(
+    wave: Wavefront, timing: Floats, by_height: Floats, window: float, knowledge: SonarKnowledge
+) -> Floats:
     """Covariance (4, 4) of a wavefront's parameters along straight rays, from that of its delays.
 
     by_height (2,): change of its tangents with the height of a source on the bottom, 1/m; NaN where that is not seen.
+    window: length (s) of what was cut out about the pulse.
     """
-    sonar = knowledge.sonar
+    sonar, up, own = knowledge.sonar, knowledge.pose.rotation[2], float(knowledge.pose.position[2])
     full = timing + np.outer(wave.by_sound_speed, wave.by_sound_speed) * sonar.sound_speed_error**2
     if not np.isfinite(full[2, 2]):  # too few sensors to tell the curvature: anything outside the array
         full[2, 2] = 1 / knowledge.elements.aperture**2
-    if knowledge.on_bottom and knowledge.bottom_reflects and np.isfinite(by_height).all():
+    if knowledge.on_bottom and knowledge.reflected and np.isfinite(by_height).all():
         moved = by_height * (REFLECTED * sonar.assumed_sound_speed / sonar.band.centre)
         full[:2, :2] += np.outer(moved, moved)
-        height = knowledge.elements.position[knowledge.elements.gain != 0] @ knowledge.pose.rotation[2]
+        height = knowledge.elements.position[knowledge.elements.gain != 0] @ up
         bent = 0.5 * (PHASE_SLOPE * float(np.std(height)) * float(np.linalg.norm(by_height))) ** 2
         full[3, 3] += (bent / (2.0 * np.pi * sonar.band.centre)) ** 2
+    elif knowledge.reflected and not knowledge.on_bottom:
+        c, depth, seen = sonar.assumed_sound_speed, knowledge.bottom_depth, (wave.tangents @ up, up @ wave.direction)
+        for height in (-own, -depth - own):
+            full = full + image_covariance(*seen, wave.curvature, full, height, 0.5 * window * c, depth, c)
     return full
 
 
