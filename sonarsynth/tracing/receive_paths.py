@@ -12,6 +12,7 @@ import numpy as np
 from sonarsynth.casting.ray_casting import OFFSET, clear_of_own_body
 from sonarsynth.columns import Columns, alike, picked, rows_of
 from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth
+from sonarsynth.description import FieldError
 from sonarsynth.equations.kernels.placing import placed
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, TOLERANCE
 from sonarsynth.equations.scattering.lobes import dot
@@ -175,10 +176,11 @@ def rays_to_centre(
     chosen: Callable[[Paths], Bools] = usable,
 ) -> ReceivePaths:  # fmt: skip
     """Rays from points (point, xyz) in the world to the array centre, sorted by point: all, or those that are chosen
-    (path,) of the usable ones. Raises ValueError for an array that has moved out of the water."""
+    (path,) of the usable ones. Raises FieldError for an array that has moved out of the water."""
     if receiver.track is not None and not receiver.track.still:
         down = depth(receiver.pose.to_world(receiver.elements.position))
-        _require_between("the array, where it hears sound,", float(down.min()), float(down.max()), medium.depth)
+        ends, path = (float(down.min()), float(down.max())), ("scene", "trajectory", "sonar")
+        _require_between(path, "the array, where it hears sound,", *ends, medium.depth)
     end = alike(receiver.pose.position, len(point))
     paths = propagation.connect(medium.profile, medium.depth, point, end)
     paths = paths.select(picked(usable(paths) & chosen(paths)))
@@ -207,19 +209,20 @@ def rays_to_centre(
 
 
 def require_in_water(bodies: tuple[PlacedTarget, ...], bottom: float) -> None:
-    """Raises ValueError for a body that reaches out of water of that depth (m)."""
-    for body in bodies:
+    """Raises FieldError for a body that reaches out of water of that depth (m)."""
+    for number, body in enumerate(bodies):
         highest, deepest = bottom, 0.0
         for rows in in_blocks(len(body.mesh.vertices)):
             down = depth(body.pose.to_world(body.mesh.vertices[rows]))
             highest, deepest = float(down.min(initial=highest)), float(down.max(initial=deepest))
-        _require_between(f"target '{body.name}'", highest, deepest, bottom)
+        path = ("scene", "world", "targets", number, "motion")
+        _require_between(path, f"target '{body.name}'", highest, deepest, bottom)
 
 
-def _require_between(what: str, highest: float, deepest: float, bottom: float) -> None:
+def _require_between(path: tuple[str | int, ...], what: str, highest: float, deepest: float, bottom: float) -> None:
     if highest < -TOLERANCE or deepest > bottom + TOLERANCE:
         where = "above the surface" if highest < -TOLERANCE else "below the bottom"
-        raise ValueError(f"{what} reaches {where} ({highest:g} to {deepest:g} m in {bottom:g} m)")
+        raise FieldError(path, f"{what} reaches {where} ({highest:g} to {deepest:g} m in {bottom:g} m)")
 
 
 def facets_of(

@@ -182,7 +182,9 @@ def test_a_plan_says_how_far_a_sonar_turns_while_it_hears_noise() -> None:
 def test_a_sonar_that_would_hear_out_of_the_water_is_refused(own) -> None:
     """In the water when the snap sounds, and at its instant."""
     made = plan(reflected(STAYS, own), ("signals",), Choices())
-    with pytest.raises(ValueError, match="the array, where it hears sound, reaches above the surface"):
+    with pytest.raises(
+        FieldError, match=r"trajectory\.sonar: the array, where it hears sound, reaches above the surface"
+    ):
         trace(context_of(made, made.recipe.frame(0)[1]), made.propagation)
 
 
