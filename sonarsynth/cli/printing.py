@@ -177,8 +177,6 @@ def plan_report(plan: Plan, prediction: Prediction) -> None:
     for line in _spanned(plan.as_json()):
         out.print(line, markup=False)
     out.print(", ".join(counted(count, name) for name, count in plan.sizes.items()))
-    if plan.recalled:
-        out.print(plan.recalled, markup=False)
     p = prediction
     out.print(
         f"predicted: {duration(p.seconds)} for {counted(p.frames, 'frame')} with {counted(p.workers, 'worker')}, "

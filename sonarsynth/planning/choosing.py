@@ -15,7 +15,6 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, evenly
 from sonarsynth.description.method import Demand
-from sonarsynth.planning import kept_choices
 from sonarsynth.planning.choices import OF_BEAMS, OWN_VIEW, Choices
 from sonarsynth.planning.measured.image_errors import SAFETY, beamformer
 from sonarsynth.planning.measured.ray_bending import ranging_error
@@ -67,17 +66,13 @@ def choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     except (OSError, ValueError):  # a file that is not there, which what reads it says better
         return _choose(plan, looks)
     name = repr(key)
-    found, recalled = _CHOSEN.get(name), ""
-    if found is None and (found := kept_choices.read(name)) is not None:
-        recalled = f"choices and their errors were measured before, and read from {kept_choices.folder()}"
-    if found is None:
+    if name not in _CHOSEN:
         chosen = _choose(plan, looks)
-        found = chosen.choices, chosen.errors
-        kept_choices.keep(name, *found)
-    _CHOSEN[name] = found
+        _CHOSEN[name] = chosen.choices, chosen.errors
+    choices, errors = _CHOSEN[name]
     while len(_CHOSEN) > KEPT:
         _CHOSEN.popitem(last=False)
-    return replace(plan, choices=found[0], errors=found[1], recalled=recalled)
+    return replace(plan, choices=choices, errors=errors)
 
 
 def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:

@@ -90,7 +90,6 @@ class Plan:
     shard_frames: int = 1
     thinning: float = 0.0  # error of signals, relative, of the layers that stand for a measured profile
     sequence: int = 0  # whose scene, profile and propagation these are
-    recalled: str = ""  # where the choices were read from, as an earlier process made them, in words
     odds: str = ""  # of finding targets in frames that were tried; "": none were, or no target is in view
     sources: tuple[Source, ...] | None = None  # in the place of the recipe's (`other_sources`); None: those
 
@@ -216,8 +215,6 @@ class Plan:
     def _printed(self) -> tuple[str, tuple[Stage, ...], tuple[Omission, ...], list[str]]:
         lines = [f"note: {warning}" for warning in self.warnings]
         lines.append(", ".join(counted(count, name) for name, count in self.sizes.items()))
-        if self.recalled:
-            lines.append(self.recalled)
         if self.odds:
             lines.append(f"in frames that were tried: {self.odds}")
         elif "image" in self.products and self.scene.sound_parts:

@@ -6,7 +6,6 @@ that between the last two sizes of each: 1 is in proportion.
 
 from __future__ import annotations
 
-import os
 import time
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 from benchmarks.build import one
 from benchmarks.timing import RECIPE, gemm, markdown
 from sonarsynth import planning
-from sonarsynth.planning import choosing, kept_choices
+from sonarsynth.planning import choosing
 from sonarsynth.recipe import reading
 
 FRAMES = range(30, 35)
@@ -57,7 +56,6 @@ def measured(sets: tuple[str, ...]) -> dict[str, Any]:
     """Sizes of a recipe, seconds of planning, and ms of each stage of a frame, the median of a few."""
     recipe = reading.load(RECIPE, list(sets))
     choosing._CHOSEN.clear()  # what the process remembers of another plan
-    os.environ[kept_choices.PLACE] = ""  # and what is kept on disk
     began = time.process_time()
     plan = planning.plan(recipe, {"image", "cloud"})
     planned = time.process_time() - began
