@@ -239,20 +239,17 @@ def look(
 
 
 def classify_cones(
-    bodies: tuple[PlacedTarget, ...], apex: Floats, axis: Floats, slope: Floats, reach: Floats, far: Floats,
-    own: Ints | None = None,
-) -> Ints:  # fmt: skip
+    bodies: tuple[PlacedTarget, ...], apex: Floats, axis: Floats, slope: Floats, reach: Floats, far: Floats
+) -> Ints:
     """What is certain of cones (cone,) among bodies: EMPTY of them up to `reach` (m) along the axis, CLOSED by one of
     them nearer than `far` (m), or UNKNOWN.
 
-    apex, axis: (cone, xyz) world, axes of unit length; slope (cone,): radius of the cone over the distance along it;
-    own (cone,): the body that surely is in none of it (`clear_of_own_body`), -1 for none.
+    apex, axis: (cone, xyz) world, axes of unit length; slope (cone,): radius of the cone over the distance along it.
     Holds for any line that stays in the cone, bent or not, from its apex to where it ends.
     """
     verdicts = np.full(len(apex), EMPTY)
     for rows, number in nearest_first(bodies, apex):
-        body, met = bodies[number], verdicts[rows] != CLOSED
-        open_cones = rows.start + np.flatnonzero(met if own is None else met & (own[rows] != number))
+        body, open_cones = bodies[number], rows.start + np.flatnonzero(verdicts[rows] != CLOSED)
         mesh = casting_mesh(body.mesh)
         start = (body.pose.to_body(apex[open_cones]) - mesh.centre) / mesh.size
         verdict = verdicts[open_cones]

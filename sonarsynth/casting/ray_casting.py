@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.columns import alike
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Int32s, Ints
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh
@@ -72,16 +71,10 @@ class CastingMesh:
 
         return facet_tree.tree(self.vertices, self.faces)
 
-    @cached_property
-    def horizon(self) -> Floats:
-        """Sine (facet,) of the elevation over which the mesh is not seen from each facet, NaN as long as nobody asked;
-        see `horizons`."""
-        return np.full(len(self.faces), np.nan)
-
     def times(self, factor: float) -> CastingMesh:
         """That of a copy so many times as large: what is known of the mesh in units of its size serves both."""
         copy = replace(self, centre=self.centre * factor, size=self.size * factor)
-        vars(copy).update(around=self.around, tree=self.tree, horizon=self.horizon)
+        vars(copy).update(around=self.around, tree=self.tree)
         return copy
 
     def cast(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
@@ -204,45 +197,16 @@ def first_hit(mesh: Mesh, origin: Floats, direction: Floats, far: float = np.inf
     return facet, distance * ready.size
 
 
-def clear_of_own_body(
-    bodies: tuple[PlacedTarget, ...], owner: Ints, facet: Ints, direction: Floats, slope: Floats | float = 0.0
-) -> Ints:
-    """Body (ray,) that rays from the middles of facets (owner and facet of each) in directions (ray, xyz), world, of
-    length one, come from and surely do not meet again; -1 where that is not certain. Nor do others of a cone about each
-    of them, of some slope (ray,)."""
-    slope = alike(slope, len(owner)) if np.ndim(slope) == 0 else np.asarray(slope)
-    own = np.full(len(owner), NO_TARGET)
-    for number, body in enumerate(bodies):
-        rows = slice(None) if len(bodies) == 1 and (owner == 0).all() else np.flatnonzero(owner == number)
-        far = clear_of_body(body.mesh, facet[rows], body.pose.turn_to_body(direction[rows]), slope[rows])
-        own[rows] = np.where(far, number, NO_TARGET)
-    return own
-
-
-def clear_of_body(mesh: Mesh, facet: Ints, direction: Floats, slope: Floats) -> Bools:
-    """Which rays (ray,) from the middles of facets in directions (ray, xyz), of length one, in the frame of the mesh,
-    surely do not meet it again, nor do others of a cone about each of them, of that slope (ray,)."""
-    from sonarsynth.casting import horizons
-
-    ready = casting_mesh(mesh)
-    tables = mesh.normal, *ready.tree, ready.vertices, ready.faces, ready.horizon
-    return np.asarray(horizons.clear_of_body(facet, direction, slope, *tables))
-
-
 def met_again(mesh: Mesh, facet: Ints, offset: float, direction: Floats, distance: Floats) -> Bools:
     """Whether rays (ray,) from the middles of facets, moved off them by `offset` (m), in directions (ray, xyz), of
     length one, in the frame of the mesh, meet it again within distances (ray,) m."""
-    met = ~clear_of_body(mesh, facet, direction, alike(0.0, len(facet)))
-    rays, ready = np.flatnonzero(met), casting_mesh(mesh)
-    rows = facet[rays]
-    start = (mesh.centroid[rows] + offset * mesh.normal[rows] - ready.centre) / ready.size
-    met[rays] = ready.within(start, direction[rays], distance[rays] / ready.size, any_hit=True)[0] >= 0
-    return met
+    ready = casting_mesh(mesh)
+    start = (mesh.centroid[facet] + offset * mesh.normal[facet] - ready.centre) / ready.size
+    return ready.within(start, direction, distance / ready.size, any_hit=True)[0] >= 0
 
 
-def occluded(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, own: Ints | None = None) -> Bools:
-    """Whether any body stands in each straight segment from start (segment, xyz) to end (segment, xyz) in the world;
-    own (segment,): the body that surely does not (`clear_of_own_body`), -1 for none.
+def occluded(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats) -> Bools:
+    """Whether any body stands in each straight segment from start (segment, xyz) to end (segment, xyz) in the world.
 
     A segment that starts on a facet must be moved off it (`OFFSET`). Raises ValueError for ends that are not finite.
     """
@@ -254,13 +218,12 @@ def occluded(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, own: 
     hidden = np.zeros(len(a), bool)
     origin, heading = np.empty((2, *a.shape))
     far, segment = np.empty(len(a)), np.empty(len(a), np.int64)
-    for number, body in enumerate(bodies):
+    for body in bodies:
         if not len(body.mesh.faces):
             continue
         ready, pose = casting_mesh(body.mesh), body.pose
-        skip = hidden if own is None else hidden | (own == number)
         count = intersections.into_mesh(
-            a, b, skip, pose.rotation, pose.position, ready.centre, ready.size, origin, heading, far, segment
+            a, b, hidden, pose.rotation, pose.position, ready.centre, ready.size, origin, heading, far, segment
         )
         if not count:
             continue

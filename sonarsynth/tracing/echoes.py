@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -242,8 +241,7 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     out = out.select(picked(out.spreading != 0.0)).merged()
     if array.ways is not None:
         out = out.select(np.isin(out.family, [way for way, _ in array.ways]))
-    own = facets.clear_of_own(bodies, out.facet, -out.arrival)
-    out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet), own)))
+    out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet))))
     for number, before in overlapping(bodies):
         owned = np.flatnonzero(facets.owner[out.facet] == number)
         of = out.facet[owned]
@@ -253,14 +251,12 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
 
 
 def _hides(
-    array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Emission, out: TransmitPaths, start: Floats,
-    own: Ints | None = None,
-) -> Bools:  # fmt: skip
-    """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz); own as of
-    `hidden`."""
+    array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Emission, out: TransmitPaths, start: Floats
+) -> Bools:
+    """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz)."""
     end = alike(snap.position, len(start))  # backwards: bodies are where a ray begins
-    stand_in = partial(hidden, bounces=out.bounces, turning=out.turning, own=own)
-    return stand_in(bodies, array.bending, start, end, -out.arrival, out.length)
+    ways = start, end, -out.arrival, out.length
+    return hidden(bodies, array.bending, *ways, bounces=out.bounces, turning=out.turning)
 
 
 def _turned(block: _EchoBlock, strongest: float) -> ArrayExpansion:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import OFFSET, clear_of_own_body
+from sonarsynth.casting.ray_casting import OFFSET
 from sonarsynth.columns import Columns, alike, picked, rows_of
 from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth
 from sonarsynth.description import FieldError
@@ -99,11 +99,7 @@ class Facets(Columns):
         normal = rows_of(self.normal, row)
         sideless = self.sideless
         normal = np.where(sideless[row, None], departure, normal) if sideless.any() else normal
-        return Starts(rows_of(self.clear, row), normal, self.owner[row], self.facet[row])
-
-    def clear_of_own(self, bodies: tuple[PlacedTarget, ...], row: Ints, direction: Floats) -> Ints:
-        """As `clear_of_own_body`, of straight paths to or from facets (row of each): direction (path, xyz) away."""
-        return clear_of_own_body(bodies, self.owner[row], self.facet[row], direction)
+        return Starts(rows_of(self.clear, row), normal)
 
     def lit(self, row: Ints, arrival: Floats) -> Bools:
         """Whether paths that arrive along (path, xyz) light facets (row of each): from their side, if they have one."""
@@ -118,20 +114,10 @@ class Facets(Columns):
 
 @dataclass(frozen=True, eq=False)
 class Starts(Columns):
-    """Where legs start; without normals, owners and facets: anywhere in the water."""
+    """Where legs start; without normals: anywhere in the water."""
 
     point: Floats  # (leg, xyz) m, world: clear of the facet that it is on
     normal: Floats | None = None  # (leg, xyz) of the side of it that the leg leaves on
-    owner: Ints | None = None  # (leg,) index into the bodies that are looked at
-    facet: Ints | None = None  # (leg,) index among those of its owner
-
-    def clear_of_own(
-        self, bodies: tuple[PlacedTarget, ...], direction: Floats, slope: Floats | float = 0.0
-    ) -> Ints | None:
-        """(leg,) as `clear_of_own_body`, of rays from there in directions (leg, xyz), and cones about them."""
-        if self.owner is None or self.facet is None:
-            return None
-        return clear_of_own_body(bodies, self.owner, self.facet, direction, slope)
 
 
 T = TypeVar("T", ReceivePaths, Facets)

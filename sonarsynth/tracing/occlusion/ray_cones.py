@@ -27,12 +27,10 @@ def hidden(
     *,
     bounces: Ints | None = None,
     turning: Ints | None = None,
-    own: Ints | None = None,
 ) -> Bools:
     """Whether a body stands in rays (ray, xyz) that leave start in direction departure and end after length (m) at end.
 
-    bounces, turning (ray,): their reflections from surface and bottom, and turning points; own (ray,): the body that
-    straight ones surely do not meet (`clear_of_own_body`), nor reflected ones before they are. Straight rays and
+    bounces, turning (ray,): their reflections from surface and bottom, and turning points. Straight rays and
     reflections in uniform water are exact; bent rays are followed by chords within `SAGITTA_TOLERANCE`, but only where
     they may pass a body: no ray is farther from the straight line between its ends, unfolded at its reflections, than
     its largest curvature allows.
@@ -41,16 +39,15 @@ def hidden(
     if not bodies or not len(start):
         return blocked
     if medium.profile.uniform and (bounces is None or not bounces.any()):
-        return occluded(bodies, start, end, own)
+        return occluded(bodies, start, end)
     times = np.zeros(len(start), np.int64) if bounces is None else bounces
     bow = _curvature(medium.profile) * length**2 / 8.0
     broken = (bow > SAGITTA_TOLERANCE) | (times > 0)
-    own = None if own is None or not medium.profile.uniform else own
     straight = np.flatnonzero(~broken)
-    blocked[straight] = occluded(bodies, start[straight], end[straight], None if own is None else own[straight])
+    blocked[straight] = occluded(bodies, start[straight], end[straight])
     bent = np.flatnonzero(broken)
     ray = start[bent], end[bent], departure[bent], times[bent], bow[bent]
-    full, first = _near(bodies, medium.depth, *ray, None if own is None else own[bent])
+    full, first = _near(bodies, medium.depth, *ray)
     if turning is not None:
         full |= (times[bent] > 0) & (turning[bent] > 0)  # which boundary comes first, a turn may have changed
     for rays, followed in ((bent[full], length[bent[full]]), (bent[~full], np.minimum(first, length[bent])[~full])):
@@ -202,13 +199,10 @@ def _near(
     departure: Floats,
     bounces: Ints,
     bow: Floats,
-    own: Ints | None = None,
 ) -> tuple[Bools, Floats]:
-    """Which rays (ray,) may pass a body far from their start, and how far from it (m) others may still be in one; own
-    (ray,): the body that they surely do not meet before they are reflected."""
+    """Which rays (ray,) may pass a body far from their start, and how far from it (m) others may still be in one."""
     far, first = np.zeros(len(start), bool), np.zeros(len(start))
-    room = np.where(departure[:, 2] > 0, -start[:, 2], bottom + start[:, 2])
-    for number, body in enumerate(bodies):
+    for body in bodies:
         centre, radius = enclosing(body)
         inside = np.linalg.norm(start - centre, axis=1) <= radius
         leave = np.where(inside, 2.0 * (radius + bow), 0.0)
@@ -217,8 +211,6 @@ def _near(
             start, end, departure[:, 2] > 0, bounces, bottom, leave, bow, centre, radius, near
         )
         far |= near
-        if own is not None:
-            leave[(own == number) & (leave * np.abs(departure[:, 2]) < room)] = 0.0
         first = np.maximum(first, leave)
     return far, first
 

@@ -63,9 +63,8 @@ class Occlusion:
         """
         if self.elements is None or self.elements.count == 1 or not self.bodies:
             end = alike(self.receiver.pose.position, len(starts.point))
-            own = starts.clear_of_own(self.bodies, legs.departure)
             ray = starts.point, end, legs.departure, legs.length
-            hides = hidden(self.bodies, self.bending, *ray, bounces=legs.bounces, turning=legs.turning, own=own)
+            hides = hidden(self.bodies, self.bending, *ray, bounces=legs.bounces, turning=legs.turning)
             return legs.select(picked(~hides))
         certain = self._certain(legs, starts)
         in_sight, mixed = certain != CLOSED, certain == UNKNOWN
@@ -146,8 +145,7 @@ class Occlusion:
         )
         sure = np.flatnonzero(np.isfinite(slope))
         verdict[rows], leaving, along, slope = NO_CONE, leaving.select(sure), away[rows[sure]], slope[sure]
-        own = leaving.clear_of_own(self.bodies, along, slope)
-        verdict[rows[sure]] = classify_cones(self.bodies, leaving.point, along, slope, reach[sure], far[sure], own)
+        verdict[rows[sure]] = classify_cones(self.bodies, leaving.point, along, slope, reach[sure], far[sure])
         return verdict
 
     def _dark(self, legs: ReceivePaths, starts: Starts, rows: Ints) -> Bools:
@@ -220,8 +218,7 @@ class Occlusion:
         ray = np.flatnonzero(~unseen)
         leaving, towards, turns = starts.select(leg[ray]), ahead[ray], (beside.bounces[ray], beside.turning[ray])
         away = leaving.point, self.receiver.pose.position + offset[ray], towards, length[ray]
-        own = leaving.clear_of_own(self.bodies, towards)
-        unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=turns[0], turning=turns[1], own=own)
+        unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=turns[0], turning=turns[1])
         look[row, column] = unseen
         return look
 
