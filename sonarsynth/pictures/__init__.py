@@ -97,7 +97,7 @@ def show(
         ]
         of = "all frames" if common else "each frame"
         picture = FramePicture(*beam_grid(tree), views, f"beams: energy re the brightest beam of {of} (dB)")
-        files.append(write_film(picture, views, folder, frames_per_second, progress))
+        files.append(write_film(picture.figure, picture.show, views, folder, frames_per_second, progress))
     return files
 
 

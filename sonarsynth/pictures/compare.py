@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
@@ -32,9 +31,7 @@ from sonarsynth.store import Folder, folder_of
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
 
-    from sonarsynth.pictures.figures.frame_figure import Hull
 
 MOST = 4
 """Stores that fit beside each other."""
@@ -94,31 +91,13 @@ def show_beside(
     if film and len(frames) > 1:
         if len(thinned(frames)) < len(frames):
             say(f"film: {len(thinned(frames))} of {len(frames)} frames")
-        moving = BesideFilm(BesidePicture(*beam_grid(trees[0]), columns, heading, NOTE, of=of), trees, references)
-        files.append(write_film(moving, thinned(frames), folder, frames_per_second, progress))
+        moving = BesidePicture(*beam_grid(trees[0]), columns, heading, NOTE, of=of)
+
+        def show(frame: int) -> None:
+            moving.show(moment(trees, references, frame))
+
+        files.append(write_film(moving.figure, show, thinned(frames), folder, frames_per_second, progress))
     return files
-
-
-@dataclass(frozen=True, eq=False)
-class BesideFilm:
-    """Draws frames by their number: what a film of many facets needs is read when its turn comes."""
-
-    picture: BesidePicture
-    trees: Sequence[xr.DataTree]
-    references: Sequence[float | None]  # Pa2 s; None: of the brightest beam of each frame
-
-    @property
-    def figure(self) -> Figure:
-        """The figure that is drawn in."""
-        return self.picture.figure
-
-    def show(self, frame: int) -> None:
-        """Draw a frame in place of the last."""
-        self.picture.show(moment(self.trees, self.references, frame))
-
-    def pixels(self) -> np.ndarray:
-        """The figure as drawn: (row, column, rgba) uint8."""
-        return self.picture.pixels()
 
 
 def moment(trees: Sequence[xr.DataTree], references: Sequence[float | None], frame: int, why: str = "") -> Moment:
@@ -128,20 +107,10 @@ def moment(trees: Sequence[xr.DataTree], references: Sequence[float | None], fra
         energy = needed(tree, "image/energy", frame)
         brightest = float(np.max(energy, initial=0.0, where=np.isfinite(energy))) or 1.0
         level = decibels(energy, reference or brightest) if np.isfinite(energy).any() else None
-        bodies = hulls(tree, frame)
-        bodies = next((p.hulls for p in panels if _alike(p.hulls, bodies)), bodies)
-        panels.append(Panel(level, bodies, ghosts(tree, frame), lobes(tree, frame)))
+        panels.append(Panel(level, hulls(tree, frame), ghosts(tree, frame), lobes(tree, frame)))
     times = {None if (t := read(tree, "time", frame)) is None else round(float(t), 9) for tree in trees}
     clock = [f"{t:.2f} s" for t in times if t is not None and np.isfinite(t)] if len(times) == 1 else []
     return Moment("\n".join([f"frame {frame}", *clock, *([why] if why else [])]), tuple(panels))
-
-
-def _alike(hulls: tuple[Hull, ...], others: tuple[Hull, ...]) -> bool:
-    """Whether hulls are the same bodies in the same places."""
-    return len(hulls) == len(others) and all(
-        np.array_equal(a.faces, b.faces) and np.array_equal(a.vertices, b.vertices)
-        for a, b in zip(hulls, others, strict=True)
-    )
 
 
 def _fit(tree: xr.DataTree, path: Folder) -> xr.DataTree:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from sonarsynth.conventions import Progress
-from sonarsynth.pictures.figures.style import BACKDROP, ENERGY_MAP, OUTLINES
+from sonarsynth.pictures.figures.style import BACKDROP, ENERGY_MAP, OUTLINES, pixels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,24 +22,6 @@ LONGEST = 128
 """Frames of a film at most."""
 
 Item = TypeVar("Item")
-View_contra = TypeVar("View_contra", contravariant=True)
-
-
-class Picture(Protocol[View_contra]):
-    """A figure in which one view after another is drawn."""
-
-    @property
-    def figure(self) -> Figure:
-        """The figure, laid out."""
-        ...
-
-    def show(self, view: View_contra, /) -> None:
-        """Draw a view in place of the last."""
-        ...
-
-    def pixels(self) -> np.ndarray:
-        """The figure as drawn: (row, column, rgba) uint8."""
-        ...
 
 
 def thinned(frames: Sequence[Item]) -> list[Item]:
@@ -48,28 +30,30 @@ def thinned(frames: Sequence[Item]) -> list[Item]:
 
 
 def write_film(
-    picture: Picture[View_contra],
-    views: Sequence[View_contra],
+    onto: Figure,
+    show: Callable[[Item], None],
+    views: Sequence[Item],
     folder: Path,
     frames_per_second: float,
     progress: Progress | None = None,
 ) -> Path:
-    """Draw views one after another into `folder`/film.mp4 or film.gif; returns its path."""
+    """Draw views one after another into `folder`/film.mp4 or film.gif; returns its path. show: draws one onto a figure,
+    in place of the last."""
     if shutil.which("ffmpeg"):
         path = folder / "film.mp4"
-        if _mp4(_drawn(picture, views, progress), path, frames_per_second):
+        if _mp4(_drawn(onto, show, views, progress), path, frames_per_second):
             return path
         path.unlink(missing_ok=True)  # an ffmpeg without the codec
-    return _gif(_drawn(picture, views, progress), folder / "film.gif", frames_per_second)
+    return _gif(_drawn(onto, show, views, progress), folder / "film.gif", frames_per_second)
 
 
 def _drawn(
-    picture: Picture[View_contra], views: Sequence[View_contra], progress: Progress | None
+    onto: Figure, show: Callable[[Item], None], views: Sequence[Item], progress: Progress | None
 ) -> Iterator[np.ndarray]:
     """Pixels (row, column, rgba) of one view after another."""
     for n, view in enumerate(views, 1):
-        picture.show(view)
-        yield picture.pixels()
+        show(view)
+        yield pixels(onto)
         if progress is not None:
             progress(n, len(views), 0)
 

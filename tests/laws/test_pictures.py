@@ -11,7 +11,7 @@ from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View, d
 from sonarsynth.pictures.figures.outlines import CELLS, union_outline, view_outline
 from sonarsynth.pictures.figures.snap_comparison import compare_snaps
 from sonarsynth.pictures.figures.snap_figure import bandwidth, half_width, snap_figure
-from sonarsynth.pictures.figures.style import DYNAMIC_RANGE
+from sonarsynth.pictures.figures.style import DYNAMIC_RANGE, pixels
 from sonarsynth.pictures.ray_figures.ray_figure import section_figure, space_figure
 from sonarsynth.pictures.ray_figures.ray_styles import Look
 from sonarsynth.pictures.ray_figures.scene_geometry import SceneGeometry
@@ -88,7 +88,7 @@ def test_a_bright_beam_to_port_and_up_is_drawn_to_the_left_and_up() -> None:
     view = View(title="", level=level, points=np.zeros((0, 3)), point_level=np.zeros(0), hulls=())
     picture = FramePicture(azimuth, elevation, [view], "dB")
     picture.show(view)
-    shot = picture.pixels()[..., :3].astype(int)
+    shot = pixels(picture.figure)[..., :3].astype(int)
     axes = picture.figure.axes[0]
     height = shot.shape[0]
     x, y = axes.transData.transform((22.5, 17.5))

@@ -17,6 +17,7 @@ from sonarsynth.equations.arrays.grating_lobes import grating_lobes, lattice_pit
 from sonarsynth.pictures import show
 from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View
 from sonarsynth.pictures.figures.ghost_rings import Ghost, place
+from sonarsynth.pictures.figures.style import pixels
 from sonarsynth.pictures.store_reading import FAINTEST, ghosts, opened, stored
 from sonarsynth.planning import plan
 from sonarsynth.recipe import reading
@@ -114,9 +115,9 @@ def view(*seen: Ghost) -> View:
 def changed(picture: FramePicture, *seen: Ghost) -> tuple[np.ndarray, np.ndarray]:
     """Azimuth and elevation (deg) of the pixels that drawing ghosts changes."""
     picture.show(view())
-    without = picture.pixels().astype(int)
+    without = pixels(picture.figure).astype(int)
     picture.show(view(*seen))
-    rows, columns = np.nonzero(np.abs(picture.pixels() - without).max(axis=2) > 40)
+    rows, columns = np.nonzero(np.abs(pixels(picture.figure) - without).max(axis=2) > 40)
     at = np.stack([columns + 0.5, len(without) - rows - 0.5], axis=1)
     azimuth, elevation = picture.figure.axes[0].transData.inverted().transform(at).T
     return azimuth, elevation
@@ -125,7 +126,7 @@ def changed(picture: FramePicture, *seen: Ghost) -> tuple[np.ndarray, np.ndarray
 def test_ghosts_are_drawn_at_their_place_and_leave_nothing_behind(picture: FramePicture) -> None:
     ghost = Ghost("surface ghost", 0, 10.0, 25.0, -2.0)
     picture.show(view())
-    clean = picture.pixels()
+    clean = pixels(picture.figure)
     azimuth, elevation = changed(picture, ghost)
     near = np.hypot(azimuth - 10.0, elevation - 25.0) < 1.5
     assert near.sum() > 20
@@ -133,7 +134,7 @@ def test_ghosts_are_drawn_at_their_place_and_leave_nothing_behind(picture: Frame
     assert elevation[~near].min() > 25.0  # the label, above
     assert np.abs(azimuth[~near].mean() - 10.0) < 1.0
     picture.show(view())
-    assert (picture.pixels() == clean).all()
+    assert (pixels(picture.figure) == clean).all()
 
 
 @pytest.mark.parametrize("where", [(0.0, 60.0), (0.0, -60.0), (70.0, 0.0), (-70.0, 0.0), (60.0, 60.0)])
@@ -204,9 +205,9 @@ def test_grating_lobes_lie_where_the_lattice_cannot_tell() -> None:
 def test_grating_lobes_are_drawn_over_the_band_and_leave_the_axes_alone(picture: FramePicture) -> None:
     lobe = np.stack([np.linspace(10.0, 80.0, 30), np.full(30, 12.0)], axis=1)
     picture.show(view())
-    without, limits = picture.pixels().astype(int), picture.figure.axes[0].get_xlim()
+    without, limits = pixels(picture.figure).astype(int), picture.figure.axes[0].get_xlim()
     picture.show(replace(view(), lobes=(lobe,)))
-    rows, columns = np.nonzero(np.abs(picture.pixels() - without).max(axis=2) > 40)
+    rows, columns = np.nonzero(np.abs(pixels(picture.figure) - without).max(axis=2) > 40)
     at = np.stack([columns + 0.5, len(without) - rows - 0.5], axis=1)
     azimuth, elevation = picture.figure.axes[0].transData.inverted().transform(at).T
     assert picture.figure.axes[0].get_xlim() == limits

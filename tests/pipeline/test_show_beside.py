@@ -16,6 +16,7 @@ from sonarsynth.cli.running import run
 from sonarsynth.evaluation import range_errors
 from sonarsynth.pictures.compare import moment, show_beside
 from sonarsynth.pictures.figures.compared_images import BesidePicture, Column, Moment, Panel
+from sonarsynth.pictures.figures.style import pixels
 from sonarsynth.pictures.recipe_diff import names_of
 from sonarsynth.pictures.scores import as_table, echo_energies, scores_of
 from sonarsynth.pictures.store_reading import opened
@@ -200,7 +201,7 @@ def test_each_store_is_drawn_in_its_place_with_port_on_the_left() -> None:
     picture = BesidePicture(azimuth, elevation, columns, "three", rows=2)
     panels = tuple(Panel(level, ()) for level in (silent, port, None))
     picture.show(Moment("early", panels), Moment("late", panels[::-1]))
-    shot = picture.pixels()[..., :3].astype(int)
+    shot = pixels(picture.figure)[..., :3].astype(int)
 
     def brightness(panel: int, x: float, y: float) -> int:
         across, up = picture.figure.axes[panel].transData.transform((x, y))

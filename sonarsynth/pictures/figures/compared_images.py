@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.pictures.figures.blitting import Blitting
 from sonarsynth.pictures.figures.frame_figure import Hull, clipped, edges, image_axes, outline_artist, set_outlines
 from sonarsynth.pictures.figures.ghost_rings import Ghost, GhostMarks
 from sonarsynth.pictures.figures.style import INK, PALE, figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
     from matplotlib.text import Text
 
@@ -104,7 +102,6 @@ class BesidePicture:
             self._text(self._left(c), top + 0.1, title, fontsize=10.5, fontweight="bold", linespacing=1.15)
         self._table(columns, table, note)
         self._bar(top, below, of)
-        self._blitting: Blitting | None = None
 
     def show(self, *moments: Moment) -> None:
         """Draw moments, a row each, in place of the last."""
@@ -115,17 +112,8 @@ class BesidePicture:
                 assert shape is not None
                 absent = panel.level is None
                 image.set_data(np.ma.masked_all(shape.shape) if absent else _drawn(panel.level))
-            lines = _outline(self._outlines[row], [panel.hulls for panel in moment.panels])
-            for marks, panel, around in zip(self._ghosts[row], moment.panels, lines, strict=True):
-                marks.show(panel.ghosts, panel.lobes, around)
-
-    def pixels(self) -> np.ndarray:
-        """The figure as drawn: (row, column, rgba) uint8."""
-        marks = [artist for row in self._ghosts for ghosts in row for artist in ghosts.drawn]
-        changing = [*self._names, *(lines for row in self._outlines for lines in row), *marks]
-        if self._blitting is None:
-            self._blitting = Blitting(self.figure, [image for row in self._images for image in row], changing)
-        return self._blitting.pixels(changing)
+            for marks, artist, panel in zip(self._ghosts[row], self._outlines[row], moment.panels, strict=True):
+                marks.show(panel.ghosts, panel.lobes, set_outlines(artist, panel.hulls))
 
     def _text(self, x: float, y: float, text: str, **style: object) -> Text:
         """A text at inches from the lower left corner."""
@@ -163,19 +151,6 @@ class BesidePicture:
         long = f"energy re the brightest beam of {of} (dB)"
         bar.set_label(long if top - below > 3.2 else "energy (dB)", fontsize=8.5, color=INK)
         bar.ax.tick_params(labelsize=8)
-
-
-def _outline(artists: Sequence[PolyCollection], hulls: Sequence[tuple[Hull, ...]]) -> list[list[Floats]]:
-    """Draw outlines in each panel, and return them; those of hulls that are one object are found once."""
-    first: dict[int, int] = {}
-    lines: list[list[Floats]] = []
-    for i, (artist, bodies) in enumerate(zip(artists, hulls, strict=True)):
-        like = first.setdefault(id(bodies), i)
-        lines.append(set_outlines(artist, bodies) if like == i else lines[like])
-        if like != i:
-            artist.set_verts(lines[like])
-            artist.set_edgecolor(artists[like].get_edgecolor())
-    return lines
 
 
 def _drawn(level: Floats | None) -> np.ma.MaskedArray:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, counted
-from sonarsynth.pictures.figures.blitting import Blitting
 from sonarsynth.pictures.figures.ghost_rings import Ghost, GhostMarks, legend
 from sonarsynth.pictures.figures.outlines import FILM_CELLS, union_outline, view_outline
 from sonarsynth.pictures.figures.style import (
@@ -24,7 +23,6 @@ from sonarsynth.pictures.figures.style import (
 )
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.collections import PathCollection, PolyCollection
     from matplotlib.figure import Figure
@@ -123,7 +121,7 @@ class FramePicture:
             CloudPanel(placed(self.figure, 7.17, 3.1, 3.13, 1.95), PLAN, "from above", least),
             CloudPanel(placed(self.figure, 7.17, 0.45, 3.13, 1.95), SIDE, "from starboard", least),
         ]
-        self._blitting: Blitting | None = None
+        self._arranged = False
 
     def show(self, view: View) -> None:
         """Draw a frame in place of the last."""
@@ -136,22 +134,12 @@ class FramePicture:
         outlines = set_outlines(self._outlines, view.hulls)
         for panel in self._clouds:
             panel.show(view, self.window)
-        if self._blitting is None:  # arranged once, for axes that move from frame to frame are hard to watch
+        if not self._arranged:  # arranged once, for axes that move from frame to frame are hard to watch
             self._title.set_text(view.title)
             settle(self.figure)
             self._moment.set_position(end_of(self._title))
-            self._blitting = Blitting(self.figure, [self._image], self._changing())
+            self._arranged = True
         self._ghosts.show(view.ghosts, view.lobes, outlines)
-
-    def pixels(self) -> np.ndarray:
-        """The figure as drawn: (row, column, rgba) uint8."""
-        assert self._blitting is not None
-        return self._blitting.pixels(self._changing())
-
-    def _changing(self) -> list[Artist]:
-        """What is drawn anew in each frame, the rearmost first."""
-        clouds = [artist for panel in self._clouds for artist in panel.changing]
-        return [self._moment, self._outlines, *self._ghosts.drawn, *clouds]
 
 
 class CloudPanel:
@@ -168,17 +156,11 @@ class CloudPanel:
         label(axes, names[plane[0]], names[plane[1]], f"points {name}, energy of {least:.0f} to 0 dB")
         self._hulls: PolyCollection = PolyCollection([], linewidths=1.0)
         axes.add_collection(self._hulls, autolim=False)
-        self._bodies: list[Floats] = []  # hulls (vertex, 2) as they are drawn
         self._earlier: PathCollection = axes.scatter([], [], s=4, linewidths=0, color=EARLIER)
         self._points: PathCollection = axes.scatter(
             [], [], c=[], s=9, linewidths=0, cmap=ENERGY_MAP, vmin=least, vmax=0
         )
         self._note: Text = axes.text(0.02, 0.04, "", transform=axes.transAxes, fontsize=8, color="#e8e8e8")
-
-    @property
-    def changing(self) -> list[Artist]:
-        """What is drawn anew in each frame, the rearmost first."""
-        return [self._hulls, self._earlier, self._points, self._note]
 
     def show(self, view: View, space: Window) -> None:
         """Draw a frame in place of the last."""
@@ -189,9 +171,7 @@ class CloudPanel:
         self.axes.set_xlim(-sign * reach, sign * reach)
         self.axes.set_ylim(-reach / 1.6, reach / 1.6)
         bodies = [(hull.vertices - centre)[:, self.plane] for hull in view.hulls]
-        if len(bodies) != len(self._bodies) or not all(map(_alike, bodies, self._bodies)):
-            fill_hulls(self._hulls, bodies, [hull.faces for hull in view.hulls])
-            self._bodies = bodies
+        fill_hulls(self._hulls, bodies, [hull.faces for hull in view.hulls])
         self._earlier.set_offsets((view.earlier - centre)[:, self.plane])
         at = (view.points - centre)[:, self.plane]
         self._points.set_offsets(at)
@@ -278,11 +258,6 @@ def fill_hulls(artist: PolyCollection, bodies: list[Floats], faces: list[Ints]) 
     artist.set_verts(lines)
     artist.set_edgecolor(colours)
     artist.set_facecolor([to_rgba(colour, 0.18) for colour in colours])
-
-
-def _alike(points: Floats, others: Floats) -> bool:
-    """Whether points are where others are, but for a thousandth of their extent: a body that only moves on."""
-    return points.shape == others.shape and bool(np.abs(points - others).max() < 1e-3 * np.ptp(others))
 
 
 def end_of(text: Text) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Bytes, Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -86,6 +86,15 @@ def settle(fig: Figure) -> None:
         fig.set_layout_engine("none")
     for axes in fig.axes:
         axes.apply_aspect()
+
+
+def pixels(fig: Figure) -> Bytes:
+    """A figure of `figure` as drawn: (row, column, rgba) uint8."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    assert isinstance(fig.canvas, FigureCanvasAgg)
+    fig.canvas.draw()
+    return np.array(fig.canvas.buffer_rgba())
 
 
 def placed(onto: Figure, left: float, bottom: float, width: float, height: float, **more: Any) -> Any:
