@@ -10,7 +10,7 @@ from typing import Final
 
 from sonarsynth.frontiers import AccuracyReport
 from sonarsynth.frontiers.rows import Point
-from sonarsynth.pictures.accuracy_figures.frontier_figure import Line, Panel, frontier_figure
+from sonarsynth.pictures.figures.frontier_figure import Line, Panel, frontier_figure
 
 TITLES: Final = {
     "trace": "signals: tracing and synthesis, by how paths are traced",

@@ -13,13 +13,12 @@ from scipy.integrate import quad
 from scipy.special import j1
 
 from sonarsynth.equations.scattering.modal_series import Fluid, cylinder_amplitude, sphere_amplitude
-from sonarsynth.pictures.accuracy_figures.bodies_figure import Curve, Panel, RefinementCurve, bodies_figure
 from sonarsynth.validation import REFERENCES, Row
 from sonarsynth.validation.bodies.body_cases import BAND, SOUND_SPEED, Point, order, trade_rows, wavenumber
 from sonarsynth.validation.bodies.cylinder import lit_cylinder
 from sonarsynth.validation.bodies.facet_integral import exact_triangle, triangle_rows
 from sonarsynth.validation.bodies.sphere import front_echo
-from sonarsynth.validation.report import PICTURES, write
+from sonarsynth.validation.report import write
 
 BODIES = ("sphere", "cylinder", "plate")
 PART: Mapping[str, set[str]] = {
@@ -119,24 +118,9 @@ def test_a_wrong_integral_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not any(row.ok for row in triangle_rows(True) if row.quantity == "1e-8 off the mirror angle")
 
 
-def test_a_picture_shows_every_trade_and_curve() -> None:
-    x = np.linspace(0.0, 1.0, 5)
-    trade = RefinementCurve("a body", [10, 100], [0.1, 1.0], [1e-2, 0.0], [1e-1, 1e-3])
-    panels = [
-        Panel("over x", "x", "dB", (Curve("exact", x, x, "exact", 0), Curve("facets", x, x, "facets", 1)), -1.0, 2.0)
-    ]
-    made = bodies_figure("bodies", {"an error": [trade], "another": [trade]}, panels)
-    assert len(made.axes) == 6
-    assert [axes.get_ylabel() for axes in made.axes[:5]] == ["an error", "an error", "another", "another", "dB"]
-    np.testing.assert_array_equal(made.axes[0].lines[0].get_xydata(), [[10, 1e-2], [100, 1e-17]])
-    np.testing.assert_array_equal(made.axes[1].lines[0].get_xdata(), trade.milliseconds)
-    assert [line.get_label() for line in made.axes[4].lines] == ["exact", "facets"]
-
-
 def test_rows_and_picture_are_written(rows: dict[str, list[Row]], tmp_path: Path) -> None:
     files = write(rows["plate"], tmp_path, "plate")
     assert [file.name for file in files] == ["plate.json", "plate.png"]
     answer = json.loads(files[0].read_text())
     assert {"case", "quantity", "bound", "error", "ok", "cost", "cost_unit", "facets", "knob"} <= set(answer[0])
     assert files[1].stat().st_size > 30_000
-    assert set(REFERENCES) - set(PICTURES) == {"bubble"}

@@ -118,7 +118,7 @@ def test_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pyt
     app = typer.Typer()
     app.command()(accuracy)
     good = Row(
-        "a case", "a reference", "time", "s", 1e-13, 1e-15, 0.7, "us a ray", {"pairs": 3, "rays": 9}, note="a note"
+        "a case", "a reference", "time", "s", 1e-13, 1e-15, 0.7, "us a ray", {"pairs": 3, "rays": 9}, "a knob", "a note"
     )
     monkeypatch.setitem(REFERENCES, "rays", lambda quick: [good])
     assert run(app, ["--reference", "rays", "--out", str(tmp_path)]) == 0

@@ -19,7 +19,6 @@ from sonarsynth.validation.bodies.body_cases import (
     PER_ASPECT,
     SEED,
     SOUND_SPEED,
-    round_x,
     wavenumber,
 )
 from sonarsynth.validation.run_time import timed
@@ -210,9 +209,3 @@ def _face() -> Iterator[Row]:
         PER_ASPECT,
         {"facets": 12, "values": level.size},
     )
-
-
-def fan_out(off: Floats) -> tuple[Floats, Floats]:
-    """A wave straight in, and ways out (way, xyz) at angles off the normal (deg), towards x."""
-    out = round_x(90.0 - off)[:, [0, 2, 1]]
-    return np.broadcast_to(DOWN, out.shape), out

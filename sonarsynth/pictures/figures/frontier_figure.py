@@ -1,4 +1,4 @@
-"""Error against run time of each stage of a frame: the walk of every knob, what was chosen, and the peers."""
+"""Error against run time, of stages of a frame or quantities of a reference: knobs, choice, peers."""
 
 from __future__ import annotations
 
@@ -25,27 +25,28 @@ NARROWEST = 5.0
 
 @dataclass(frozen=True)
 class Line:
-    """One knob, or one peer: milliseconds and errors of its settings."""
+    """One knob, or one peer: costs and errors of its settings."""
 
     name: str
-    milliseconds: tuple[float, ...]
+    cost: tuple[float, ...]
     error: tuple[float, ...]
     peer: bool = False
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One stage."""
+    """One stage, or one quantity of a reference."""
 
     title: str
     unit: str
     allowed: float  # inf: nothing is asked for
     lines: tuple[Line, ...]
-    chosen: tuple[float, float]  # ms, error
+    chosen: tuple[float, float] | None = None  # cost, error; None: nothing was to be chosen
+    cost: str = "CPU time of one core a frame (ms)"
 
 
 def frontier_figure(title: str, panels: Sequence[Panel], note: str) -> Figure:
-    """One panel a stage, two in a row: error over CPU time, both logarithmic."""
+    """Panels, two in a row: error over CPU time, both logarithmic."""
     rows = -(-len(panels) // 2)
     fig = figure(13.0, 0.7 + 4.3 * rows, dpi=100)
     fig.suptitle(title, x=0.01, ha="left", fontsize=12, color=INK)
@@ -63,20 +64,17 @@ def _draw(axes: Axes, panel: Panel) -> None:
     axes.axhline(floor, color=PALE, linewidth=0.6, linestyle=":")
     if isfinite(panel.allowed):
         axes.axhline(panel.allowed, color=INK, linewidth=0.9, linestyle="--", label=f"allowed, {panel.allowed:g}")
-    _frontier(axes, panel, floor)
+    if panel.chosen is not None:
+        _choice(axes, panel, panel.chosen, floor)
     for peer, shapes in ((False, SHAPES), (True, PEERS)):
         for n, line in enumerate(line for line in panel.lines if line.peer == peer):
-            pairs = sorted(zip(line.milliseconds, (max(e, floor) for e in line.error), strict=True))
+            pairs = sorted(zip(line.cost, (max(e, floor) for e in line.error), strict=True))
             style: dict[str, Any] = (
                 {"color": INK, "markersize": 8, "linestyle": ":", "linewidth": 0.8}
                 if line.peer
                 else {"color": RAYS[n % len(RAYS)], "markersize": 5, "linewidth": 1.0}
             )
             axes.plot(*zip(*pairs, strict=True), marker=shapes[n % len(shapes)], label=line.name, **style)
-    at = (panel.chosen[0], max(panel.chosen[1], floor))
-    axes.plot(*at, "o", markersize=4, color=CHOSEN, zorder=5)
-    ring: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": CHOSEN, "markeredgewidth": 2.2}
-    axes.plot(*at, "o", markersize=15, linestyle="", label="chosen", zorder=5, **ring)
     _finish(axes, panel, floor)
 
 
@@ -91,17 +89,21 @@ def _finish(axes: Axes, panel: Panel, floor: float) -> None:
     middle = (left * right) ** 0.5
     axes.set_xlim(min(left, middle / NARROWEST), max(right, middle * NARROWEST))
     axes.xaxis.set_minor_formatter(NullFormatter())
-    label(axes, "CPU time of one core a frame (ms)", f"error ({panel.unit})", panel.title)
+    label(axes, panel.cost, f"error ({panel.unit})", panel.title)
     axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, labelspacing=0.7)
 
 
-def _frontier(axes: Axes, panel: Panel, floor: float) -> None:
-    """The step line under which no setting of ours lies."""
+def _choice(axes: Axes, panel: Panel, chosen: tuple[float, float], floor: float) -> None:
+    """A ring at what was chosen, and the step line under which no setting of ours lies."""
+    at = (chosen[0], max(chosen[1], floor))
+    axes.plot(*at, "o", markersize=4, color=CHOSEN, zorder=5)
+    ring: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": CHOSEN, "markeredgewidth": 2.2}
+    axes.plot(*at, "o", markersize=15, linestyle="", label="chosen", zorder=5, **ring)
     points = sorted(
         (x, max(y, floor))
         for x, y in [
-            panel.chosen,
-            *(at for line in panel.lines if not line.peer for at in zip(line.milliseconds, line.error, strict=True)),
+            chosen,
+            *(at for line in panel.lines if not line.peer for at in zip(line.cost, line.error, strict=True)),
         ]
     )
     best: list[tuple[float, float]] = []

@@ -1,1 +1,0 @@
-"""Figures of error against run time."""
