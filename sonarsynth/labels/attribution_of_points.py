@@ -99,7 +99,7 @@ class Attribution:
     power: Floats  # (point, group) at the delay, in any unit
     energy: Floats  # (point, group) Pa2 s about it
     owner: Ints  # (point,) the loudest group, -1 without any
-    share: Floats  # (point, path from first on) of the power of the loudest group
+    share: Floats  # (point, path from first on) of the power of the loudest group: see `point_kernels.attribute`
 
 
 def attribution(
@@ -149,6 +149,7 @@ def attribution(
         curvature,
         longer[rows],
         group,
+        arrivals.coherent[rows],
         arrivals.direct[example],
         _spectra(arrivals, rows, stretch, elements, fine),
         _matched(fine)[groups[1]],

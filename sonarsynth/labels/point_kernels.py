@@ -152,6 +152,7 @@ def attribute(
     curvature: Floats,
     longer: Floats,
     group: Ints,
+    coherent: Bools,
     pulse: Bools,
     spectrum: Complexes,
     matched: Floats,
@@ -164,24 +165,26 @@ def attribute(
     pattern: Pattern,
 ) -> tuple[Floats, Floats, Ints, Floats]:
     """Power (point, group) at the delay of each point, energy (point, group) within the gate, the loudest group
-    (point,), -1 without any, and what each path (point, path from `first` on) of it brings of that power.
+    (point,), -1 without any, and what each path (point, path from `first` on) of it brings of that power: where its
+    phase counts, what of its pressure is in phase with that of all such, and against it less than nothing. The mean
+    delay by that is where their sum is loudest, and a smooth body is heard at its glint.
 
     beam (point, xyz); moment (point,) s when the point's echo reaches the array centre; beam_energy (point,): energy of
     the beam; first, last (point,): the paths that may be heard then, ascending in delay (path,) s. A path counts within
     `gate` (s), longer by `longer` (path,) s and by reach (s) times how far its direction is from the beam's: a pulse is
     heard through side lobes as long as it takes to cross the array. slowness: of the water over that of the beams.
     spectrum (path, bin), of the pulse at 1 m; matched (group, bin): amplitude of the group's pulse in what ranges it;
-    energy (group, bin): of the pulse; pulse (group,): of no target, which brings no more energy than echoes leave of
-    `beam_energy`, for the sonar may have taken it out; focus, curvature: 1/m.
+    coherent (path,): its phase counts; energy (group, bin): of the pulse; pulse (group,): of no target, which brings no
+    more energy than echoes leave of `beam_energy`, for the sonar may have taken it out; focus, curvature: 1/m.
     """
     bins, groups = len(frequency), len(pulse)
     power, total = np.zeros((len(beam), groups)), np.zeros((len(beam), groups))
     owner, share = np.full(len(beam), -1), np.zeros((len(beam), max(1, (last - first).max())))
     sums, peaks = np.empty((groups, bins), np.complex128), np.empty(groups, np.complex128)
-    response, apart = np.empty(bins, np.complex128), np.empty(3)
+    response, apart, brought = np.empty(bins, np.complex128), np.empty(3), np.empty(share.shape[1], np.complex128)
     spacing = frequency[1] - frequency[0] if bins > 1 else 0.0
     for p in range(len(beam)):
-        sums[:], peaks[:] = 0.0, 0.0
+        sums[:], peaks[:], brought[:] = 0.0, 0.0, 0.0
         for e in range(first[p], last[p]):
             late, away = moment[p] - delay[e], 0.0
             for x in range(3):
@@ -201,14 +204,25 @@ def attribute(
                 sums[group[e], k] += value
                 peak += matched[group[e], k] * value
                 phasor *= turned
-            share[p, e - first[p]] = abs(peak) ** 2
+            brought[e - first[p]] = peak
             peaks[group[e]] += peak
         _compare(power[p], total[p], sums, peaks, energy, pulse, beam_energy[p])
         owner[p] = power[p].argmax() if power[p].max() > 0.0 else -1
-        for e in range(first[p], last[p]):
-            if group[e] != owner[p]:
-                share[p, e - first[p]] = 0.0
+        own = slice(first[p], last[p])
+        _shared(share[p], brought, group[own] == owner[p], coherent[own])
     return power, total, owner, share
+
+
+@compiled
+def _shared(share: Floats, brought: Complexes, own: Bools, coherent: Bools) -> None:
+    """Write what each path (path,) of the group adds to the power of a peak by what it brings of the pressure."""
+    joint = 0j
+    for e in range(len(own)):
+        if own[e] and coherent[e]:
+            joint += brought[e]
+    for e in range(len(own)):
+        if own[e]:
+            share[e] = (brought[e] * (joint if coherent[e] else brought[e]).conjugate()).real
 
 
 @compiled
@@ -224,7 +238,7 @@ def means(
     for p in range(len(share)):
         total = share[p].sum()
         for e in range(share.shape[1]):
-            if share[p, e] > 0.0:
+            if share[p, e] != 0.0:
                 weight, row = share[p, e] / total, rows[first[p] + e]
                 out[p, 0] += weight * delay[row]
                 out[p, 1] += weight * radius[row]

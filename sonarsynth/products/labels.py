@@ -48,7 +48,7 @@ class PointLabels:
     family: npt.NDArray[np.int8]  # (point,) index into FAMILIES: how it reached the array; not direct: a ghost
     lit_by: npt.NDArray[np.int8]  # (point,) index into FAMILIES: how sound reached the target; not direct: too far off
     facet: npt.NDArray[np.int32]  # (point,) that brings most; -1 for none
-    true_range: npt.NDArray[np.float32]  # (point,) m from the array centre to where the echo was made
+    true_range: npt.NDArray[np.float32]  # (point,) m from the array centre to what is heard of the target
     distance: npt.NDArray[np.float32]  # (point,) m from the point to the nearest surface of the target
     origin: npt.NDArray[np.int8]  # (point,) index into ORIGINS
 

@@ -144,7 +144,13 @@ _CLOUD = group_of(
     ),
     row("lit_by", POINT, "1", "how sound reached the target", dtype="int8", attributes=flags(FAMILIES)),
     row("facet", POINT, "1", "facet that brought most of the echo", dtype="int32", attributes=NONE),
-    row("true_range", POINT, "m", "distance of the array centre from where the echo was made", dtype="float32"),
+    row(
+        "true_range",
+        POINT,
+        "m",
+        "distance of the array centre from what is heard of the target",
+        dtype="float32",
+    ),
     row("distance", POINT, "m", "distance of the point from the nearest surface of its target", dtype="float32"),
     row("origin", POINT, "1", "how the array came to hear the point", dtype="int8", attributes=flags(ORIGINS)),
 )
