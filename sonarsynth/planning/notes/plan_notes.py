@@ -16,6 +16,7 @@ from sonarsynth.planning.notes.motion_rows import stretch_notes
 from sonarsynth.planning.notes.population_notes import once, population_notes
 from sonarsynth.planning.notes.source_notes import (
     assumed_speed_notes,
+    direction_notes,
     lobe_notes,
     off_the_bottom,
     steering_notes,
@@ -65,7 +66,8 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         lines += stretch_notes(noted(looks), recipe.accuracy.range_m)
     lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene) + clipping_notes(plan, looks)
     if plan.sizes["emission"] and plan.products & OF_BEAMS:
-        lines += unlocated(scene) or lobe_notes(noted(looks)) + assumed_speed_notes(noted(looks))
+        some = noted(looks)
+        lines += unlocated(scene) or lobe_notes(some) + direction_notes(some) + assumed_speed_notes(some)
     for look in noted(looks):
         lines += mirror_notes(look) + overlap_notes(look)
         lines += _extent(look.scene, look.profile)

@@ -12,6 +12,7 @@ from sonarsynth.equations.arrays.grating_lobes import loudest_lobe
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.pulse_durations import extreme_waveforms
 from sonarsynth.ranging import LocatingMethod
+from sonarsynth.ranging.range_profiles import aperture_moments
 from sonarsynth.receiver import elements
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
@@ -99,6 +100,27 @@ def steering_notes(looks: Sequence[SampledScene]) -> list[str]:
                     f"images are steered as for a sonar at rest: at {fast:.3g} m/s echoes at their edges appear "
                     f"{np.rad2deg(off):.2g} deg off where they come from (points do not)"
                 ]
+    return lines
+
+
+def direction_notes(looks: Sequence[SampledScene]) -> list[str]:
+    """Along which axes of its beams an array tells no directions: those across which it has no extent."""
+    from sonarsynth.ranging.picking.peak_picking import RESOLVED  # it loads what plans need not
+
+    lines = []
+    for look in looks:
+        sonar, beams, array = look.scene.sonar, look.scene.sonar.beams, elements(look.scene.sonar.array)
+        k = 2.0 * np.pi * sonar.band.centre / sonar.assumed_sound_speed
+        extent = np.sqrt(np.diag(aperture_moments(array))[1:])
+        axes = (("azimuth", beams.azimuth_span, beams.azimuths), ("elevation", beams.elevation_span, beams.elevations))
+        unknown = [axis for (axis, span, n), x in zip(axes, extent, strict=True) if n > 2 and k * x * span <= RESOLVED]
+        if unknown:
+            count = int(np.count_nonzero(array.gain))
+            tell = "one hydrophone tells" if count == 1 else f"{count} hydrophones, of no extent there, tell"
+            lines.append(
+                f"{tell} no {' and no '.join(unknown)} of echoes: points may be at any, as their predicted errors say "
+                "(scene.sonar.array)"
+            )
     return lines
 
 

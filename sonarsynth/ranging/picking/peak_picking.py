@@ -80,6 +80,8 @@ def peak_echoes(
     energy = _energies(window, profiles, axes, b, height)
     keep = (height >= least[b]) & (energy > residue(image, window.loudest))
     keep[keep] = _own(window, profiles, b[keep], t[keep], height[keep], noise[b[keep]])
+    if not axes.resolved[:2].all():
+        keep[keep] = _once(window, profiles, axes, b[keep], t[keep], height[keep])
     b, t, top_offset, height, energy = b[keep], t[keep], top_offset[keep], height[keep], energy[keep]
     centre = power_centres(
         power, index, *beams, b, t, top_offset, axes.step * axes.sharpness, CENTRE_WINDOW, NOISE_CLEAR * noise
@@ -112,6 +114,20 @@ def _maxima(
     anywhere = maximum_filter1d(power.max(axis=0), 2 * profiles.about + 1)
     good = (power[b, t] * 10 ** (side_lobes / 10) >= anywhere[t]) & ~_cut(power, b, t, end)
     return b[good], t[good]
+
+
+def _once(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, t: Ints, height: Floats) -> Bools:
+    """Which peaks (peak,) are the loudest of their echo, which beams along an axis that is not resolved hear alike: not
+    at one delay, where the middle of the array is beside its centre."""
+    middle = live_gain(window.elements.gain) @ window.elements.position / window.sonar.assumed_sound_speed
+    late = t - profiles.direction[b] @ middle / profiles.step
+    place = np.column_stack([profiles.row[b], profiles.column[b]]) * axes.resolved[:2]
+    once, rest = np.zeros(len(b), bool), np.ones(len(b), bool)
+    for p in np.argsort(-height, kind="stable"):
+        if rest[p]:
+            once[p] = True
+            rest &= (np.abs(late - late[p]) > profiles.about + 1) | (np.abs(place - place[p]).max(axis=1) > 1)
+    return once
 
 
 def _energies(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, height: Floats) -> Floats:
