@@ -11,6 +11,7 @@ from sonarsynth.labels import SLICES, Band, SonarTiming, label_points
 from sonarsynth.pipeline.stored_values import Values, of_isolated, sensor_values, table
 from sonarsynth.pipeline.synthesis import errors_of, known_elements
 from sonarsynth.planning import Plan
+from sonarsynth.planning.pulse_durations import lateness
 from sonarsynth.products import Arrivals, LinkBudget, PointCloud, PointLabels, SourceEstimates
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.direct_sum import relative_absorption
@@ -64,11 +65,20 @@ def point_labels(
         known_elements(plan, frame),
         sonar.assumed_sound_speed,
         plan.choices.beamforming.focus,
-        float(estimates.time[0]) if len(estimates.time) else np.nan,
+        _emitted_clock(plan, frame, arrivals, float(estimates.time[0])) if len(estimates.time) else np.nan,
         frame.sonar_pose,
         frame.sonar_velocity * moves,
     )
     return label_points(cloud, arrivals, band, moment, listening, scattered)
+
+
+def _emitted_clock(plan: Plan, frame: Frame, arrivals: Arrivals, heard: float) -> float:
+    """When time 0 of the direct pulse whose peak is heard at a time (s) arrives: arrivals are of time 0."""
+    late = np.array([lateness(snap.waveform, plan.scene.sonar) for snap in frame.moment.snaps])
+    if not late.any() or not arrivals.direct.any():
+        return heard
+    delays = late[arrivals.snap[arrivals.direct]]
+    return heard - float(delays[np.argmin(np.abs(arrivals.delay[arrivals.direct] + delays - heard))])
 
 
 def frame_values(plan: Plan, frame: Frame) -> Values:

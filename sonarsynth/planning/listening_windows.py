@@ -17,10 +17,10 @@ from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.planning.measured.ray_bending import unlike_straight
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Plan, PulseDurations, Windows
-from sonarsynth.planning.pulse_durations import blur_of, supports_of
+from sonarsynth.planning.pulse_durations import blur_of, lateness, supports_of
 from sonarsynth.products import Paths
 from sonarsynth.propagation import Straight
-from sonarsynth.receiver import Band, elements
+from sonarsynth.receiver import Band, Sonar, elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.filtered_pulse import snap_levels
@@ -52,8 +52,8 @@ def listening_windows(recipe: Recipe, looks: Sequence[SampledScene]) -> Windows:
     supports = supports_of(looks)
     real = np.array([frame.index if look.real else -1 for look in looks for frame in look.frames])
     spans = [span for look in looks for span in _spans(look)]
-    times = np.array([(s.first, s.last_direct, s.first_echo, s.last_echo, s.last) for s in spans])
-    first_heard, last_direct, first_echo, last_echo, last_heard = times.T
+    times = np.array([(s.first, s.last_clock, s.first_echo, s.last_echo, s.last) for s in spans])
+    first_heard, last_clock, first_echo, last_echo, last_heard = times.T
     echoes = bool(np.isfinite(first_echo).any())
     shortest = float(np.nanmin(first_echo)) if echoes else np.nan
     longest = float(np.nanmax(last_echo)) if echoes else np.nan
@@ -67,7 +67,7 @@ def listening_windows(recipe: Recipe, looks: Sequence[SampledScene]) -> Windows:
         raise FieldError(("scene", "processing", "echo_window", "stop"), f"must be after start ({start:g} s)")
     rate = sonar.sampling_frequency
     first = _first_sample(first_heard, supports, rate)
-    last = np.maximum(last_heard + supports.after, last_direct + stop) + MARGIN
+    last = np.maximum(last_heard + supports.after, last_clock + stop) + MARGIN
     samples = int(np.ceil(np.max(last - first) * rate * (1.0 + (UNSAMPLED_MARGIN if unseen else 0.0)))) + 1
     disturbed = sum(_disturbed(span, start - supports.before, stop + supports.before) for span in spans)
     starts = np.full(recipe.frames, np.nan)
@@ -126,7 +126,7 @@ def _new_start(plan: Plan, frame: Frame) -> float:
     (span,) = _spans(SampledScene(scene, plan.profile, (frame,)))
     supports, rate, gate = windows.supports, scene.sonar.sampling_frequency, scene.processing.echo_window
     first = float(_first_sample(np.asarray(span.first), supports, rate))
-    last = max(span.last + supports.after, span.last_direct + windows.echo_stop) + MARGIN
+    last = max(span.last + supports.after, span.last_clock + windows.echo_stop) + MARGIN
     path, advice = ("scene", "processing", "echo_window"), "give its start and stop, or fewer frames"
     if np.ceil((last - first) * rate) + 1 > windows.samples:
         raise FieldError(
@@ -167,9 +167,9 @@ class _ArrivalInterval:
     """When a frame is heard at the array centre (s)."""
 
     first: float  # first direct arrival of any snap
-    clock: float  # direct arrival of the loudest snap: what the sonar takes for the start
-    last_direct: float  # last direct arrival of any snap
-    first_echo: float  # of any snap, after its own direct arrival; NaN where nothing echoes
+    clock: float  # peak of the direct pulse of the loudest snap: what the sonar takes for the start
+    last_clock: float  # of any snap
+    first_echo: float  # of any snap, after its own direct pulse; NaN where nothing echoes
     last_echo: float
     last: float  # last arrival of any snap
     others: tuple[tuple[float, float], ...] = ()  # direct arrival and last echo of the snaps that are not the loudest
@@ -181,7 +181,7 @@ def _spans(look: SampledScene) -> list[_ArrivalInterval]:
     bounces, bottom_depth = scene.physics.tracing.bounces, scene.world.environment.depth
     blurred, spans = blur_of(scene), []
     for frame in look.frames:
-        span = _span(frame, profile, bottom_depth, bounces)
+        span = _span(frame, scene.sonar, profile, bottom_depth, bounces)
         slack = _slack(scene.physics.doppler, frame, span, profile)
         if not scene.physics.tracing.layered:
             slack += unlike_straight(scene.physics.tracing, frame, profile, bottom_depth)
@@ -189,7 +189,7 @@ def _spans(look: SampledScene) -> list[_ArrivalInterval]:
             replace(
                 span,
                 first=span.first - slack,
-                last_direct=span.last_direct + slack,
+                last_clock=span.last_clock + slack,
                 first_echo=span.first_echo - 2.0 * slack,  # the direct arrival may err, and the echo
                 last_echo=span.last_echo + 2.0 * slack + blurred,
                 last=span.last + slack + blurred,
@@ -198,7 +198,7 @@ def _spans(look: SampledScene) -> list[_ArrivalInterval]:
     return spans
 
 
-def _span(frame: Frame, profile: Profile, bottom_depth: float, bounces: int) -> _ArrivalInterval:
+def _span(frame: Frame, sonar: Sonar, profile: Profile, bottom_depth: float, bounces: int) -> _ArrivalInterval:
     array = frame.sonar_pose.position
     snaps = frame.moment.snaps
     if not snaps:
@@ -223,13 +223,14 @@ def _span(frame: Frame, profile: Profile, bottom_depth: float, bounces: int) -> 
         for s, level in zip(snaps, snap_levels(snaps), strict=True)
     ]
     loudest = int(np.argmax(received_level))
-    latest = float(np.max(np.asarray(late_echo) - direct)) if echoes else np.nan
+    clock = direct + [lateness(s.waveform, sonar) for s in snaps]
+    latest = float(np.max(np.asarray(late_echo) - clock)) if echoes else np.nan
     others = tuple((float(direct[n]), float(last[n])) for n in range(len(snaps)) if n != loudest)
     return _ArrivalInterval(
         first=float(direct.min()),
-        clock=float(direct[loudest]),
-        last_direct=float(direct.max()),
-        first_echo=float((earliest - direct).min()) if echoes else np.nan,
+        clock=float(clock[loudest]),
+        last_clock=float(clock.max()),
+        first_echo=float((earliest - clock).min()) if echoes else np.nan,
         last_echo=latest,
         last=float(last.max()),
         others=others,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from sonarsynth.environment.boundary_numbers import rms_height
 from sonarsynth.geometry.mesh import farthest_corner
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import PulseDurations
-from sonarsynth.receiver import elements
+from sonarsynth.receiver import Sonar, elements
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.signals import pulse_support
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, envelope_delay, silencing_blur
@@ -25,6 +26,8 @@ ECHO_SUPPORT = 1e-4
 """The echo window holds every echo down to this part of its peak: its feet, under -80 dB, are cut."""
 DIRECT = 0.1
 """What ranging takes out of echoes is the direct pulse where it is over this part of its peak."""
+AT_ONCE = 10e-6
+"""s: a pulse that is loudest so soon before or after its time 0 is loudest then."""
 FOOT = 1e-2
 """Where the direct pulse is in the way, feet of echoes under this part of their peak may be cut."""
 
@@ -41,7 +44,8 @@ def supports_of(looks: Sequence[SampledScene]) -> PulseDurations:
         turned = lossy or scene.physics.tracing.bounces > 0 or not profile.uniform  # also caustics turn the phase
         before, after = _support(scene, SUPPORT, turned=turned) + across
         plain = _support(scene, SUPPORT, turned=False)[1]
-        clear = min(after, plain + across + TAIL)  # a turned pulse may never end: what echoes meanwhile must be heard
+        early = min((lateness(w, scene.sonar) for w in extreme_waveforms(scene)), default=0.0)
+        clear = min(after, plain + across + TAIL) - min(early, 0.0)  # a turned pulse may never end, and hide all echoes
         echo, foot = (_support(scene, threshold, turned=turned) + across for threshold in (ECHO_SUPPORT, FOOT))
         rows.append((before, after, *echo, clear, foot.max(), _direct(scene)))
     return PulseDurations(*(float(n) for n in np.max(rows, axis=0)))
@@ -54,6 +58,13 @@ def _direct(scene: Scene) -> float:
         (before, after), late = pulse_support(shape, sonar.antialias, DIRECT), envelope_delay(shape, sonar)
         longest = max(longest, before + late, after - late)
     return longest
+
+
+@lru_cache(maxsize=64)
+def lateness(shape: Waveform, sonar: Sonar) -> float:
+    """When (s) after its time 0 a pulse is loudest, for the sonar its arrival; 0 where windows have room for it."""
+    late = envelope_delay(shape, sonar)
+    return late if abs(late) > AT_ONCE else 0.0
 
 
 def _support(scene: Scene, tolerance: float, *, turned: bool) -> Floats:

@@ -30,6 +30,7 @@ from sonarsynth.signals import AutoSynthesis, Synthesis
 from sonarsynth.sources import Source
 from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.noise_source import NoiseSource
+from sonarsynth.sources.sound_source import SoundSource
 from sonarsynth.state import Emission, WorldState
 from sonarsynth.targets.relief import Relief
 from sonarsynth.targets.target import Target
@@ -95,11 +96,10 @@ class World:
     @field_validator("targets", "sources")
     @classmethod
     def _check_count(cls, several: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
-        sources = info.field_name == "sources"
-        count = sum(len(source.times) for source in several) if sources else len(several)
+        snaps = info.field_name == "sources"
+        count = sum(len(source.times) for source in several) if snaps else len(several)
         if count > MOST:
-            noun = "snaps" if sources else "targets"
-            raise ValueError(f"{count} {noun} are more than {MOST}")
+            raise ValueError(f"{count} {'snaps' if snaps else 'targets'} are more than {MOST}")
         return several
 
 
@@ -114,8 +114,7 @@ class Trajectory:
     start: Seconds = 0.0
     """Time of the first frame since the start of the motions."""
     sonar: Motion = Still(position=(0.0, 0.0, -5.0), heading=0.5 * np.pi)
-    """How the sonar moves, and where it looks: its heading, pitch and roll. Left out: at rest 5 m deep, looking east; a
-    motion that is given without a heading looks north."""
+    """How the sonar moves and looks. Left out: at rest 5 m deep, looking east; motions without a heading look north."""
 
     def time(self, step: int) -> float:
         """Time (s) of a frame since the start of the motions."""
@@ -141,8 +140,7 @@ class Physics:
     synthesis: Synthesis = Field(default_factory=AutoSynthesis)
     """How signals are made from arrivals."""
     doppler: bool = True
-    """Whether targets and sonar move while sound is under way; false: all is where it is at the instant of the frame.
-    """
+    """Whether targets and sonar move while sound is under way; false: all is where it is at the frame's instant."""
 
 
 @description
@@ -199,6 +197,11 @@ class Scene:
     """What the sonar does with what it hears."""
 
     @property
+    def sources(self) -> tuple[SoundSource, ...]:
+        """What makes the sound, that which the sonar carries with it."""
+        return tuple(source.carried_by(self.trajectory.sonar) for source in self.world.sources)
+
+    @property
     def laws(self) -> tuple[Scattering, ...]:
         """How each target scatters."""
         return tuple(t.scattering or self.physics.scattering for t in self.world.targets)
@@ -231,14 +234,13 @@ class Scene:
 
     def moment(self, time: float, *, key: int | str = 0, step: int = 0, seed: int = 0) -> WorldState:
         """The world at a time (s), with the snaps that a frame of the sequence of this key, step and seed draws."""
-        placed = zip(self.world.targets, self.meshes, strict=True)
         bodies = tuple(
             PlacedTarget(t.name, mesh, pose(t.motion, time), velocity(t.motion, time), t.motion, time)
-            for t, mesh in placed
+            for t, mesh in zip(self.world.targets, self.meshes, strict=True)
         )
         bottom = self.world.environment.depth
         snaps: list[Emission] = []
-        for i, source in enumerate(self.world.sources):
+        for i, source in enumerate(self.sources):
             snaps += source.emissions(bottom, stream(seed, "snap", key, step, i), time)
         loose = list[Scatterers]()
         for i, field in enumerate(self.world.scatterers):

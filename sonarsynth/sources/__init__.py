@@ -6,6 +6,7 @@ from typing import Annotated
 
 from sonarsynth.description import BY_KIND
 from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.sources.transmitter import Transmitter
 
-Source = Annotated[SnappingShrimp, BY_KIND]
+Source = Annotated[SnappingShrimp | Transmitter, BY_KIND]
 """What makes sound, by `kind`."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description.method import Method
+from sonarsynth.geometry.motion import Motion
 from sonarsynth.sources.pulse_model import PulseModel
 from sonarsynth.sources.snap_pulses import Waveform, waveform
 
@@ -49,8 +50,14 @@ class SoundSource(Method):
     """The field that gives the times, to be named where they are wrong."""
     pulse_field: ClassVar[str] = "kind"
     """The field that gives the pulse."""
+    carried: ClassVar[bool] = False
+    """Whether the sonar carries it: then it is somewhere only as `carried_by` gives it."""
     illuminates: bool = True
     """Whether its echoes are traced; if not, it is heard directly alone."""
+
+    def carried_by(self, motion: Motion) -> SoundSource:
+        """The same aboard a sonar that moves so; what stands in the world stays where it is."""
+        return self
 
     def position_at(self, bottom: float, time: float = 0.0) -> Floats:
         """Where it is (xyz) in m, over a bottom at this depth (m), at a time (s) since the start of the motions."""

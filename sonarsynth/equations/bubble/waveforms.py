@@ -16,6 +16,9 @@ MOST_SAMPLES = 1 << 24
 SPREAD = 6.5
 """Standard deviations (times sqrt 2) of a Gaussian that is down to 5e-19."""
 
+OVERSAMPLED = 2.0
+"""Rate of the samples of a sweep, over what its middle would need: its ends have waves beyond its band."""
+
 
 def logarithmic(bubble: Bubble, highest: float) -> Pulse:
     """The logarithmic bubble's pulse for waves up to `highest` (Hz)."""
@@ -77,6 +80,22 @@ def gabor(frequency: float, cycles: float, peak: float, highest: float) -> Pulse
     time, step = _grid(SPREAD * np.sqrt(2.0) * s, highest + frequency + SPREAD / (np.sqrt(2.0) * np.pi * s))
     p = peak * np.cos(2.0 * np.pi * frequency * time) * np.exp(-0.5 * (time / s) ** 2)
     return Pulse(time, p * step, float(time[0]), float(time[-1]), abs(peak))
+
+
+def sweep(start: float, stop: float, duration: float, taper: float, hyperbolic: bool, highest: float) -> Pulse:
+    """A sweep from one frequency (Hz) to another in some time (s), of 1 Pa, whose ends are raised cosines over a share
+    `taper` of it. Linear: the phase is 2 pi (f0 t + b t^2/(2 T)), f0 and b its middle and its band; hyperbolic, the
+    period changes evenly: 2 pi ln(1 - k (t + T/2))/-k' (Altes & Titlebaum 1970, J. Acoust. Soc. Am. 48, 1014)."""
+    time, step = _grid(0.5 * duration, OVERSAMPLED * (highest + max(start, stop)))
+    since = time + 0.5 * duration
+    if hyperbolic and start != stop:
+        rate = (1.0 / stop - 1.0 / start) / duration
+        cycles = np.log1p(start * rate * since) / rate
+    else:
+        cycles = start * since + 0.5 * (stop - start) / duration * since**2
+    edge = np.clip(np.minimum(since, duration - since) / (0.5 * taper * duration), 0.0, 1.0)
+    p = np.sin(2.0 * np.pi * cycles) * np.sin(0.5 * np.pi * edge) ** 2
+    return Pulse(time, p * step, float(time[0]), float(time[-1]), 1.0)
 
 
 def _deviation(frequency: float, cycles: float) -> float:

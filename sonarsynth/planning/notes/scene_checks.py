@@ -119,8 +119,8 @@ def _check_plain(scene: Scene, number: int) -> None:
 def check_shrimp(scene: Scene) -> None:
     """Every source must be in the water, and its pulse one that can be made and heard."""
     bottom_depth = scene.world.environment.depth
-    for i, source in enumerate(scene.world.sources):
-        position = source.position_at(bottom_depth)
+    for i, source in enumerate(scene.sources):
+        position = source.position_at(bottom_depth, scene.trajectory.start)
         if not np.abs(position).max() <= FARTHEST:
             raise FieldError(
                 ("scene", "world", "sources", i, "position"), f"is more than {FARTHEST:g} m from the origin"
@@ -245,7 +245,7 @@ def check_located(scene: Scene, frame: Frame, products: frozenset[str]) -> None:
             raise FieldError(
                 ("scene", "world", "sources", owner, "position"),
                 f"is {away:.3g} m from the centre of the array at frame {frame.index}, among its hydrophones, which "
-                f"reach {least:.3g} m: it cannot be located, so there would be no image",
+                f"reach {least:.3g} m: it cannot be located, so there would be no image, but for locating: trigger",
             )
 
 

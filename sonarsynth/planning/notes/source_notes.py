@@ -34,8 +34,8 @@ STEERED = 0.25
 
 def standing_off(scene: Scene) -> tuple[str, ...]:
     """Names of the sources that are not on the bottom, to what the sonar knows of its depth."""
-    bottom, error = scene.world.environment.depth, scene.sonar.bed_depth_error
-    height = {source.name: float(source.position_at(bottom)[2]) + bottom for source in scene.world.sources}
+    bottom, error, start = scene.world.environment.depth, scene.sonar.bed_depth_error, scene.trajectory.start
+    height = {source.name: float(source.position_at(bottom, start)[2]) + bottom for source in scene.sources}
     return tuple(name for name, up in height.items() if up > OFF * error)
 
 

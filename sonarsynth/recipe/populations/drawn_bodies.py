@@ -166,7 +166,7 @@ class _Sea:
         times = np.array([trajectory.time(step) for step in steps])
         sonar = np.array([pose(trajectory.sonar, t).position for t in times])
         others: list[_Ball | _MovingBox] = [_Ball(sonar, 0.5 * elements(scene.sonar.array).aperture)]
-        for i, source in enumerate(scene.world.sources):
+        for i, source in enumerate(scene.sources):
             snaps = [
                 source.emissions(bottom, stream(seed, "snap", key, step, i), t)
                 for step, t in zip(steps, times.tolist(), strict=True)

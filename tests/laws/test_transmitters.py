@@ -1,0 +1,210 @@
+"""A sonar's own transmitter: where it is, where it sends, what it sends, and what becomes of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from sonarsynth import FieldError, render
+from sonarsynth.conventions import Floats, direction
+from sonarsynth.equations.bubble import pulses
+from sonarsynth.geometry.motion import Circle, ConstantVelocity, Motion, Still, pose
+from sonarsynth.planning import plan
+from sonarsynth.ranging import SensorDelays
+from sonarsynth.ranging.location.triggered import Triggered
+from sonarsynth.receiver import Band, BandPass, BeamGrid, PlanarLattice, elements
+from sonarsynth.recipe import Recipe
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.sources.snap_models import Gabor
+from sonarsynth.sources.transmitter import Sweep, TransmitBeam, Transmitter
+from tests.scenes import point_scene
+
+SWEEP = Sweep(start=40e3, stop=80e3, duration=2e-3)
+TONE = Gabor(frequency=60e3, cycles=10.0)
+BEAM = TransmitBeam(azimuth_width=np.deg2rad(60), elevation_width=np.deg2rad(30), azimuth=0.2, elevation=-0.1)
+AT = (0.1, 0.05, -0.3)
+TARGET = (30.0, 2.0, -51.0)
+C = 1500.0
+
+
+def scene(
+    transmitter: Transmitter, motion: Motion | None = None, target: tuple[float, float, float] = TARGET
+) -> Recipe:
+    """A point in deep water, and a sonar that knows when and where it sends."""
+    band = {"band": Band(low=38e3, high=82e3), "filter": BandPass(low=38e3, high=82e3)}
+    beams = BeamGrid(azimuth_span=np.deg2rad(20), azimuths=21, elevation_span=np.deg2rad(20), elevations=21)
+    array = PlanarLattice(columns=16, rows=12, pitch=0.01, face=0.0)
+    recipe = point_scene(target, AT, strength=1e-2, array=array, beams=beams, sound_speed_error=0.0, **band)
+    return with_source(recipe, transmitter, motion)
+
+
+def with_source(recipe: Recipe, source: Any, motion: Motion | None = None) -> Recipe:
+    own = recipe.scene
+    processing = replace(own.processing, locating=Triggered(time_error=1e-9, position_error=1e-6))
+    trajectory = own.trajectory if motion is None else replace(own.trajectory, sonar=motion)
+    world = replace(own.world, sources=(source,))
+    return replace(recipe, scene=replace(own, world=world, processing=processing, trajectory=trajectory))
+
+
+def test_at_rest_it_is_a_source_that_stands_there() -> None:
+    """Every bit of what is heard, located and ranged."""
+    own = scene(Transmitter(position=AT, pulse=TONE, source_level=180.0))
+    place = tuple(pose(own.scene.trajectory.sonar, 0.0).to_world(AT).tolist())
+    other = with_source(own, SnappingShrimp(position=place, snap=TONE, source_level=180.0))
+    ours, theirs = (render(plan(recipe, ["signals", "image", "cloud"]), 0) for recipe in (own, other))
+    for name in ("signals/pressure", "image/energy", "cloud/range", "source_estimates/position"):
+        np.testing.assert_array_equal(ours[name].values, theirs[name].values)
+    assert int(ours["cloud/count"]) == 1
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        ConstantVelocity(start=(1.0, 2.0, -50.0), heading=0.7, speed=2.0, climb=0.3, pitch=0.1, roll=-0.2),
+        Circle(centre=(5.0, 0.0, -40.0), radius=3.0, speed=1.5, pitch=0.2, roll=0.1),
+    ],
+    ids=lambda m: m.kind,
+)
+def test_it_goes_and_turns_with_the_sonar(motion: Motion) -> None:
+    recipe = scene(Transmitter(position=AT, pulse=SWEEP, source_level=200.0, beam=BEAM, ping_times=(0.0, 0.02)), motion)
+    frame, step = recipe.scene.frame(0), 1e-4
+    for late, sent in zip((0.0, 0.02), frame.moment.snaps, strict=True):
+        before, now, after = (pose(motion, frame.time + late + off) for off in (-step, 0.0, step))
+        np.testing.assert_allclose(sent.position, now.to_world(AT), atol=1e-12)
+        moved = (after.to_world(AT) - before.to_world(AT)) / (2.0 * step)
+        np.testing.assert_allclose(sent.velocity, moved, atol=1e-7)
+        assert sent.directivity is not None
+        towards = direction(np.linspace(-1.5, 1.5, 7), np.linspace(-0.6, 0.7, 7))
+        np.testing.assert_allclose(sent.directivity(now.turn_to_world(towards)), BEAM.pattern(towards), atol=1e-12)
+
+
+def test_a_beam_has_half_its_power_at_its_widths_and_little_behind() -> None:
+    ahead = TransmitBeam(azimuth_width=np.deg2rad(60), elevation_width=np.deg2rad(20), baffle=40.0)
+    assert ahead.pattern(direction(0.0, 0.0)) == pytest.approx(1.0, abs=1e-12)
+    sides = np.deg2rad([[30.0, 0.0], [-30.0, 0.0], [0.0, 10.0], [0.0, -10.0]])
+    assert ahead.pattern(direction(*sides.T)) ** 2 == pytest.approx(0.5, abs=2e-5)
+    behind = direction(np.deg2rad([110.0, 180.0, -150.0]), np.array([0.0, 0.0, 0.2]))
+    assert 20.0 * np.log10(ahead.pattern(behind)) == pytest.approx(-40.0, abs=1e-9)
+    turned = replace(ahead, azimuth=0.3, elevation=-0.2)
+    assert turned.pattern(direction(0.3, -0.2)) == pytest.approx(1.0, abs=1e-12)
+    assert turned.pattern(direction(0.3, -0.2 + np.deg2rad(10.0))) ** 2 == pytest.approx(0.5, abs=2e-5)
+    rim = ahead.pattern(
+        direction(0.5 * np.pi + np.array([-1e-7, 1e-7]), np.zeros(2))
+    )  # no step at the plane of its face
+    assert abs(np.diff(rim)) < 1e-6
+
+
+def peak(pressure: Floats, rate: float) -> Floats:
+    """Peak (hydrophone,) of tones from their energy: peak^2 s sqrt(pi)/2 of a Gaussian of deviation s."""
+    deviation = TONE.cycles / TONE.frequency / np.sqrt(8.0 * np.log(2.0))
+    return np.asarray(np.sqrt(np.sum(pressure**2, axis=1) / rate / (0.5 * np.sqrt(np.pi) * deviation)))
+
+
+def test_what_arrives_is_what_the_sonar_equation_says() -> None:
+    """SL + 20 lg b + TS - 20 lg r1 r2 of a tone, with one TS on the axis of the beam and beside it; the direct sound is
+    SL + 20 lg b - 20 lg r."""
+    sonar, strengths = pose(Still(position=(0.0, 0.0, -50.0), heading=0.5 * np.pi), 0.0), []
+    sender, place = Transmitter(position=AT, pulse=TONE, source_level=190.0, beam=BEAM), sonar.to_world(AT)
+    sent = 10.0 ** (190.0 / 20.0 - 6.0)
+    for target in (TARGET, (20.0, -4.0, -54.0), (25.0, 10.0, -46.0)):
+        recipe = scene(sender, target=target)
+        frame = render(plan(recipe, ["signals"]), 0)
+        hydrophones = sonar.to_world(elements(recipe.scene.sonar.array).position)
+        pressure = frame["signals/pressure"].values.astype(float)
+        rate = recipe.scene.sonar.sampling_frequency
+        late = float(frame["signals/start"]) + np.arange(pressure.shape[1]) / rate > 0.02
+        out, away = np.array(target) - place, hydrophones - place
+        r1, r = np.linalg.norm(out), np.linalg.norm(away, axis=1)
+        loud = sent * BEAM.pattern(sonar.turn_to_body(out / r1)) / r1
+        r2 = np.linalg.norm(np.array(target) - hydrophones, axis=1)
+        strengths.append(peak(pressure[:, late], rate) / (loud / r2))
+        direct = sent * BEAM.pattern(sonar.turn_to_body(away / r[:, None])) / r
+        assert peak(pressure[:, ~late], rate) == pytest.approx(np.abs(direct), rel=2e-3)
+    assert np.array(strengths) == pytest.approx(np.mean(strengths), rel=5e-3)
+
+
+def wave(sweep: Sweep, time: Floats) -> Floats:
+    """The same in closed form, at times (sample,) s from its middle."""
+    t, length = time + 0.5 * sweep.duration, sweep.duration
+    if sweep.law == "linear":
+        cycles = sweep.start * t + (sweep.stop - sweep.start) * t**2 / (2.0 * length)
+    else:
+        k = (1.0 - sweep.start / sweep.stop) / length  # 1/f = (1 - k t)/f1
+        cycles = sweep.start * (t if k == 0.0 else -np.log(np.maximum(1.0 - k * t, 1e-9)) / k)
+    ends = np.clip(np.minimum(t, length - t) / (0.05 * length), 0.0, 1.0)
+    return np.asarray(np.sin(2.0 * np.pi * cycles) * 0.5 * (1.0 - np.cos(np.pi * ends)))
+
+
+LAWS = pytest.mark.parametrize("law", ["linear", "hyperbolic"])
+
+
+@LAWS
+@pytest.mark.parametrize(("start", "stop"), [(40e3, 80e3), (70e3, 30e3), (50e3, 50e3)])
+def test_a_sweep_has_the_spectrum_of_its_waveform(law: Any, start: float, stop: float) -> None:
+    sweep = Sweep(start=start, stop=stop, duration=2e-3, law=law)
+    f = np.linspace(20e3, 100e3, 161)
+    step = 1e-7
+    time = np.arange(-1e-3, 1e-3 + step, step)
+    exact = np.exp(-2j * np.pi * f[:, None] * time) @ wave(sweep, time) * step
+    assert np.abs(pulses.spectrum(f, sweep.pulse(0.0, 100e3)) - exact).max() < 1e-4 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize(
+    ("law", "start", "stop", "length", "loss"),
+    [
+        ("linear", 25e3, 85e3, 2e-3, 0.09),
+        ("hyperbolic", 25e3, 85e3, 2e-3, 0.02),
+        ("linear", 360e3, 440e3, 4e-3, 0.58),
+        ("hyperbolic", 360e3, 440e3, 4e-3, 0.05),
+    ],
+)
+def test_a_sweep_that_is_stretched_by_motion_comes_at_another_time(
+    law: Any, start: float, stop: float, length: float, loss: float
+) -> None:
+    """At 2 m/s towards a target: by (2 v/c) f2 T/B, counted from its beginning (Rihaczek 1969, ch. 7); with losses
+    of 0.1 to 0.6 dB."""
+    sweep, stretch = Sweep(start=start, stop=stop, duration=length, law=law), 1.0 + 2.0 * 2.0 / C
+    step = 1.0 / (12.0 * stop)
+    half = int(0.7 * length / step)
+    time = np.arange(-half, half) * step
+    still, moved = wave(sweep, time), wave(sweep, (time + 0.5 * length) * stretch - 0.5 * length)
+    size = 4 * half
+
+    def envelope(a: Floats, b: Floats) -> Floats:
+        product = np.fft.fft(a, size) * np.fft.fft(b, size).conj()
+        product[size // 2 :] = 0.0
+        return np.abs(np.fft.fftshift(np.fft.ifft(product)))
+
+    own, other = envelope(still, still), envelope(moved, still)
+    shift = (np.argmax(other) - np.argmax(own)) * step
+    assert shift == pytest.approx(
+        -2.0 * 2.0 / C * stop * length / (stop - start), abs=0.02 * length / (length * (stop - start)) + 2 * step
+    )
+    assert 20.0 * np.log10(own.max() / other.max()) == pytest.approx(loss, abs=0.02)
+
+
+@LAWS
+def test_the_echo_of_a_sweep_is_one_point_where_the_target_is(law: Any) -> None:
+    ping = Transmitter(position=AT, pulse=replace(SWEEP, law=law), source_level=190.0, beam=BEAM)
+    cloud = render(scene(ping), 0)["cloud"]
+    assert int(cloud["count"]) == 1 and int(cloud["target"][0]) == 0
+    away = np.linalg.norm(np.array(TARGET) - [0.0, 0.0, -50.0])
+    assert abs(float(cloud["range"][0]) - away) < 1e-3
+
+
+def test_bad_transmitters_are_refused_in_one_line() -> None:
+    with pytest.raises(ValidationError, match="position is the middle of the array"):
+        Transmitter(position=(0.0, 0.0, 0.0), pulse=TONE, source_level=190.0)
+    with pytest.raises(FieldError, match=r"sources\.0\.position: .* at hydrophone \d+ of the array"):
+        plan(scene(Transmitter(position=(0.0, 0.075, -0.055), pulse=TONE, source_level=190.0)))
+    near = scene(Transmitter(position=(0.05, 0.01, -0.04), pulse=SWEEP, source_level=190.0))
+    listening = replace(near.scene, processing=replace(near.scene.processing, locating=SensorDelays()))
+    with pytest.raises(FieldError, match="no image, but for locating: trigger"):
+        plan(replace(near, scene=listening))
+    above = scene(Transmitter(position=(0.0, 0.0, 60.0), pulse=TONE, source_level=190.0))
+    with pytest.raises(FieldError, match=r"sources\.0\.position: depth -10 m is outside the water"):
+        plan(above)
