@@ -33,6 +33,7 @@ from sonarsynth.pipeline.stored_values import (
     in_slots,
     link_budget_values,
     path_values,
+    range_image_values,
     signal_values,
     source_estimate_values,
     truth_values,
@@ -46,6 +47,7 @@ from sonarsynth.products import Arrivals, PointCloud, Signals, no_points
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.location.association import in_record, light_first
+from sonarsynth.ranging.range_cells import range_image
 from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
@@ -54,6 +56,8 @@ from sonarsynth.threads import in_one_thread
 from sonarsynth.tracing.arrivals import trace
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
     import xarray as xr
 
 __all__ = [
@@ -72,6 +76,7 @@ __all__ = [
     "frame_tree",
     "locate_and_image",
     "range_frame",
+    "range_image_of",
     "render",
     "silent_at",
     "silent_frame",
@@ -224,6 +229,9 @@ def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFr
     if "beams" in plan.products:
         values |= beam_values(plan, beamformed.beams, beamformed.image)
         mark_stage("resolve")
+    if "range_image" in plan.products:
+        values |= range_image_values(plan, range_image_of(plan, frame, beamformed), traced.truth)
+        mark_stage("range image")
     if "cloud" in plan.products:
         cloud = cloud_of(plan, frame, beamformed).loudest(plan.sizes["point"])
         mark_stage("range")
@@ -233,19 +241,31 @@ def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFr
     return values
 
 
-def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointCloud:
-    """The points of a frame that has an image; `plan` is that of its sequence."""
+def _received(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> ReceivedWindow | None:
+    """What echoes are ranged from; none without an image, or where its echo window is not in the record."""
     image, signals, estimates, beams = beamformed.image, beamformed.imaged, beamformed.estimates, beamformed.beams
     if image is None or signals is None or estimates is None or beams is None:
-        return no_points()
+        return None
     if not in_record(estimates, signals, plan.windows.echo_start, plan.windows.echo_stop)[:1].any():
+        return None
+    loudest, pulse = ranging_kernels.peak(signals.pressure), plan.windows.supports.direct
+    elements, sonar = known_elements(plan, frame), plan.scene.sonar
+    return ReceivedWindow(elements, sonar, image, beams, loudest, beamformed.signals, estimates, pulse)
+
+
+def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointCloud:
+    """The points of a frame that has an image; `plan` is that of its sequence."""
+    window, choices = _received(plan, frame, beamformed), plan.choices
+    if window is None:
         return no_points()
-    elements, sonar, choices = known_elements(plan, frame), plan.scene.sonar, plan.choices
-    loudest = ranging_kernels.peak(signals.pressure)
-    pulse = plan.windows.supports.direct
-    window = ReceivedWindow(elements, sonar, image, beams, loudest, beamformed.signals, estimates, pulse)
     track = receiver_of(plan, frame).track
     return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile, track)
+
+
+def range_image_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> npt.NDArray[np.float32] | None:
+    """The range image of a frame (range, azimuth); none as for `cloud_of`. `plan` is that of its sequence."""
+    window, grid = _received(plan, frame, beamformed), plan.scene.sonar.ranges
+    return None if window is None or grid is None else range_image(window, grid.range, receiver_of(plan, frame).track)
 
 
 def values_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> Values:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation
 from sonarsynth.equations.kernels.rounding import multiples
 from sonarsynth.imaging.beam_envelopes import envelope_levels
+from sonarsynth.labels.views.range_cells_met import met_at_ranges
 from sonarsynth.pipeline.variables.variable import Variable
 from sonarsynth.pipeline.variables.variable_groups import LEVEL_STEP, NO_LEVEL
 from sonarsynth.planning import Plan
@@ -125,6 +127,16 @@ def beam_values(plan: Plan, beams: BeamSpectra | None, image: EnergyImage) -> Va
     return table("/beams", level=stored, start=np.nan if beams is None else beams.snapshots.start)
 
 
+def range_image_values(plan: Plan, energy: npt.NDArray[np.float32] | None, truth: Truth) -> Values:
+    """The range image, NaN where there is none, and whose cells are whose."""
+    grid, beams = plan.scene.sonar.ranges, plan.scene.sonar.beams
+    assert grid is not None, "asked when the plan was made"
+    if energy is None:
+        energy = np.full((grid.count, beams.azimuths), np.nan, np.float32)
+    target = met_at_ranges(truth.beam_target, truth.beam_range, beams.elevation, grid.range)
+    return table("/range_image", energy=energy, target=target)
+
+
 def cloud_values(cloud: PointCloud, labels: PointLabels, size: int, targets: int) -> Values:
     """The cloud, each coordinate apart, and whose echo each point is, padded to `size` points; how many points each of
     so many targets has."""
@@ -168,7 +180,7 @@ def _padded(values: np.ndarray, size: int) -> np.ndarray:
     return rows
 
 
-INDICES = (("/truth/beams", "target"), ("/cloud", "target"), ("/paths", "target"))
+INDICES = (("/truth/beams", "target"), ("/cloud", "target"), ("/paths", "target"), ("/range_image", "target"))
 """Variables that are numbers of targets."""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.planning.choices import ALL_PRODUCTS, OF_BEAMS, PRODUCTS, Choices, choices_from
 from sonarsynth.planning.choosing import choose
 from sonarsynth.planning.costs import machine_factor, stages
-from sonarsynth.planning.listening_windows import check_windows, frame_start, listening_windows
+from sonarsynth.planning.listening_windows import frame_start, listening_windows
 from sonarsynth.planning.measured.path_counts import room_for_paths
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, behind_baffle, context_of, receiver_of, survey_of
@@ -18,7 +18,8 @@ from sonarsynth.planning.measured.sampled_frames import SampledScene, check_alik
 from sonarsynth.planning.measured.thinned_profile import thinned
 from sonarsynth.planning.notes.omissions import left_out
 from sonarsynth.planning.notes.plan_notes import notes, stored_validity
-from sonarsynth.planning.notes.scene_checks import check_frame, check_located, check_methods, read_inputs
+from sonarsynth.planning.notes.product_checks import check_located, check_methods, check_windows
+from sonarsynth.planning.notes.scene_checks import check_frame, read_inputs
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan, Windows
 from sonarsynth.receiver import elements
@@ -145,7 +146,8 @@ def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:
     scene = recipe.scene_of(0)
     beams = scene.sonar.beams
     snaps = most_emissions(recipe.spanned)
-    return {
+    ranges = {} if scene.sonar.ranges is None else {"range": scene.sonar.ranges.count}
+    return ranges | {
         "frame": recipe.frames,
         "sensor": elements(scene.sonar.array).count,
         "sample": windows.samples,

@@ -17,9 +17,9 @@ from sonarsynth.state import OcclusionPoint
 PRODUCTS = ("signals", "image", "cloud")
 """What a build makes where nothing else is asked for. Truth is always written; with any product, levels of what is
 traced too."""
-ALL_PRODUCTS = (*PRODUCTS, "beams", "paths")
+ALL_PRODUCTS = (*PRODUCTS, "beams", "range_image", "paths")
 """What a build can be asked for."""
-OF_BEAMS = frozenset({"image", "cloud", "beams"})
+OF_BEAMS = frozenset({"image", "cloud", "beams", "range_image"})
 """Products that the signals are steered for."""
 OWN_VIEW = 5e-3
 """Error of signals under which each hydrophone sees the targets by itself: what is hidden from a few of them alone, in

@@ -34,6 +34,7 @@ SECONDS = {
     "transform sensor sample": 1.6e-9,
     "steer beam bin": 4.5e-8,
     "envelope delay": 2e-8,
+    "range cell": 1.2e-8,
     "write byte": 2e-9,
 }
 """Seconds per unit of work."""
@@ -254,12 +255,22 @@ def _sonar_rows(plan: Plan, size: FrameSize) -> list[Row]:
         description, count = f"envelopes of beams, {delays} delays", size.beams * delays
         seconds = size.beams * size.bins * SECONDS["steer beam bin"] + count * SECONDS["envelope delay"]
         rows.append(("resolve", description, "requested", "0.005 dB, rounding", seconds, 2 * count))
+    rows += _range_image_row(plan, size)
     if "cloud" in plan.products:
         error = "predicted, /cloud/range_error" + _bent(plan)
         seconds = plan.choices.picking.cost(size) + plan.choices.placing.cost(size)
         method = f"{plan.choices.picking.row()}, {plan.choices.placing.row()}"
         rows.append(("range", method, "requested", error, seconds, 66 * plan.sizes["point"]))
     return rows
+
+
+def _range_image_row(plan: Plan, size: FrameSize) -> list[Row]:
+    grid = plan.scene.sonar.ranges
+    if "range_image" not in plan.products or grid is None:
+        return []
+    seconds = size.beams * (size.bins * SECONDS["steer beam bin"] + grid.count * SECONDS["range cell"])
+    error, stored = "ranges by the assumed sound speed", 6 * plan.sizes["azimuth"] * grid.count
+    return [("range image", f"{grid.count} ranges", "requested", error, seconds, stored)]
 
 
 def stages(plan: Plan) -> tuple[Stage, ...]:

@@ -8,9 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints, depth, format_bytes
+from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.description import FieldError
-from sonarsynth.description.memory import frame_bytes, free_bytes
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays.ray_solutions import mean_slowness, water
 from sonarsynth.geometry.mesh import in_blocks
@@ -20,7 +19,7 @@ from sonarsynth.planning.plans import Plan, PulseDurations, Windows
 from sonarsynth.planning.pulse_durations import blur_of, lateness, supports_of
 from sonarsynth.products import Paths
 from sonarsynth.propagation import Straight
-from sonarsynth.receiver import Band, Sonar, elements
+from sonarsynth.receiver import Band, RangeGrid, Sonar
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.filtered_pulse import snap_levels
@@ -57,6 +56,9 @@ def listening_windows(recipe: Recipe, looks: Sequence[SampledScene]) -> Windows:
     echoes = bool(np.isfinite(first_echo).any())
     shortest = float(np.nanmin(first_echo)) if echoes else np.nan
     longest = float(np.nanmax(last_echo)) if echoes else np.nan
+    if (grid := sonar.ranges) is not None:  # heard from the first cell to the last
+        shortest, longest = _with_ranges(grid, sonar.assumed_sound_speed, looks, shortest, longest)
+        echoes = True
     unseen = UNSAMPLED_MARGIN * (longest - shortest) if (real >= 0).sum() < recipe.frames else 0.0
     removed, start = _opening(looks[0].scene, shortest, supports, MARGIN + unseen)
     latest = longest + supports.echo_after + MARGIN + unseen
@@ -75,6 +77,15 @@ def listening_windows(recipe: Recipe, looks: Sequence[SampledScene]) -> Windows:
     cut = echoes and (start > shortest - supports.foot or stop < longest + supports.foot)
     tight = tuple(int(n) for n in dict.fromkeys(real[[*_first(first_echo, real), *_first(-last_echo, real)]]))
     return Windows(starts, samples, float(start), float(stop), supports, disturbed, removed, cut, tight)
+
+
+def _with_ranges(
+    grid: RangeGrid, speed: float, looks: Sequence[SampledScene], first: float, last: float
+) -> tuple[float, float]:
+    """First and last echo (s), NaN for none, with what may be heard from ranges by any source."""
+    away = [np.linalg.norm(s.position - f.sonar_pose.position) for k in looks for f in k.frames for s in f.moment.snaps]
+    nearest = 2.0 * max(grid.near - float(max(away, default=0.0)), 0.0) / speed
+    return float(np.nanmin([first, nearest])), float(np.nanmax([last, 2.0 * grid.range[-1] / speed]))
 
 
 def _shortest(band: Band, pulse: float) -> float:
@@ -280,21 +291,3 @@ def _straight_time(profile: Profile, bottom_depth: float, a: Floats, b: Floats) 
     ends = np.broadcast_arrays(depth(a), depth(b))
     slowness = mean_slowness(water(profile.depth, profile.speed, bottom_depth), *(np.atleast_1d(z) for z in ends))
     return np.asarray(distance * slowness.reshape(distance.shape))
-
-
-def check_windows(scene: Scene, windows: Windows) -> None:
-    """The echo window must hold a period of the band, and a frame must fit in the memory that is free here."""
-    path = ("scene", "processing", "echo_window")
-    length, period = windows.echo_stop - windows.echo_start, 1.0 / scene.sonar.band.high
-    if length < period:
-        raise FieldError(path, f"is {length:.3g} s long, less than a period of the highest frequency, {period:.3g} s")
-    sensors, facets = elements(scene.sonar.array).count, sum(len(mesh.faces) for mesh in scene.meshes)
-    needed, free = frame_bytes(facets, sensors * windows.samples, scene.parts_kept), free_bytes()
-    if needed > max(free, frame_bytes(facets, 0)):  # meshes are checked by themselves
-        seconds = windows.samples / scene.sonar.sampling_frequency
-        raise FieldError(
-            path,
-            f"a frame would take {format_bytes(needed)} of memory, and {format_bytes(free)} are free here "
-            f"({sensors} hydrophones for "
-            f"{seconds:.3g} s): the arrivals are too far apart in time",
-        )

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from sonarsynth.description import FieldError
-from sonarsynth.planning.listening_windows import check_windows, listening_windows
+from sonarsynth.planning.listening_windows import listening_windows
 from sonarsynth.planning.measured.ray_bending import difference_of_paths, propagation
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.measured.thinned_profile import SHARE
-from sonarsynth.planning.notes.scene_checks import check_frame, check_located, check_shrimp, read_inputs
+from sonarsynth.planning.notes.product_checks import check_located, check_windows
+from sonarsynth.planning.notes.scene_checks import check_frame, check_shrimp, read_inputs
 from sonarsynth.planning.plans import Plan
 from sonarsynth.sources import Source
 

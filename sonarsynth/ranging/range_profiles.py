@@ -62,6 +62,8 @@ class EchoFilter:
     received: ReceivedWindow
     share: Floats  # (bin,) of the amplitude of an echo
     matched: Complexes  # (bin,) the pulse's own waveform taken out
+    taper: Floats  # (bin,) of the band
+    unity: float  # power in a profile of an echo that is as strong as the direct pulse
     length: int  # of the transform to delays
     count: int  # of delays that are in the window
 
@@ -161,8 +163,8 @@ def template_spectrum(template: Complexes, length: int) -> Complexes:
     return np.asarray(rfft(wave), np.complex128)
 
 
-def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profiles:
-    """Profiles of the beams (row, column): matched to the direct pulse as this beam would hear it, whitened, tapered.
+def echo_filter(received: ReceivedWindow) -> EchoFilter:
+    """What makes profiles of beams: matched to the direct pulse as this beam would hear it, whitened, tapered.
 
     With W the direct pulse at the array centre and D the face directivity towards the beam, the profile is the envelope
     of the inverse transform of B conj(W) D/(|W|^2 + w max|W|^2): all of the band counts alike, which is as sharp as the
@@ -171,19 +173,27 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
     echo's spectrum, or an echo would be loudest where the face hears best, nearer to the axis.
     """
     window, sonar, elements = received.beams.snapshots, received.sonar, received.elements
-    c, f, spacing = sonar.assumed_sound_speed, window.frequency, window.spacing
+    f, spacing = window.frequency, window.spacing
     lowest = round(f[0] / spacing)
     samples = fast_length(window.samples)
     wave = direct_spectrum(received.direct, received.estimates, elements, sonar, samples, received.pulse)
     wave = wave[lowest : lowest + len(f)]
     taper, matched = matched_filter(f, wave, spacing, sonar.band)
     share = np.abs(wave * matched) + np.finfo(float).tiny
-    share /= share.sum()
     length = next_fast_len(OVERSAMPLING // 2 * len(f))
-    step = 0.5 / (length * spacing)
+    count = min(int(window.duration / (0.5 / (length * spacing))) + 1, 2 * length)
+    unity = float((share.sum() * window.sampling_frequency / length) ** 2)  # beams are in Pa, the pulse in Pa s
+    return EchoFilter(received, share / share.sum(), matched, taper, unity, length, count)
+
+
+def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profiles:
+    """Profiles of the beams (row, column) by their `echo_filter`."""
+    window, elements, c = received.beams.snapshots, received.elements, received.sonar.assumed_sound_speed
+    f, spacing = window.frequency, window.spacing
     row, column = beams
     u = direction(received.image.azimuth[column], received.image.elevation[row])
-    echoes = EchoFilter(received, share, matched, length, min(int(window.duration / step) + 1, 2 * length))
+    echoes = echo_filter(received)
+    share, matched, taper = echoes.share, echoes.matched, echoes.taper
     spectra, power = echoes.profiles(u)
     spread = np.sum(taper**2)
     centre = float(f @ taper**2 / spread)
@@ -195,7 +205,7 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
         spectra=spectra,
         power=power,
         first=window.start - float(received.estimates.time[0]),
-        step=step,
+        step=echoes.step,
         width=half_width(elements, centre / c),
         resolution=1 / (2 * np.pi * beta),
         moments=_moments(f, share, np.abs(matched) ** 2, spacing),

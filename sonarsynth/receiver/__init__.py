@@ -19,6 +19,7 @@ from sonarsynth.conventions import (
     NonNegativeMetres,
     Pascals,
     PositiveHertz,
+    PositiveMetres,
     PositiveRadians,
     WaterSoundSpeed,
 )
@@ -133,6 +134,9 @@ class Converter:
         return float(self.full_scale / 2 ** (self.bits - 1))
 
 
+MOST_RANGES = 100_000
+
+
 @description
 class BeamGrid:
     """Steered directions: a grid symmetric about the acoustic axis, ascending in azimuth and in elevation."""
@@ -155,6 +159,36 @@ class BeamGrid:
     def elevation(self) -> Floats:
         """(elevation,) rad, up positive."""
         return _symmetric(self.elevation_span, self.elevations)
+
+
+@description
+class RangeGrid:
+    """Ranges of the cells of a range image."""
+
+    near: PositiveMetres
+    """Of the first cells."""
+    far: PositiveMetres
+    """Of the last, or less than a step beyond."""
+    step: PositiveMetres
+    """From one to the next: a quarter of c/B at most, or echoes fall between cells."""
+
+    @model_validator(mode="after")
+    def _check(self) -> RangeGrid:
+        if not self.near < self.far:
+            raise ValueError("far must be beyond near")
+        if (self.far - self.near) / self.step > MOST_RANGES:
+            raise ValueError(f"more than {MOST_RANGES} ranges")
+        return self
+
+    @property
+    def count(self) -> int:
+        """How many ranges there are."""
+        return 1 + int(np.ceil((self.far - self.near) / self.step - 1e-9))
+
+    @property
+    def range(self) -> Floats:
+        """(range,) m, ascending."""
+        return np.asarray(self.near + self.step * np.arange(self.count), float)
 
 
 def _symmetric(span: float, count: int) -> Floats:
@@ -186,6 +220,8 @@ class Sonar:
     """Converter to whole counts; left out: pressure is stored as float32."""
     beams: BeamGrid = BeamGrid()
     """Directions of the images."""
+    ranges: RangeGrid | None = None
+    """Ranges of range images, which it then listens for; left out: there are none."""
     assumed_sound_speed: WaterSoundSpeed = 1540.0
     """The sound speed that the sonar uses to steer and to range."""
     sound_speed_error: Annotated[MetresPerSecond, Ge(0)] = 1.0

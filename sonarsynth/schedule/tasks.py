@@ -104,7 +104,7 @@ def render_frames(job: Job, frames: Sequence[int]) -> list[StageResult]:
 def stages_of(products: Iterable[str]) -> list[str]:
     """Those of frames with such products: truth and paths are traced, and the last is for what takes single beams."""
     asked = set(products)
-    return list(STAGES)[: 1 if asked <= {"paths"} else 3 if asked & {"cloud", "beams"} else 2]
+    return list(STAGES)[: 1 if asked <= {"paths"} else 3 if asked & {"cloud", "beams", "range_image"} else 2]
 
 
 def _trace(plan: Plan, frame: int, before: Any) -> Any:

@@ -32,7 +32,8 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
     add("/", "frame", ("frame",), np.arange(sizes["frame"]), "1", "frame of the dataset")
     on_grid = " ".join(["/truth/beams", *(f"/{name}" for name in ("image", "beams") if name in plan.products)])
     degrees = {"comment": "as the sonar looks"}
-    add(on_grid, "azimuth", ("azimuth",), np.rad2deg(beams.azimuth), "degree", "azimuth, port positive", **degrees)
+    by_azimuth = on_grid + " /range_image" * ("range_image" in plan.products)
+    add(by_azimuth, "azimuth", ("azimuth",), np.rad2deg(beams.azimuth), "degree", "azimuth, port positive", **degrees)
     add(
         on_grid, "elevation", ("elevation",), np.rad2deg(beams.elevation), "degree", "elevation, up positive", **degrees
     )
@@ -70,12 +71,18 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
             "s",
             "time after the start of the window, steps of 1/bandwidth",
         )
+    _add_ranges(plan, add)
     if "signals" in plan.products:
         _add_sensors(plan, add)
     for column in columns(plan.recipe.spanned):
         static["/", column.name] = (("frame",), np.repeat(column.values, plan.recipe.spanned.steps), column.attributes)
     _add_meshes(plan, add)
     return static
+
+
+def _add_ranges(plan: Plan, add: Any) -> None:
+    if "range_image" in plan.products and (grid := plan.scene.sonar.ranges) is not None:
+        add("/range_image", "range", ("range",), grid.range, "m", "range from the middle of the array")
 
 
 def _add_meshes(plan: Plan, add: Any) -> None:

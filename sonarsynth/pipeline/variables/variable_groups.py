@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sonarsynth.pipeline.variables.target_variables import INSTANT
 from sonarsynth.pipeline.variables.truth_variables import LEVELS, SENSORS, SOUNDSCAPE, TRUTH
 from sonarsynth.pipeline.variables.variable import (
     BEAMS,
@@ -70,6 +71,28 @@ _BEAMS = group_of(
         attributes=(("scale_factor", LEVEL_STEP), *comment("missing: silence, or a beam that the image lacks")),
     ),
     row("start", ("frame",), "s", "time of delay 0 after the instant of the frame"),
+)
+_RANGES = group_of(
+    "/range_image",
+    "range_image",
+    row(
+        "energy",
+        ("frame", "range", "azimuth"),
+        "1",
+        "power at this range of the loudest beam of this azimuth, over that of an echo as strong as the direct pulse",
+        dtype="float32",
+        attributes=comment(
+            "beams are matched to the direct pulse; NaN: not in the echo window, or no snap was located"
+        ),
+    ),
+    row(
+        "target",
+        ("frame", "range", "azimuth"),
+        "1",
+        "target that a beam of this azimuth meets at this range",
+        dtype="int16",
+        attributes=(*NONE, *INSTANT),
+    ),
 )
 KINDS = tuple(kind.name.lower() for kind in Kind)
 _PATHS = group_of(
@@ -213,7 +236,7 @@ _ESTIMATES = group_of(
     ),
 )
 VARIABLES: tuple[Variable, ...] = (
-    *(*_ROOT, *_SIGNALS, *_IMAGE, *_BEAMS, *_PATHS, *_CLOUD, *_ESTIMATES),
+    *(*_ROOT, *_SIGNALS, *_IMAGE, *_BEAMS, *_RANGES, *_PATHS, *_CLOUD, *_ESTIMATES),
     *(*TRUTH, *SENSORS, *SOUNDSCAPE, *LEVELS),
 )
 """Every variable that a frame may have."""

@@ -10,12 +10,12 @@ from sonarsynth.environment.sea import Profile
 from sonarsynth.planning.choices import OF_BEAMS, OWN_VIEW
 from sonarsynth.planning.measured.lost_echoes import lost_echoes
 from sonarsynth.planning.measured.sampled_frames import SampledScene
-from sonarsynth.planning.notes.clipping_notes import clipping_notes
 from sonarsynth.planning.notes.formula_validity import validity
 from sonarsynth.planning.notes.motion_rows import stretch_notes
 from sonarsynth.planning.notes.population_notes import once, population_notes
 from sonarsynth.planning.notes.source_notes import (
     assumed_speed_notes,
+    clipping_notes,
     direction_notes,
     lobe_notes,
     off_the_bottom,

@@ -15,7 +15,6 @@ from sonarsynth.equations.rays.ray_solutions import TOLERANCE
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.motion import Track, pose
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.planning.notes.noise_checks import check_noises
 from sonarsynth.planning.notes.track_checks import check_tracks
 from sonarsynth.receiver import Sonar, elements
@@ -233,27 +232,6 @@ def _check_snaps(scene: Scene, frame: Frame) -> None:
         for body in frame.moment.bodies:
             if enclosed(body, snap.position[None])[0]:
                 raise FieldError(path, f"is inside target '{body.name}' at frame {frame.index}, or touches it")
-
-
-def check_located(scene: Scene, frame: Frame, products: frozenset[str]) -> None:
-    """No source is so near that it cannot be located, where image or cloud need that."""
-    least = scene.processing.locating.nearest(elements(scene.sonar.array))
-    owners = [i for i, source in enumerate(scene.world.sources) for _ in source.times]
-    for owner, snap in zip(owners, frame.moment.snaps, strict=True):
-        away = float(np.linalg.norm(snap.position - frame.sonar_pose.position))
-        if away < least and products & OF_BEAMS:
-            raise FieldError(
-                ("scene", "world", "sources", owner, "position"),
-                f"is {away:.3g} m from the centre of the array at frame {frame.index}, among its hydrophones, which "
-                f"reach {least:.3g} m: it cannot be located, so there would be no image, but for locating: trigger",
-            )
-
-
-def check_methods(scene: Scene, products: frozenset[str]) -> None:
-    """The beamformer must be able to use the array."""
-    line = scene.processing.beamforming.refusal(elements(scene.sonar.array))
-    if line and products & OF_BEAMS:
-        raise FieldError(("scene", "processing", "beamforming", "kind"), line)
 
 
 def _box_in_water(body: PlacedTarget, bottom_depth: float) -> bool:
