@@ -16,6 +16,7 @@ from sonarsynth.planning.notes.population_notes import once, population_notes
 from sonarsynth.planning.notes.source_notes import (
     assumed_speed_notes,
     clipping_notes,
+    coarse_counts,
     direction_notes,
     lobe_notes,
     off_the_bottom,
@@ -65,6 +66,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         lines += view_notes(noted(looks)) + steering_notes(noted(looks))
         lines += stretch_notes(noted(looks), recipe.accuracy.range_m)
     lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene) + clipping_notes(plan, looks)
+    lines += coarse_counts(scene)
     if plan.sizes["emission"] and plan.products & OF_BEAMS:
         some = noted(looks)
         lines += unlocated(scene) or lobe_notes(some) + direction_notes(some) + assumed_speed_notes(some)

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, depth, evenly
+from sonarsynth.conventions import REFERENCE_PRESSURE, Floats, depth, evenly
 from sonarsynth.description.method import Demand
+from sonarsynth.environment.noise import NoiseField
 from sonarsynth.equations.arrays.grating_lobes import loudest_lobe
 from sonarsynth.planning.measured.sampled_arrivals import behind_baffle, context_of, reception_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene
@@ -21,11 +22,14 @@ from sonarsynth.receiver.sensor_errors import drawn_errors
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals import channel_errors
 from sonarsynth.signals.auto_synthesis import DEFAULT_ERROR, deposit_for
+from sonarsynth.signals.electronics import ElectronicNoise
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.tracing.arrivals import trace
 
 HEARD = 8
 """Frames that are heard, at most, to see whether snaps clip."""
+DITHER = 0.5
+"""Root mean square of noise, in counts, from which on a converter adds noise and nothing else."""
 OFF = 3.0
 """A source this many standard errors of the bottom's depth above the bottom stands off it."""
 OTHER_WATER = 2.0
@@ -183,6 +187,24 @@ def clipping_notes(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
     return [
         f"snaps clip in {np.count_nonzero(over > 0.0)} of {len(heard)} frames that were heard, by up to "
         f"{over.max():.1f} dB: signals and levels are then too low (scene.sonar.converter.full_scale)"
+    ]
+
+
+def coarse_counts(scene: Scene) -> list[str]:
+    """Whether the converter's counts are too coarse for the noise: with less than half a count, rounding is no noise of
+    its own and takes most of it (Widrow & Kollar 2008, Quantization Noise, ch. 20)."""
+    sonar, noises = scene.sonar, list[NoiseField](scene.world.environment.noises)
+    noises += [ElectronicNoise(sonar.electronics)] if sonar.electronics is not None else []
+    if sonar.converter is None or not noises or scene.world.chorus is not None:
+        return []
+    f = np.linspace(sonar.band.low, sonar.band.high, 256)
+    rms = float(np.sqrt(np.trapezoid(sum(noise.density(f) for noise in noises), f)))
+    if rms >= DITHER * sonar.converter.quantum:
+        return []
+    levels = (20.0 * np.log10(p / REFERENCE_PRESSURE) for p in (rms, sonar.converter.quantum))
+    return [
+        "noise of {:.0f} dB re 1 uPa in the band is under half a count of the converter, {:.0f} dB: it is mostly "
+        "rounded to nothing, and faint echoes with it (scene.sonar.converter)".format(*levels)
     ]
 
 
