@@ -11,8 +11,9 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Progress
 from sonarsynth.pictures.figures.frame_figure import FramePicture, View, window
+from sonarsynth.pictures.figures.range_fan import range_fan
 from sonarsynth.pictures.figures.sheet import Errors, sheet
-from sonarsynth.pictures.figures.style import decibels
+from sonarsynth.pictures.figures.style import decibels, save
 from sonarsynth.pictures.film import thinned, write_film
 from sonarsynth.pictures.steered_beams import beams
 from sonarsynth.pictures.store_reading import (
@@ -46,8 +47,8 @@ def show(
 ) -> list[Path]:
     """Draw a store, and say a summary.
 
-    film.mp4 (film.gif without ffmpeg) has every frame that was built, sheet.png one. What the store does not hold is
-    left out of the pictures and said.
+    film.mp4 (film.gif without ffmpeg) has every frame that was built, sheet.png one, and ranges.png its range image.
+    What the store does not hold is left out of the pictures and said.
 
     Parameters
     ----------
@@ -86,6 +87,8 @@ def show(
     read = dict(zip(wanted, every_stored(tree, wanted), strict=True))
     chosen = frame if frame is not None else max(read, key=lambda i: _interest(read[i]))
     files = [_write_sheet(tree, read[chosen], folder, say)]
+    if "range_image" in tree.children:
+        files.append(_write_fan(tree, read[chosen], folder))
     if film and len(frames) > 1:
         if len(filmed) < len(frames):
             say(f"film: {len(filmed)} of {len(frames)} frames")
@@ -156,6 +159,14 @@ def _snr(tree: xr.DataTree, frame: StoredFrame) -> str:
     snr, names = stored[frame.index], needed(tree, "truth/targets/target")
     loud = [n for n in np.argsort(-np.nan_to_num(snr, nan=-np.inf))[:3] if np.isfinite(snr[n])]
     return "   snr " + ", ".join(f"{names[n]} {round(float(snr[n]))} dB" for n in loud) if loud else ""
+
+
+def _write_fan(tree: xr.DataTree, frame: StoredFrame, folder: Path) -> Path:
+    ranges, azimuth = (needed(tree, f"range_image/{name}") for name in ("range", "azimuth"))
+    energy, target = (needed(tree, f"range_image/{name}", frame.index) for name in ("energy", "target"))
+    names = [str(name) for name in needed(tree, "truth/targets/target")]
+    fan = range_fan(f"frame {frame.index}", ranges, azimuth, energy, target, names)
+    return save(fan, folder / "ranges.png")
 
 
 def _write_sheet(

@@ -15,7 +15,8 @@ from sonarsynth.ranging.received_window import ReceivedWindow
 
 
 def range_image(received: ReceivedWindow, ranges: Floats, track: Track | None = None) -> npt.NDArray[np.float32]:
-    """The largest power (range, azimuth) of the beams of an azimuth, all its elevations, at each range (range,) in m.
+    """The largest power (range, azimuth) of the beams of an azimuth, all its elevations, in the cells about ranges
+    (range,) in m, evenly spaced.
 
     Each beam is matched to the direct pulse, as for the cloud, and 1 is an echo as strong as that. A range r in the
     direction u of a beam is heard so late after the direct pulse:
@@ -43,23 +44,35 @@ def range_image(received: ReceivedWindow, ranges: Floats, track: Track | None = 
 
 
 @compiled
+def _place(r: float, beam: Any, source: Any, drift: Any, speed: float) -> float:
+    """When (s) an echo from a range in the direction of a beam is heard, after the direct pulse."""
+    away, late = np.sqrt(source[0] ** 2 + source[1] ** 2 + source[2] ** 2), 0.0
+    for _ in range(3):  # the sonar makes way at a hundredth of the speed of sound, or less
+        square = 0.0
+        for x in range(3):
+            square += (r * beam[x] - source[x] - late * drift[x]) ** 2
+        late = (r + np.sqrt(square) - away) / speed
+    return late
+
+
+@compiled
 def _largest(
     power: Any, first: float, step: float, ranges: Any, beams: Any, source: Any, drift: Any, speed: float, cells: Any
 ) -> None:
-    """Raise cells (range, azimuth) to the powers (azimuth, delay) of beams (azimuth, xyz), between delays by lines."""
-    away = np.sqrt(source[0] ** 2 + source[1] ** 2 + source[2] ** 2)
+    """Raise cells (range, azimuth) to the powers (azimuth, delay) of beams (azimuth, xyz): in the middle of a cell, by
+    lines between delays, and at all delays in it."""
+    half = 0.5 * (ranges[1] - ranges[0]) if len(ranges) > 1 else 0.0
+    last = power.shape[1] - 1
     for a in range(len(beams)):
+        end = (_place(ranges[0] - half, beams[a], source, drift, speed) - first) / step
         for k in range(len(ranges)):
-            r, late = ranges[k], 0.0
-            for _ in range(3):  # the sonar makes way at a thousandth of the speed of sound, or less
-                square = 0.0
-                for x in range(3):
-                    square += (r * beams[a, x] - source[x] - late * drift[x]) ** 2
-                late = (r + np.sqrt(square) - away) / speed
-            place = (late - first) / step
-            n = int(np.floor(place))
-            if n < 0 or n + 1 >= power.shape[1]:
+            begin, end = end, (_place(ranges[k] + half, beams[a], source, drift, speed) - first) / step
+            middle = 0.5 * (begin + end)
+            n = int(np.floor(middle))
+            if n < 0 or n + 1 > last:
                 continue
-            between = power[a, n] + (place - n) * (power[a, n + 1] - power[a, n])
-            if not cells[k, a] >= between:
-                cells[k, a] = between
+            loudest = power[a, n] + (middle - n) * (power[a, n + 1] - power[a, n])
+            for m in range(max(int(np.ceil(begin)), 0), min(int(np.floor(end)), last) + 1):
+                loudest = max(loudest, power[a, m])
+            if not cells[k, a] >= loudest:
+                cells[k, a] = loudest

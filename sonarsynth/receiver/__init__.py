@@ -170,7 +170,7 @@ class RangeGrid:
     far: PositiveMetres
     """Of the last, or less than a step beyond."""
     step: PositiveMetres
-    """From one to the next: a quarter of c/B at most, or echoes fall between cells."""
+    """From one to the next. A cell has the loudest of what is heard half a step before and after its range."""
 
     @model_validator(mode="after")
     def _check(self) -> RangeGrid:

@@ -34,6 +34,7 @@ FRAMES = {
     "harbour.yaml": (0, 8),
     "deep.yaml": (0, 15),
     "crowd.yaml": (9,),
+    "ping.yaml": (31,),
     "survey.yaml": range(6),  # of three sequences
 }
 """Frames of a recipe that are built; of others all."""

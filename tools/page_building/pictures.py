@@ -17,6 +17,7 @@ from sonarsynth.frontiers.frontier_report import write
 from sonarsynth.pictures import _reference, _view
 from sonarsynth.pictures.compare import show_beside
 from sonarsynth.pictures.figures.frame_figure import FramePicture
+from sonarsynth.pictures.figures.range_fan import draw_fan
 from sonarsynth.pictures.store_reading import beam_grid, opened, stored
 from tools.page_building.label_pictures import labels
 from tools.page_building.sea_pictures import choruses, noises
@@ -35,6 +36,7 @@ FRAMES = {
     "grid": 3,
     "survey": 24,
     "harbour": 8,
+    "ping": 31,
 }
 """The frame of each shipped recipe that is drawn."""
 GHOSTS = 46
@@ -51,7 +53,11 @@ LAWS = {
 def thumbnail(name: str, folder: Path, out: Path) -> None:
     """The energy image of a frame of a shipped recipe, 30 dB deep, with the boxes of the targets."""
     sets = list(harbour.written(folder)) if name == "harbour" else []
-    tree = ss.render(ss.load(ROOT / "configs" / f"{name}.yaml", sets), FRAMES[name])
+    recipe = ss.load(ROOT / "configs" / f"{name}.yaml", sets)
+    if recipe.scene.sonar.ranges is not None:
+        fan(name, ss.render(ss.plan(recipe, ["range_image"]), FRAMES[name]), out)
+        return
+    tree = ss.render(recipe, FRAMES[name])
     energy, boxes = tree["image/energy"], tree["truth/targets/image_box"].values
     decibels = 10 * np.log10(energy.values / energy.values.max())
     azimuth, elevation = energy["azimuth"].values, energy["elevation"].values
@@ -60,6 +66,18 @@ def thumbnail(name: str, folder: Path, out: Path) -> None:
     for left, right, low, high in boxes:
         axes.add_patch(plt.Rectangle((left, low), right - left, high - low, fill=False, color="cyan", linewidth=0.8))
     axes.set(xlim=(azimuth[-1], azimuth[0]), ylim=(elevation[0], elevation[-1]), xticks=[], yticks=[])
+    figure.subplots_adjust(0, 0, 1, 1)
+    figure.savefig(out / f"{name}.png", metadata={"Software": None})
+    plt.close(figure)
+
+
+def fan(name: str, tree: Any, out: Path) -> None:
+    """The range image of a frame, with outlines of the cells of the targets."""
+    image = tree["range_image"]
+    cells = (image[variable].values for variable in ("range", "azimuth", "energy", "target"))
+    figure, axes = plt.subplots(figsize=(1.6, 1.2), dpi=100)
+    draw_fan(axes, *cells)
+    axes.set(xticks=[], yticks=[])
     figure.subplots_adjust(0, 0, 1, 1)
     figure.savefig(out / f"{name}.png", metadata={"Software": None})
     plt.close(figure)

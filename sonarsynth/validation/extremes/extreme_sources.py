@@ -162,11 +162,49 @@ def _bounded() -> CaseResult:
     return together(results)
 
 
+PING = """\
+scene:
+  world:
+    environment: {{depth: 1000 m, sound_speed: {{kind: isovelocity, speed: 1540 m/s}}}}
+    targets:
+      - name: ball
+        shape: {{kind: sphere, radius: 0.3 m, edge: 5 cm}}
+        motion: {{kind: still, position: [{away}, 0, -50]}}
+    sources:
+      - kind: transmitter
+        position: [5 cm, 0 cm, -25 cm]
+        pulse: {{kind: sweep, start: 40 kHz, stop: 80 kHz, duration: {length} ms}}
+        source_level: 190 dB
+        beam: {{azimuth_width: 90 deg, elevation_width: 90 deg}}
+  sonar:
+    array: {{kind: planar_lattice, columns: 8, rows: 8, pitch: 5 cm}}
+    band: {{low: 38 kHz, high: 82 kHz}}
+    beams: {{azimuths: 21, elevations: 21}}
+    sound_speed_error: 0 m/s
+  trajectory: {{sonar: {{kind: still, position: [0, 0, -50], heading: 90 deg}}}}
+  processing: {{locating: {{kind: trigger, time_error: 1 ns, position_error: 1 um}}}}
+"""
+
+
+def _pings() -> CaseResult:
+    """Of 0.2, 2 and 20 ms, a target 2 and 20 m off: one point on it where the ping is over when its echo comes, or is
+    as short as the way there and taken out; none where it goes on."""
+    results = []
+    for away, length, points in ((2, 0.2, 1), (2, 2, 1), (2, 20, 0), (20, 0.2, 1), (20, 2, 1), (20, 20, 1)):
+        cloud = render(plan(reading.loads(PING.format(away=away, length=length)), ("cloud",)), 0)["cloud"].dataset
+        count = int(cloud["count"])
+        wrong = (cloud["range"] - cloud["true_range"]).values[:count] / cloud["range_error"].values[:count]
+        good = count == points and bool((np.abs(wrong) < 3.0).all())
+        results.append(holds(good, f"{count} points of a ping of {length:g} ms, {away} m off"))
+    return together(results)
+
+
 CASES = (
     Case("a snap in mid-water, 10 m to 5 km away", "the bearing; the place within its errors, or none", _middle),
     Case("bands of 100 Hz to 60 kHz", "the place within its errors, or none with a reason", _bands),
     Case("1 to 20 snaps at one instant", "each estimate one of them, or none with a reason", _crowd),
     Case("a stranger 20 dB louder", "the louder one first, each within its errors", _stranger),
     Case("1e5 snaps of a chorus a second", "the mean square of Campbell's theorem", _dense),
+    Case("pings of 0.2 to 20 ms, targets 2 and 20 m off", "a point within its errors; none under the ping", _pings),
     Case("a chorus at the surface and on the bottom", "finite, no louder than at the bubble", _bounded),
 )
