@@ -6,18 +6,23 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 
+UPRIGHT = 1e-6
+"""Sine of the angle from the vertical below which a bow points straight up or down."""
+
 
 def heading_pitch_roll(orientation: Floats) -> tuple[Floats, Floats, Floats]:
-    """Heading from north by east, pitch (bow up), roll (starboard down), in degrees.
+    """Heading from north by east, pitch (bow up), roll (starboard down), in degrees; no roll where the bow is upright.
 
     orientation: (row, wxyz) from the body (x forward, y port, z up) to the world (x east, y north, z up).
     """
     w, x, y, z = np.moveaxis(orientation, -1, 0)
     bow = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)])
-    port_up, mast_up = 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
-    heading = np.rad2deg(np.arctan2(bow[0], bow[1])) % 360.0
-    pitch = np.rad2deg(np.arcsin(np.clip(bow[2], -1.0, 1.0)))
-    return heading, pitch, np.rad2deg(np.arctan2(port_up, mast_up))
+    port = np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)])
+    level = np.hypot(bow[0], bow[1])
+    upright = level < UPRIGHT  # heading and roll are then turns about one axis
+    heading = np.where(upright, np.arctan2(port[1], -port[0]), np.arctan2(bow[0], bow[1]))
+    roll = np.where(upright, 0.0, np.arctan2(port[2], 1 - 2 * (x * x + y * y)))
+    return np.rad2deg(heading) % 360.0, np.rad2deg(np.arctan2(bow[2], level)), np.rad2deg(roll)
 
 
 def beam_rotation(azimuth: Floats, elevation: Floats) -> tuple[Floats, Floats]:

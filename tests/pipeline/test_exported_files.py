@@ -197,14 +197,18 @@ def test_two_exports_do_not_mix(store: Path, coco: Path, capsys: pytest.CaptureF
 
 
 def test_turns_of_ships_are_those_of_the_attitude() -> None:
-    """Against rotation matrices: axes north, east, down of the world, forward, starboard, down of the ship."""
+    """Against rotation matrices: axes north, east, down of the world, forward, starboard, down of the ship. With
+    the bow upright, where heading and roll are turns about one axis, what they add up to."""
     random = np.random.default_rng(3)
-    angles = np.column_stack([random.uniform(0, 360, 50), random.uniform(-80, 80, 50), random.uniform(-170, 170, 50)])
+    pitch = np.concatenate([random.uniform(-80, 80, 44), [90, -90, 90, -90, 90 - 1e-4, 1e-4 - 90]])
+    angles = np.column_stack([random.uniform(0, 360, 50), pitch, random.uniform(-170, 170, 50)])
     ship = Rotation.from_euler("ZYX", angles, degrees=True).as_matrix()
     flip = np.diag([1.0, -1.0, -1.0])
     swap = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
     ours = Rotation.from_matrix(swap @ ship @ flip).as_quat(scalar_first=True)
-    np.testing.assert_allclose(np.column_stack(heading_pitch_roll(ours)), angles, atol=1e-9)
+    found = np.column_stack(heading_pitch_roll(ours))
+    np.testing.assert_allclose(found[:44], angles[:44], atol=1e-9)
+    np.testing.assert_allclose(Rotation.from_euler("ZYX", found, degrees=True).as_matrix(), ship, atol=1e-7)
 
 
 def test_every_beam_has_turns_within_their_limits() -> None:
