@@ -17,13 +17,16 @@ MOST_SHOWN: Final = 20
 def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
     """The errors of a validation, each with its place in the file: of a misspelt field first, at most `MOST_SHOWN`."""
     texts: dict[Where, str] = {}
+    explained = set[Where]()  # by what is wrong with one of their fields or entries
     for details in error.errors(include_url=False):
         keys, message = error_message(details, error_path(details, source.data), root, source.data)
         if details["type"] == "dataclass_type" and (texts.get(keys) or "").startswith("must be '"):
             texts[keys] = texts[keys].replace("' or '", "', '").replace(", not ", " or a mapping, not ", 1)
         texts.setdefault(keys, message)
+        if details["type"] == "too_short":  # only entries that are right are counted
+            explained.add(keys)
     words = {keys for keys, text in texts.items() if text.startswith("must be '") and text.endswith("not a mapping")}
-    for keys in words:  # of a word or a mapping, it is the mapping that was meant
+    for keys in explained | words:  # of a word or a mapping, it is the mapping that was meant
         if any(len(longer) > len(keys) and longer[: len(keys)] == keys for longer in texts):
             del texts[keys]
     items = list(texts.items())
