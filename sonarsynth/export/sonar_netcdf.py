@@ -135,7 +135,7 @@ def _write(tree: xr.DataTree, path: Path, frames: np.ndarray, groups: list[_Beam
             {
                 "Conventions": "CF-1.7, SONAR-netCDF4-2.0, ACDD-1.3",
                 "date_created": now,
-                "keywords": "passive sonar, simulation",
+                "keywords": f"{'active' if 'lit_by' in tree.attrs else 'passive'} sonar, simulation",
                 "license": str(tree.attrs.get("licence", "None")),
                 "sonar_convention_authority": "ICES",
                 "sonar_convention_name": "SONAR-netCDF4",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from sonarsynth import FieldError, render
+from sonarsynth import FieldError, build, render
 from sonarsynth.conventions import Floats, direction
 from sonarsynth.equations.bubble import pulses
 from sonarsynth.geometry.motion import Circle, ConstantVelocity, Motion, Still, pose
@@ -21,6 +22,8 @@ from sonarsynth.recipe import Recipe
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.sources.snap_models import Gabor
 from sonarsynth.sources.transmitter import Sweep, TransmitBeam, Transmitter
+from sonarsynth.store import folder_of
+from sonarsynth.store.cards.facts import facts_of
 from tests.scenes import point_scene
 
 SWEEP = Sweep(start=40e3, stop=80e3, duration=2e-3)
@@ -194,6 +197,22 @@ def test_the_echo_of_a_sweep_is_one_point_where_the_target_is(law: Any) -> None:
     assert int(cloud["count"]) == 1 and int(cloud["target"][0]) == 0
     away = np.linalg.norm(np.array(TARGET) - [0.0, 0.0, -50.0])
     assert abs(float(cloud["range"][0]) - away) < 1e-3
+
+
+def test_the_card_of_a_dataset_says_what_lights_it(tmp_path: Path) -> None:
+    own = scene(Transmitter(position=AT, pulse=TONE, source_level=190.0))
+    both = replace(own.scene.world, sources=(*own.scene.world.sources, SnappingShrimp(position=(10.0, 3.0, -55.0))))
+    for recipe, light in (
+        (own, "active sonar that is lit by its own pings:"),
+        (replace(own, scene=replace(own.scene, world=both)), "active sonar that is lit by its own pings and snapping"),
+        (
+            with_source(own, SnappingShrimp(position=(10.0, 3.0, -55.0))),
+            "passive sonar that is lit by snapping shrimp:",
+        ),
+    ):
+        store = folder_of(tmp_path / f"{len(light)}.zarr")
+        build(plan(recipe, []), str(store), workers=0)
+        assert light in facts_of(store).summary
 
 
 def test_bad_transmitters_are_refused_in_one_line() -> None:

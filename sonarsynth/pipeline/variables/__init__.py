@@ -65,6 +65,9 @@ def attributes(plan: Plan) -> dict[str, Any]:
     besides["reverberation"] = world.reverberation is not None
     others = [name for name, value in besides.items() if value]
     also: dict[str, Any] = {"other_sounds": others} if others else {}
+    own = [source.carried for source in world.sources]
+    if any(own):
+        also["lit_by"] = ["its own pings"] + ["snapping shrimp"] * (not all(own))
     return also | {
         "title": recipe.title,
         "Conventions": "CF-1.11",

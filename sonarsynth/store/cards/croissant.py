@@ -59,7 +59,7 @@ CONTEXT: Final[Mapping[str, Any]] = {
 }
 """The context of appendix 1 of the specification."""
 
-KEYWORDS: Final = ("passive sonar", "snapping shrimp", "underwater acoustics", "synthetic data", "simulation")
+KEYWORDS: Final = ("underwater acoustics", "synthetic data", "simulation")
 ZARR: Final = "application/vnd.zarr"
 _TYPES: Final = {"number": "sc:Float", "whole number": "sc:Integer", "yes or no": "sc:Boolean", "text": "sc:Text"}
 _SPLIT_URLS: Final = {name: f"cr:{name.capitalize()}Split" for name in (*SPLITS, "training")} | {
@@ -87,7 +87,9 @@ def croissant(facts: Facts) -> dict[str, Any]:
         "dateCreated": facts.created,
         "version": str(dataset.get("version", "1.0.0")),
         "citeAs": facts.citation,
-        "keywords": list(dict.fromkeys([*map(str, dataset.get("keywords", ())), *KEYWORDS])),
+        "keywords": list(
+            dict.fromkeys([*map(str, dataset.get("keywords", ())), facts.sonar, *facts.lit_by, *KEYWORDS])
+        ),
         "isLiveDataset": False,
         "inLanguage": "en",
         "distribution": [*_objects(facts), _files(facts)],

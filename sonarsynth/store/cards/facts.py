@@ -110,6 +110,17 @@ class Facts:
         return " ".join(sentence for sentence in (dated, tool, str(self.dataset.get("url", ""))) if sentence)
 
     @property
+    def lit_by(self) -> tuple[str, ...]:
+        """What makes the sound whose echoes are heard."""
+        named = self.attributes.get("lit_by")
+        return tuple(map(str, named)) if isinstance(named, list) else ("snapping shrimp",)
+
+    @property
+    def sonar(self) -> str:
+        """Whether it makes that sound itself."""
+        return "passive sonar" if self.lit_by == ("snapping shrimp",) else "active sonar"
+
+    @property
     def summary(self) -> str:
         """What the dataset is, in the words of its makers or in one sentence of ours."""
         own = str(self.dataset.get("description", ""))
@@ -121,9 +132,10 @@ class Facts:
             phrases.append(f"in {self.plan['sequences']} sequence{'s' * (self.plan['sequences'] != 1)}")
         if sizes.get("sensor"):
             phrases.append(f"of an array of {sizes['sensor']} hydrophones")
+        light = " and ".join(self.lit_by)
         return (
-            f"Synthetic passive sonar that is lit by snapping shrimp: {' '.join(phrases)}, simulated, each with the "
-            "truth that made it: where targets and shrimp are, what each beam meets, and a link budget of levels."
+            f"Synthetic {self.sonar} that is lit by {light}: {' '.join(phrases)}, simulated, each with the truth that "
+            "made it: where targets and sources are, what each beam meets, and a link budget of levels."
         )
 
 
