@@ -31,6 +31,18 @@ def test_a_wave_over_an_array_in_space_is_found_from_any_side(az, el, curvature,
     assert abs(wave.time - time) < 1e-11
 
 
+@given(st.floats(-7.0, -3.0), angles, st.floats(0.0, 0.6), st.integers(0, 99), st.integers(1, 4))
+def test_a_step_from_a_wave_along_the_plane_of_an_array_stays_at_its_delays(aside, el, curvature, seed, steps):
+    """Of 1 ns of noise: on which side of the plane a wave comes from is in its delays to the second order only."""
+    random, u = np.random.default_rng(seed), unit(np.array([10.0**aside, np.cos(el), np.sin(el)]))
+    q = random.uniform(-0.5, 0.5, (40, 3)) * [0.0, 1.0, 1.0]
+    delay = wavefront_delays(q, u, curvature, 1500.0)
+    wave = spherical_wave(delay + 1e-9 * random.normal(size=40), q, 1500.0, np.ones(40), u, curvature, True, steps)
+    assert wave is not None
+    off = wave.time + wavefront_delays(q, wave.direction, wave.curvature, 1500.0) - delay
+    assert np.abs(off).max() < 1e-8
+
+
 @given(turns, angles, st.floats(0.0, 0.3), st.integers(0, 9), st.tuples(*[st.floats(-1, 1)] * 4))
 def test_delays_turn_with_the_frame(az, el, curvature, seed, quaternion):
     assume(np.linalg.norm(quaternion) > 0.1)

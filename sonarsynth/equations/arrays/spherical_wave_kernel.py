@@ -89,6 +89,15 @@ def inverse_of(normal: Any, curved: bool) -> Any:
 
 
 @compiled
+def _farthest_turn(late: Any, weight: Any, speed: float, size: float) -> float:
+    """Angle (rad) that a step may turn by: its square then moves delays by no more than they are off. A wave along the
+    plane of an array has the same delays whichever side it is turned to, and no other step is so long."""
+    total = np.sum(weight)
+    off = late - np.sum(weight * late) / total
+    return float(np.sqrt(2.0 * speed / size * np.sqrt(np.sum(weight * off**2) / total)))
+
+
+@compiled
 def gauss_newton(
     position: Any, delay: Any, weight: Any, start: Any, speed: float, size: float, curved: bool, iterations: int
 ) -> Any:
@@ -100,6 +109,7 @@ def gauss_newton(
         normal, right, own, late, jacobian = normal_equations(position, delay, weight, u, k, speed, tangents)
         found, covariance = inverse_of(normal, curved)
         step = covariance @ right
+        step[:2] *= min(_farthest_turn(late, weight, speed, size) / max(np.hypot(step[0], step[1]), 1e-300), 1.0)
         turned = u + step[0] * tangents[0] + step[1] * tangents[1]
         bent = min(max(k + step[2], -0.5 / size), 2.0 / size)  # no source among the sensors
         moved = np.hypot(step[0], step[1]) + abs(bent - k) * size
