@@ -12,10 +12,9 @@ from sonarsynth.planning.choosing import choose
 from sonarsynth.planning.costs import machine_factor, stages
 from sonarsynth.planning.listening_windows import frame_start, listening_windows
 from sonarsynth.planning.measured.path_counts import room_for_paths
-from sonarsynth.planning.measured.ray_bending import propagation
+from sonarsynth.planning.measured.ray_bending import above_bottom, propagation
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, behind_baffle, context_of, receiver_of, survey_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene, check_alike, sample_frames
-from sonarsynth.planning.measured.thinned_profile import thinned
 from sonarsynth.planning.notes.omissions import left_out
 from sonarsynth.planning.notes.plan_notes import notes, stored_validity
 from sonarsynth.planning.notes.product_checks import check_located, check_methods, check_windows
@@ -100,11 +99,10 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
                     check_located(look.scene, frame, products)
     ends = (looks[0].frames[0], looks[0].frames[-1])
     paths = propagation(scene, profile, ends, recipe.accuracy.signal)
-    fewer, thinning = thinned(paths, recipe, 0, profile)
     windows = listening_windows(recipe, looks)
     check_windows(scene, windows)
     sizes = _sizes(recipe, windows)
-    resolved = Plan(recipe, products, fewer, paths, windows, sizes=sizes, thinning=thinning)
+    resolved = Plan(recipe, products, above_bottom(scene, profile), paths, windows, sizes=sizes)
     resolved = choose(resolved, looks) if choices is None else replace(resolved, choices=choices)
     if "paths" in products:
         resolved = replace(resolved, sizes=sizes | {"path": room_for_paths(resolved, looks)})

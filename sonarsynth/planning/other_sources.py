@@ -6,11 +6,10 @@ from dataclasses import replace
 
 from sonarsynth.description import FieldError
 from sonarsynth.planning.listening_windows import listening_windows
-from sonarsynth.planning.measured.ray_bending import difference_of_paths, propagation
+from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.measured.sampled_frames import SampledScene
-from sonarsynth.planning.measured.thinned_profile import SHARE
 from sonarsynth.planning.notes.product_checks import check_located, check_windows
-from sonarsynth.planning.notes.scene_checks import check_frame, check_shrimp, read_inputs
+from sonarsynth.planning.notes.scene_checks import check_frame, check_shrimp
 from sonarsynth.planning.plans import Plan
 from sonarsynth.sources import Source
 
@@ -29,9 +28,6 @@ def plan_with(plan: Plan, index: int, sources: tuple[Source, ...]) -> Plan:
     check_located(scene, frame, plan.products)
     model, signal = plan.propagation, plan.recipe.accuracy.signal
     fits = model == model.exact() or propagation(scene, plan.profile, (frame,), signal) == model
-    if fits and plan.thinning > 0.0:
-        waters = (model, plan.profile), (model, read_inputs(scene))
-        fits = difference_of_paths(*waters, scene, (frame,)) <= SHARE * signal
     if not fits:
         raise FieldError(
             ("scene", "world", "sources"),

@@ -18,8 +18,7 @@ from sonarsynth.planning.choices import Choices
 from sonarsynth.planning.measured.absorption_error import StraightPaths, mean_absorption, passed_by, shape_error
 from sonarsynth.planning.measured.chorus_reach import band_frequencies, chorus_reach
 from sonarsynth.planning.measured.distant_chorus import DistantChorus, distant_chorus
-from sonarsynth.planning.measured.ray_bending import propagation
-from sonarsynth.planning.measured.thinned_profile import thinned
+from sonarsynth.planning.measured.ray_bending import above_bottom, propagation
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
 from sonarsynth.planning.plan_tables import Omission, Stage, as_html, as_text
 from sonarsynth.propagation import Propagation
@@ -88,7 +87,6 @@ class Plan:
     validity: tuple[str, ...] = ()  # where formulas and laws hold and do not, as the store has it
     sizes: dict[str, int] = field(default_factory=dict)
     shard_frames: int = 1
-    thinning: float = 0.0  # error of signals, relative, of the layers that stand for a measured profile
     sequence: int = 0  # whose scene, profile and propagation these are
     odds: str = ""  # of finding targets in frames that were tried; "": none were, or no target is in view
     sources: tuple[Source, ...] | None = None  # in the place of the recipe's (`other_sources`); None: those
@@ -258,5 +256,4 @@ def _of_sequence(plan: Plan, sequence: int) -> Plan:
         first, last = plan.recipe.first_frame(sequence), plan.recipe.first_frame(sequence + 1) - 1
         ends = (plan.recipe.frame(first)[1], plan.recipe.frame(last)[1])
     paths = propagation(scene, profile, ends, plan.recipe.accuracy.signal)
-    fewer, thinning = thinned(paths, plan.recipe, sequence, profile)
-    return replace(plan, sequence=sequence, profile=fewer, propagation=paths, thinning=thinning)
+    return replace(plan, sequence=sequence, profile=above_bottom(scene, profile), propagation=paths)

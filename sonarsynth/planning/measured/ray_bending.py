@@ -39,14 +39,6 @@ def bending_error(model: Propagation, scene: Scene, profile: Profile, frames: It
     """
     if profile.uniform:
         return 0.0
-    return difference_of_paths((model, profile), (model.exact(), profile), scene, frames)
-
-
-def difference_of_paths(
-    first: tuple[Propagation, Profile], second: tuple[Propagation, Profile], scene: Scene, frames: Iterable[Frame]
-) -> float:
-    """Error of signals, relative, by which the paths of one model in one water differ from those of another, as in
-    `bending_error`; inf where they differ in number."""
     bottom, highest = scene.world.environment.depth, scene.sonar.band.high
     worst = 0.0
     for frame in frames:
@@ -54,16 +46,25 @@ def difference_of_paths(
         start, end = ways(frame, bottom)
         if not len(start):
             continue
-        paths, theirs = (model.connect(profile, bottom, start, end) for model, profile in (first, second))
+        paths, theirs = (of.connect(profile, bottom, start, end) for of in (model, model.exact()))
         if not _alike(paths, theirs):
             return np.inf
         late = 2.0 * np.pi * highest * np.abs(paths.travel_time - theirs.travel_time)
         turned = np.linalg.norm(paths.arrival - theirs.arrival, axis=1)
-        wave = 2.0 * np.pi * highest / float(second[1].at(depth(array)))
+        wave = 2.0 * np.pi * highest / float(profile.at(depth(array)))
         over = wave * elements(scene.sonar.array).aperture * turned
         louder = np.abs(paths.spreading / theirs.spreading - 1.0)
         worst = max(worst, 2.0 * float(np.max(late + over + louder, initial=0.0)))
     return worst
+
+
+def above_bottom(scene: Scene, profile: Profile) -> Profile:
+    """A measured profile down to the first node at or below the bottom; any other as it is."""
+    bottom, count = scene.world.environment.depth, len(profile.depth)
+    first = int(np.searchsorted(profile.depth, bottom, side="left")) + 1
+    if not scene.world.environment.sound_speed.measured or first >= count or bottom < profile.depth[0]:
+        return profile
+    return Profile(profile.depth[:first], profile.speed[:first], profile.notes)
 
 
 def ways(frame: Frame, bottom: float) -> tuple[Floats, Floats]:

@@ -63,7 +63,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     rows += motion_left_out(plan, frame) + _chorus_left_out(plan) + reverberation_left_out(plan)
     if not environment.noises:
         rows.append(Omission("ambient noise", "none in the recipe", "signals are free of noise"))
-    return tuple(rows + _thinned(plan) + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))
+    return tuple(rows + _below_bottom(plan) + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))
 
 
 def _relief_left_out(plan: Plan) -> list[Omission]:
@@ -150,13 +150,10 @@ def _refraction_bound(plan: Plan, frame: Frame) -> str:
     return f"requested, but the sound speed varies by {varies:.3g} m/s: angles and delays are biased"
 
 
-def _thinned(plan: Plan) -> list[Omission]:
-    """Nodes of a measured profile that fewer layers stand for."""
-    read, nodes = len(profile_of(plan.scene.world.environment.sound_speed).depth), len(plan.profile.depth)
-    if nodes == read:
-        return []
-    bound = f"{plan.thinning:.1g} of the signals, measured" if plan.thinning else "0: the rest is below the bottom"
-    return [Omission(f"{read} nodes of the sound speed", f"{nodes} stand for them", bound)]
+def _below_bottom(plan: Plan) -> list[Omission]:
+    """Nodes of a measured profile that are not needed."""
+    left = len(profile_of(plan.scene.world.environment.sound_speed).depth) - len(plan.profile.depth)
+    return [Omission(f"{left} nodes of the sound speed", "they are below the bottom", "0")] if left else []
 
 
 def _not_traced(plan: Plan) -> list[Omission]:

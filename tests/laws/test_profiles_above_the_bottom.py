@@ -1,0 +1,35 @@
+"""Nodes of a measured profile below the bottom are left out: no ray is there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import sonarsynth as ss
+from sonarsynth.environment.casts import profile_of
+
+BOX = """
+title: a box under a cast
+scene:
+  world:
+    environment:
+      depth: 60 m
+      sound_speed: {kind: cast, path: cast.csv}
+    targets:
+      - {name: box, shape: {kind: box, size: [1, 1, 1]}, motion: {kind: still, position: [15, 2, -14]}}
+    sources: [{kind: snapping_shrimp, position: [12, -6, -20]}]
+  sonar: {array: {kind: planar_lattice, columns: 4, rows: 4, pitch: 5 cm}}
+  trajectory: {frames: 2, sonar: {kind: still, position: [0, 0, -10], heading: 90 deg}}
+"""
+
+
+def test_what_is_below_the_bottom_needs_no_nodes(tmp_path):
+    depth = np.array([1.0, 10.0, 30.0, 61.0, 70.0, 80.0])
+    rows = "".join(f"{z:.4f},{c:.6f}\n" for z, c in zip(depth, 1500.0 + np.sqrt(depth), strict=True))
+    (tmp_path / "cast.csv").write_text("depth (m),sound speed (m/s)\n" + rows)
+    (tmp_path / "box.yaml").write_text(BOX)
+    plan = ss.plan(ss.load(tmp_path / "box.yaml"), products=["signals"])
+    whole = profile_of(plan.scene.world.environment.sound_speed)
+    assert len(whole.depth) == 6
+    np.testing.assert_array_equal(plan.profile.depth, whole.depth[:4])
+    np.testing.assert_array_equal(plan.profile.speed, whole.speed[:4])
+    assert [row.what for row in plan.left_out if "nodes" in row.what] == ["2 nodes of the sound speed"]
