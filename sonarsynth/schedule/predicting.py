@@ -6,15 +6,10 @@ The plan alone gives costs by counts of work. A prediction is better: it makes s
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import log
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
-
-import numpy as np
 
 from sonarsynth import store
 from sonarsynth.labels.odds import NO_ODDS, Odds
@@ -31,9 +26,7 @@ PREPARED: Final = 3.0
 CLUSTER: Final = 0.35
 """Share of that to start and to end a scheduler and its client."""
 WORKER: Final = 0.75
-"""Share of it that a worker takes until it is at its pace: to join its scheduler, to have the plan, kernels; of this"""
-LOADED: Final = 0.35
-"""so much is in its first frame, for kernels that planning has loaded here."""
+"""Share of it that a worker takes until it is at its pace: to join its scheduler, to have the plan, kernels."""
 PER_FRAME: Final = 3e-3
 """Seconds of one core for the scheduler to see to the tasks of a frame."""
 CLOSING: Final = 0.3
@@ -56,13 +49,9 @@ class Prediction:
     stages: Mapping[str, float]  # s of one core a frame, by stage; `write` with it
     raw_bytes_a_frame: int  # before compression
     loading: float  # s of one core, before the first frame of a process is at the pace of the others
-    fresh: tuple[float, ...]  # s of one core that tried frames took longer for the first time
-    steps: float  # frames of a sequence, on average, where there is more than one sequence; else 0
     prepared: float  # s of one core until a process has the plan
     waiting: float  # wall-clock time over processor time here and now, of one process
-    others: float  # processes that ran or waited for a core then, besides this one
     writing_wait: float  # s a frame that writing takes longer than its processor time
-    sharing: float  # processor time of work where all workers run, over that of one alone
     laying_out: tuple[float, float]  # s: processor, wall clock
     sizes: tuple[Sizes, Sizes]  # of the store without frames; that a whole shard adds
     files: int  # and folders, at most
@@ -82,14 +71,13 @@ class Prediction:
 
     @property
     def frames_seconds(self) -> float:
-        """Seconds of one core for all frames: making (what is done for the first time with it), without writing."""
-        making = self.frame_seconds - self.stages.get("write", 0.0)
-        return self.frames * making + max(self.workers, 1) * self._first_times + self.workers * LOADED * self.prepared
+        """Seconds of one core for all frames: making (what workers load with it), without writing."""
+        return self.frames * (self.frame_seconds - self.stages.get("write", 0.0)) + self.workers * self.loading
 
     @property
     def core_seconds(self) -> float:
         """Seconds of the processor in all, those of starting too."""
-        work = self.frames * self.frame_seconds + max(self.workers, 1) * self._first_times
+        work = self.frames * self.frame_seconds + self.workers * self.loading
         if self.workers:
             work += (CLUSTER + self.workers * WORKER) * self.prepared + self.frames * PER_FRAME
         return self.laying_out[0] + work
@@ -103,11 +91,11 @@ class Prediction:
         crowded = max(self.workers, 1) / parallel
         shards = -(-self.frames // self.shard_frames)
         busiest = min(self.frames, -(-shards // max(self.workers, 1)) * self.shard_frames)
-        work, waiting = busiest * self.frame_seconds + self._first_times, self._waiting
-        wall = self.laying_out[1] + work * crowded * self.sharing * waiting + busiest * self.writing_wait
+        work = busiest * self.frame_seconds + (self.loading if self.workers else 0.0)
+        wall = self.laying_out[1] + work * crowded * self.waiting + busiest * self.writing_wait
         if self.workers:
             seeing_to = self.frames * PER_FRAME / (self.cores if self.workers >= self.cores else 1)
-            wall += waiting * ((CLUSTER + crowded * WORKER) * self.prepared + seeing_to) + CLOSING
+            wall += self.waiting * ((CLUSTER + crowded * WORKER) * self.prepared + seeing_to) + CLOSING
         return wall
 
     @property
@@ -127,24 +115,6 @@ class Prediction:
         fixed, shard = self.sizes
         shards = -(-self.frames // self.shard_frames)
         return round(self.file_bytes + fixed.disk - fixed.files + shards * max(shard.disk - shard.files, 0.0))
-
-    @property
-    def _waiting(self) -> float:
-        """Wall-clock time over processor time of a worker: they wait for each other and for all else that runs."""
-        parallel = max(min(self.workers, self.cores), 1)
-        return self.waiting * max(1.0, (parallel + self.others) / self.cores) / max(1.0, (1 + self.others) / self.cores)
-
-    @property
-    def _first_times(self) -> float:
-        """Seconds of one core that frames of a worker take longer for the first time.
-
-        Each sequence has its first frame; along one, ever fewer frames are new, and in this process, none.
-        """
-        frames, tried = self.frames / max(self.workers, 1), max(len(self.fresh), 1)
-        if self.steps:
-            return self.loading * bool(self.workers) + sum(self.fresh) / tried * frames / self.steps
-        grown = 1.0 + log(frames / tried) if frames > tried else frames / tried
-        return self.loading + sum(self.fresh) * grown if self.workers else 0.0
 
     def tried(self, plan: Plan) -> Plan:
         """The plan with the seconds of this prediction, and the odds of finding targets, for printing."""
@@ -217,13 +187,9 @@ def predict(
         stages=counted,
         raw_bytes_a_frame=raw,
         loading=0.0,
-        fresh=(),
-        steps=plan.recipe.frames / plan.recipe.sequences if plan.recipe.sequences > 1 else 0,
         prepared=usual if prepared is None else min(prepared, 1.25 * usual),
         waiting=1.0,
-        others=0.0,
         writing_wait=0.0,
-        sharing=1.0,
         laying_out=(LAYING_OUT, LAYING_OUT),
         files=store.layout_of(plan).files(),
         sizes=(Sizes(3e5, 1.1e6), Sizes(1.0, 1.6) * (COMPRESSED * raw * plan.shard_frames)),
@@ -242,53 +208,15 @@ def _from(prediction: Prediction, trial: Trial) -> Prediction:
     """A prediction with what a trial has shown."""
     stages = {name: seconds for name, seconds in trial.cpu.items() if name != "collect"}
     stages["write"] = trial.writing[0] / prediction.shard_frames + trial.cpu.get("collect", 0.0)
-    few = "" if trial.every == 1 else f"; with one facet in {trial.every}"
     return replace(
         prediction,
-        basis=f"timing frames on this machine (number {', '.join(map(str, sorted(trial.frames)))}{few})",
+        basis=f"timing frames on this machine (number {', '.join(map(str, sorted(trial.frames)))})",
         stages=stages,
         loading=min(trial.loading, 0.2 * prediction.prepared),  # not what a compiler did, which is kept
-        fresh=trial.fresh,
         waiting=trial.waiting,
-        others=trial.others,
         writing_wait=max(trial.writing[1] - trial.waiting * trial.writing[0], 0.0) / prediction.shard_frames,
-        sharing=sharing(prediction.cores),
         laying_out=trial.laying_out,
         sizes=(trial.fixed, trial.shard),
         failures=trial.failures,
         odds=trial.odds,
     )
-
-
-def sharing(cores: int) -> float:
-    """Processor time of work while all of so many cores do the same, over that of one alone: 1 where none shares."""
-    if cores < 2:
-        return 1.0
-    count = min(cores, 16)
-    together = threading.Barrier(count)
-    spent = [0.0] * count
-
-    def work(n: int) -> None:
-        spent[n] = _busy(together.wait)
-
-    alone = _busy(lambda: 0)
-    threads = [threading.Thread(target=work, args=(n,)) for n in range(count)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    return float(np.clip(np.median(spent) / alone, 1.0, 2.0))
-
-
-def _busy(ready: Callable[[], int]) -> float:
-    """Processor time of a pass of arithmetic through 4 MB, the best of many that take about 20 ms in all."""
-    block, result = np.ones((2, 2**19), np.float32)
-    np.sqrt(block, out=result)  # memory is there
-    ready()
-    best = np.inf
-    for _ in range(20):
-        began = time.thread_time()
-        np.sqrt(block, out=result)
-        np.multiply(result, block, out=result)
-        best = min(best, time.thread_time() - began)
-    return best
