@@ -155,7 +155,7 @@ class Hovering(_Ranges):
 
 @description
 class Wandering(_Ranges):
-    """Leg after leg at constant speed, with another heading on each."""
+    """Leg after leg at constant speed: on the first with the heading that was drawn, on each other with another."""
 
     kind: Literal["wandering"] = "wandering"
     speed: tuple[MetresPerSecond, MetresPerSecond]

@@ -63,7 +63,7 @@ class Population:
     on_bottom: bool = False
     """Whether they lie on the bottom, by their lowest points, rather than where the region has them."""
     orientation: Orientation = Field(default_factory=Upright)
-    """How they lie, in the middle of the sequence."""
+    """How they lie: at rest and straight ahead always, swinging about it, wandering at first."""
     track: DrawnTrack = Field(default_factory=AtRest)
     """How they move. They are where they were drawn in the middle of the sequence."""
     apart: NonNegativeMetres = 0.0
