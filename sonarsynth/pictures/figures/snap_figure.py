@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
-from sonarsynth.equations.bubble.pulses import Pulse, filtered, gain_for_level, levels, reach, spectrum
+from sonarsynth.equations.bubble.pulses import Pulse, filtered, gain_for_level, levels, reach, spectrum, support
 from sonarsynth.equations.noise.filters import Fir, response
 from sonarsynth.pictures.figures.snap_comparison import SnapComparison, draw_comparison
 from sonarsynth.pictures.figures.style import INK, MARKS, figure, grid, label, pressure_unit
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 AS_MADE = Fir(0.0, 1e6, 0.2e6, 80.0)
 """The snap itself is drawn below 1.1 MHz."""
 
+LOUD = 0.1
+"""Of the peak: as long as a pulse exceeds that, it is drawn."""
 AROUND = 100e-6
 """s that are drawn before and after the collapse."""
 
@@ -42,12 +44,13 @@ def snap_figure(
 ) -> Figure:
     """The snap at 1 m, scaled to `source_level` (dB re 1 uPa at 1 m peak; None: its own), before and after the filter.
 
-    pulse: gives it for waves up to a frequency (Hz). Drawn for 200 us about the collapse, up to `HIGHEST`, with
-    level, width and bandwidth; under it, where there is one, a comparison with a measured snap.
+    pulse: gives it for waves up to a frequency (Hz). Drawn for 200 us about the collapse or as long as it is loud, up to
+    `HIGHEST`, with level, width and bandwidth; under it, where there is one, a comparison with a measured snap.
     """
     fine, received = pulse(reach(AS_MADE)), pulse(max(reach(fir), HIGHEST))
     gain = gain_for_level(fine, source_level)
-    time = np.linspace(-AROUND, AROUND, 4001)
+    before, after = (max(AROUND, 1.1 * lasts) for lasts in support(received, fir, LOUD))
+    time = np.linspace(-before, after, 4001 if before == after == AROUND else 20001)
     frequency = np.linspace(HIGHEST / 800, HIGHEST, 800)
     passed = response(frequency, fir)
     density = gain * spectrum(frequency, received)
