@@ -44,7 +44,7 @@ def snap_figure(
 ) -> Figure:
     """The snap at 1 m, scaled to `source_level` (dB re 1 uPa at 1 m peak; None: its own), before and after the filter.
 
-    pulse: gives it for waves up to a frequency (Hz). Drawn for 200 us about the collapse or as long as it is loud, up to
+    pulse: gives it for waves up to a frequency (Hz). Drawn for 200 us about the collapse, or while it is loud, up to
     `HIGHEST`, with level, width and bandwidth; under it, where there is one, a comparison with a measured snap.
     """
     fine, received = pulse(reach(AS_MADE)), pulse(max(reach(fir), HIGHEST))
