@@ -82,7 +82,7 @@ def _shape(folder: Path) -> Callable[[str], str]:
     return lambda text: text.strip() if text.strip() in SHAPES else _file(text, folder)
 
 
-NAMES = "remus, reef, thermocline, crowd, deep, tank, l_shape, grid, boat, survey, harbour."
+NAMES = "remus, reef, thermocline, crowd, deep, tank, l_shape, grid, boat, survey, ping, harbour."
 
 
 def init(
