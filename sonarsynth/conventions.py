@@ -49,6 +49,8 @@ FORMAT_VERSION: Final = "3"
 ASSUMED_SPEED: Final = "scene.sonar.assumed_sound_speed"
 """Where a recipe has the sound speed that the sonar assumes: the name of its coordinate where it varies."""
 
+PINGS: Final = "its own pings"
+"""What targets are seen by where the sonar sends: the `lit_by` of a store."""
 NO_TARGET: Final = -1
 """Index of "no target", "no facet": never 0, which is a target."""
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Progress
+from sonarsynth.conventions import PINGS, Floats, Progress
 from sonarsynth.description import FieldError
 from sonarsynth.detection import beam_width
 from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 METRES_A_DEGREE: Final = 111_195.0
 """Of latitude, and of longitude at the equator, where there is the origin of the world."""
 LOST: Final = (
-    "the light is that of snaps: what the convention asks of a transmitter is NaN, and no equation converts to target "
+    "what the convention asks of a transmitter is NaN, for snaps and for pings, and no equation converts to target "
     "strength",
     "positions are metres east and north of 0 N 0 E; times are counted from the start of the motions, or the first "
     "frame where that is earlier, as 1970-01-01",
@@ -135,7 +135,7 @@ def _write(tree: xr.DataTree, path: Path, frames: np.ndarray, groups: list[_Beam
             {
                 "Conventions": "CF-1.7, SONAR-netCDF4-2.0, ACDD-1.3",
                 "date_created": now,
-                "keywords": f"{'active' if 'lit_by' in tree.attrs else 'passive'} sonar, simulation",
+                "keywords": ("active" if PINGS in tree.attrs.get("lit_by", ()) else "passive") + " sonar, simulation",
                 "license": str(tree.attrs.get("licence", "None")),
                 "sonar_convention_authority": "ICES",
                 "sonar_convention_name": "SONAR-netCDF4",

@@ -47,7 +47,7 @@ from sonarsynth.products import Arrivals, PointCloud, Signals, no_points
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.location.association import in_record, light_first
-from sonarsynth.ranging.range_cells import range_image
+from sonarsynth.ranging.range_image import range_image
 from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame

@@ -265,6 +265,7 @@ def _sonar_rows(plan: Plan, size: FrameSize) -> list[Row]:
 
 
 def _range_image_row(plan: Plan, size: FrameSize) -> list[Row]:
+    """A row, where range images are asked for."""
     grid = plan.scene.sonar.ranges
     if "range_image" not in plan.products or grid is None:
         return []

@@ -198,8 +198,8 @@ class Scene:
 
     @property
     def sources(self) -> tuple[SoundSource, ...]:
-        """What makes the sound, that which the sonar carries with it."""
-        return tuple(source.carried_by(self.trajectory.sonar) for source in self.world.sources)
+        """What makes the sound, what is mounted on the sonar with it."""
+        return tuple(source.mounted_on(self.trajectory.sonar) for source in self.world.sources)
 
     @property
     def laws(self) -> tuple[Scattering, ...]:

@@ -50,14 +50,19 @@ class SoundSource(Method):
     """The field that gives the times, to be named where they are wrong."""
     pulse_field: ClassVar[str] = "kind"
     """The field that gives the pulse."""
-    carried: ClassVar[bool] = False
-    """Whether the sonar carries it: then it is somewhere only as `carried_by` gives it."""
+    mounted: ClassVar[bool] = False
+    """Whether it is mounted on the sonar: then it is somewhere only as `mounted_on` gives it."""
     illuminates: bool = True
     """Whether its echoes are traced; if not, it is heard directly alone."""
 
-    def carried_by(self, motion: Motion) -> SoundSource:
-        """The same aboard a sonar that moves so; what stands in the world stays where it is."""
+    def mounted_on(self, motion: Motion) -> SoundSource:
+        """The same on a sonar that moves so; what is not mounted stays where it is."""
         return self
+
+    @property
+    def light(self) -> str:
+        """What targets are seen by, as cards of datasets say it."""
+        return self.kind.replace("_", " ")
 
     def position_at(self, bottom: float, time: float = 0.0) -> Floats:
         """Where it is (xyz) in m, over a bottom at this depth (m), at a time (s) since the start of the motions."""

@@ -1,8 +1,8 @@
-"""A sonar's own transmitter: a source that the sonar carries, and what it sends."""
+"""A sonar's own transmitter: a source that is mounted on the sonar, and what it sends."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from typing import Annotated, ClassVar, Final, Literal
 
@@ -10,7 +10,17 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 from pydantic import model_validator
 
-from sonarsynth.conventions import Decibels, Floats, Number, Position, PositiveHertz, PositiveSeconds, Radians, Seconds
+from sonarsynth.conventions import (
+    PINGS,
+    Decibels,
+    Floats,
+    Number,
+    Position,
+    PositiveHertz,
+    PositiveSeconds,
+    Radians,
+    Seconds,
+)
 from sonarsynth.conventions import direction as direction_of
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.equations.bubble import waveforms
@@ -101,7 +111,7 @@ class Transmitter(SoundSource):
 
     times_field: ClassVar[str] = "ping_times"
     pulse_field: ClassVar[str] = "pulse"
-    carried: ClassVar[bool] = True
+    mounted: ClassVar[bool] = True
 
     @model_validator(mode="after")
     def _check(self) -> Transmitter:
@@ -109,9 +119,14 @@ class Transmitter(SoundSource):
             raise ValueError("position is the middle of the array: say where beside it the transmitter is")
         return self
 
-    def carried_by(self, motion: Motion) -> SoundSource:
-        """As `SoundSource.carried_by`."""
-        return _OnBoard(self, motion)
+    def mounted_on(self, motion: Motion) -> SoundSource:
+        """As `SoundSource.mounted_on`."""
+        return _Mounted(motion=motion, **{field.name: getattr(self, field.name) for field in fields(self)})
+
+    @property
+    def light(self) -> str:
+        """As `SoundSource.light`."""
+        return PINGS
 
     @property
     def times(self) -> tuple[float, ...]:
@@ -128,53 +143,24 @@ class Transmitter(SoundSource):
         return self.source_level
 
 
-@dataclass(frozen=True)
-class _OnBoard(SoundSource):
-    """A transmitter where a sonar that moves so carries it."""
+@dataclass(frozen=True, kw_only=True)
+class _Mounted(Transmitter):
+    """A transmitter on a sonar that moves so."""
 
-    transmitter: Transmitter
     motion: Motion
-
-    times_field: ClassVar[str] = Transmitter.times_field
-    pulse_field: ClassVar[str] = Transmitter.pulse_field
-    carried: ClassVar[bool] = True
-
-    @property
-    def name(self) -> str:  # type: ignore[override]
-        """As `SoundSource.name`."""
-        return self.transmitter.name
-
-    def row(self) -> str:
-        """As `Method.row`."""
-        return self.transmitter.row()
-
-    @property
-    def times(self) -> tuple[float, ...]:
-        """As `SoundSource.times`."""
-        return self.transmitter.times
-
-    def model(self, bottom: float) -> PulseModel:
-        """As `SoundSource.model`."""
-        return self.transmitter.model(bottom)
-
-    @property
-    def level(self) -> float | None:
-        """As `SoundSource.level`."""
-        return self.transmitter.level
 
     def position_at(self, bottom: float, time: float = 0.0) -> Floats:
         """As `SoundSource.position_at`."""
-        return pose(self.motion, time).to_world(self.transmitter.position)
+        return pose(self.motion, time).to_world(self.position)
 
     def velocity(self, time: float) -> Floats:
         """As `SoundSource.velocity`."""
-        arm = pose(self.motion, time).turn_to_world(self.transmitter.position)
+        arm = pose(self.motion, time).turn_to_world(self.position)
         return np.asarray(velocity(self.motion, time) + np.cross(spin(self.motion, time), arm))
 
     def directivity(self, time: float) -> Directivity | None:
         """As `SoundSource.directivity`."""
-        beam = self.transmitter.beam
-        return None if beam is None else partial(_pattern, beam, pose(self.motion, time).rotation)
+        return None if self.beam is None else partial(_pattern, self.beam, pose(self.motion, time).rotation)
 
 
 def _pattern(beam: TransmitBeam, rotation: Floats, towards: Floats) -> Floats:

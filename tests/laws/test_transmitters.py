@@ -168,8 +168,8 @@ def test_a_sweep_has_the_spectrum_of_its_waveform(law: Any, start: float, stop: 
 def test_a_sweep_that_is_stretched_by_motion_comes_at_another_time(
     law: Any, start: float, stop: float, length: float, loss: float
 ) -> None:
-    """At 2 m/s towards a target: by (2 v/c) f2 T/B, counted from its beginning (Rihaczek 1969, ch. 7); with losses
-    of 0.1 to 0.6 dB."""
+    """At 2 m/s towards a target: by (2 v/c) f2 T/B, counted from its beginning (Rihaczek 1969, Principles of
+    High-Resolution Radar); with losses of 0.02 to 0.6 dB."""
     sweep, stretch = Sweep(start=start, stop=stop, duration=length, law=law), 1.0 + 2.0 * 2.0 / C
     step = 1.0 / (12.0 * stop)
     half = int(0.7 * length / step)

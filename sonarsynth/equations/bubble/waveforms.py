@@ -1,4 +1,4 @@
-"""Waveforms whose pulse is known: the logarithmic bubble, a recording, and plain test pulses with an exact spectrum."""
+"""Waveforms whose pulse is known: the logarithmic bubble, a recording, sweeps, and test pulses with exact spectra."""
 
 from __future__ import annotations
 
@@ -83,9 +83,12 @@ def gabor(frequency: float, cycles: float, peak: float, highest: float) -> Pulse
 
 
 def sweep(start: float, stop: float, duration: float, taper: float, hyperbolic: bool, highest: float) -> Pulse:
-    """A sweep from one frequency (Hz) to another in some time (s), of 1 Pa, whose ends are raised cosines over a share
-    `taper` of it. Linear: the phase is 2 pi (f0 t + b t^2/(2 T)), f0 and b its middle and its band; hyperbolic, the
-    period changes evenly: 2 pi ln(1 - k (t + T/2))/-k' (Altes & Titlebaum 1970, J. Acoust. Soc. Am. 48, 1014)."""
+    """A sweep of 1 Pa from a frequency f1 to f2 (start, stop, Hz) in a duration T (s), whose ends are raised cosines:
+    both together a share `taper` of it.
+
+    Its phase, t (s) from its beginning, is 2 pi (f1 t + (f2 - f1) t^2/(2 T)) if linear. Hyperbolic, the period changes
+    evenly: 2 pi ln(1 + f1 k t)/k, k = (1/f2 - 1/f1)/T. Source: Altes & Titlebaum (1970), J. Acoust. Soc. Am. 48, 1014.
+    """
     time, step = _grid(0.5 * duration, OVERSAMPLED * (highest + max(start, stop)))
     since = time + 0.5 * duration
     if hyperbolic and start != stop:

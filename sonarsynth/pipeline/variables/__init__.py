@@ -65,9 +65,8 @@ def attributes(plan: Plan) -> dict[str, Any]:
     besides["reverberation"] = world.reverberation is not None
     others = [name for name, value in besides.items() if value]
     also: dict[str, Any] = {"other_sounds": others} if others else {}
-    own = [source.carried for source in world.sources]
-    if any(own):
-        also["lit_by"] = ["its own pings"] + ["snapping shrimp"] * (not all(own))
+    if world.sources:
+        also["lit_by"] = sorted({source.light for source in world.sources})
     return also | {
         "title": recipe.title,
         "Conventions": "CF-1.11",

@@ -81,6 +81,7 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
 
 
 def _add_ranges(plan: Plan, add: Any) -> None:
+    """Ranges of the cells of range images."""
     if "range_image" in plan.products and (grid := plan.scene.sonar.ranges) is not None:
         add("/range_image", "range", ("range",), grid.range, "m", "range from the middle of the array")
 

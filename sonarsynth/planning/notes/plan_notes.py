@@ -114,7 +114,7 @@ def _shared(recipe: Recipe, looks: Sequence[SampledScene]) -> list[str]:
             split, world = recipe.split(look.frames[0].index), look.scene.world
             trajectory = look.scene.trajectory
             poses = tuple((t.motion, trajectory.start, trajectory.interval) for t in world.targets)
-            still = (s for s in world.sources if not s.carried)
+            still = (s for s in world.sources if not s.mounted)
             snaps = tuple(tuple(s.position_at(world.environment.depth).tolist()) for s in still)
             for name, value in (("target poses", poses), ("snap positions", snaps)):
                 if value:  # scenes without any have nothing in common

@@ -192,7 +192,7 @@ def clipping_notes(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
 
 def coarse_counts(scene: Scene) -> list[str]:
     """Whether the converter's counts are too coarse for the noise: with less than half a count, rounding is no noise of
-    its own and takes most of it (Widrow & Kollar 2008, Quantization Noise, ch. 20)."""
+    its own and takes most of it (Widrow & Kollar 2008, Quantization Noise)."""
     sonar, noises = scene.sonar, list[NoiseField](scene.world.environment.noises)
     noises += [ElectronicNoise(sonar.electronics)] if sonar.electronics is not None else []
     if sonar.converter is None or not noises or scene.world.chorus is not None:

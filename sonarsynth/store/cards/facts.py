@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from sonarsynth.conventions import PINGS
 from sonarsynth.store import Folder, Remote, beside, must_be_store, root_attributes
 from sonarsynth.store.files.json_lines import read_lines
 from sonarsynth.store.files.place import FileRecord, read_json
@@ -118,7 +119,7 @@ class Facts:
     @property
     def sonar(self) -> str:
         """Whether it makes that sound itself."""
-        return "passive sonar" if self.lit_by == ("snapping shrimp",) else "active sonar"
+        return "active sonar" if PINGS in self.lit_by else "passive sonar"
 
     @property
     def summary(self) -> str:
