@@ -40,7 +40,7 @@ def cloud_of(
             snapshots_of(signals, sonar, image.start, image.stop), elements, sonar
         )
     loudest = float(np.abs(signals.pressure).max(initial=0.0))
-    window = ReceivedWindow(elements, sonar, image, beams, loudest, direct or signals, estimates)
+    window = ReceivedWindow(elements, sonar, image, beams, loudest, direct or signals, estimates, focus)
     return point_cloud(window, picking, placing, pose, profile)
 
 

@@ -250,7 +250,8 @@ def _received(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> Received
         return None
     loudest, pulse = ranging_kernels.peak(signals.pressure), plan.windows.supports.direct
     elements, sonar = known_elements(plan, frame), plan.scene.sonar
-    return ReceivedWindow(elements, sonar, image, beams, loudest, beamformed.signals, estimates, pulse)
+    focus, direct = plan.choices.beamforming.focus, beamformed.signals
+    return ReceivedWindow(elements, sonar, image, beams, loudest, direct, estimates, focus, pulse)
 
 
 def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointCloud:

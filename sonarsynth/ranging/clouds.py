@@ -9,11 +9,13 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, azimuth_elevation, direction
 from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.arrays.apertures import defocus_spread
 from sonarsynth.geometry import Pose, unit
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import PointCloud, SourceEstimates, no_points
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes
 from sonarsynth.ranging.placing.solution import Solution
+from sonarsynth.ranging.range_profiles import aperture_moments
 from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.receiver import Sonar
 from sonarsynth.receiver.mirror_images import plane_normal
@@ -41,6 +43,7 @@ def point_cloud(
     solution = placing.place(echoes.delay, beam, source, window.sonar, sonar_pose, profile)
     if velocity.any() or spin.any():
         solution = solution.as_array_moves(source, -echoes.delay[:, None] * (velocity + np.cross(spin, source)))
+    echoes = _as_focused(echoes, solution.range, window)
     error = range_error(solution, echoes, window.estimates, window.sonar)
     cloud = PointCloud(
         position=solution.position.astype(np.float32),
@@ -56,6 +59,27 @@ def point_cloud(
         overflow=echoes.overflow,
     )
     return cloud.select(np.flatnonzero(np.isfinite(solution.range) & (solution.range > 0) & np.isfinite(error)))
+
+
+def _as_focused(echoes: PickedEchoes, distance: Floats, window: ReceivedWindow) -> PickedEchoes:
+    """Echoes with what beams that are not focused at their distance (echo,) m add to the errors of directions."""
+    azimuth, elevation = echoes.azimuth, echoes.elevation
+    level = np.cos(elevation)
+    up = direction(azimuth, elevation + 0.5 * np.pi)
+    port = direction(azimuth + 0.5 * np.pi, np.zeros(len(azimuth)))
+    moments = aperture_moments(window.elements)
+    wavenumber = 2.0 * np.pi * window.sonar.band.centre / window.sonar.assumed_sound_speed
+    with np.errstate(divide="ignore"):
+        curvature = 1.0 / distance - (1.0 / window.focus if window.focus else 0.0)
+    across, along = (
+        defocus_spread(np.sqrt(np.maximum(np.sum(axis @ moments * axis, axis=1), 0.0)), curvature, wavenumber)
+        for axis in (port, up)
+    )
+    return replace(
+        echoes,
+        azimuth_error=np.minimum(np.hypot(echoes.azimuth_error, across / np.maximum(level, 0.1)), np.pi),
+        elevation_error=np.minimum(np.hypot(echoes.elevation_error, along), np.pi),
+    )
 
 
 def _at_true_directions(echoes: PickedEchoes, velocity: Floats, window: ReceivedWindow) -> PickedEchoes:

@@ -21,6 +21,7 @@ class ReceivedWindow:
     loudest: float  # Pa: largest pressure in the signals that the beams are made of
     direct: Signals  # with the direct pulse in them
     estimates: SourceEstimates
+    focus: float | None = None  # m: of the beams; none: plane waves
     pulse: float = 0.0  # s: how long either side of its peak the direct pulse is heard
 
     @property

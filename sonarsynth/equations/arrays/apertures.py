@@ -33,6 +33,18 @@ def focus_delay(position: npt.ArrayLike, direction: npt.ArrayLike, focus: float 
     return np.asarray(bulge / ((1.0 + np.sqrt(np.maximum(1.0 + curvature * bulge, 0.0))) * sound_speed))
 
 
+def defocus_spread(extent: npt.ArrayLike, curvature: npt.ArrayLike, wavenumber: float) -> Floats:
+    """Standard angle (...) in rad by which peaks may be beside a wave that an array is out of focus for.
+
+    extent (...) m: root mean square, of the aperture along one axis; curvature (...) 1/m: of the wave less that of the
+    focus; wavenumber in rad/m. Each part of the aperture hears it elsewhere, over an angle extent * curvature rms. One
+    peak in the middle stays until the phase is about 2 rad rms: beyond that there are several, near the ends.
+    """
+    a, k = np.asarray(extent, float), np.abs(np.asarray(curvature, float))
+    phase = wavenumber * k * a**2
+    return np.asarray(a * k * np.sqrt(np.maximum(1.0 - (2.0 / np.maximum(phase, 1e-30)) ** 2, 0.0)))
+
+
 def live_gain(gain: npt.ArrayLike) -> Floats:
     """Element gains (sensor,) divided by their sum. Raises ValueError when it is not above zero: no element hears."""
     g = np.asarray(gain, float)
