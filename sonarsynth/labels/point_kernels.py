@@ -13,6 +13,8 @@ from sonarsynth.conventions import Bools, Complexes, Floats, Ints
 
 RIM_STEP = 0.35
 """rad at the rim of the aperture between two tables of the pattern: the nearest one errs by 0.1 rad rms at most."""
+HEARD = 0.1
+"""Of what the loudest path brings of a point: what brings less does not tell where it may be."""
 
 
 class Pattern(NamedTuple):
@@ -226,24 +228,22 @@ def _shared(share: Floats, brought: Complexes, own: Bools, coherent: Bools) -> N
 
 
 @compiled
-def means(
-    share: Floats, first: Ints, rows: Ints, delay: Floats, radius: Floats, facet: Ints, centroid: Floats
-) -> Floats:
-    """Means (point, 5) over the paths (point, path from `first` on) of points by their shares: of delay (s), of radius
-    (m), and of the middle (xyz) of the facet.
-
-    rows (path,): which paths they are of those with delay, radius and facet (path,); centroid (facet, xyz).
+def means(share: Floats, first: Ints, values: Floats) -> Floats:
+    """Means (point, column) of values (path, column) by the shares (point, path from `first` on) of points, none beyond
+    the values of the paths that bring `HEARD` of the loudest: where echoes cancel, their mean may be anywhere.
     """
-    out = np.zeros((len(share), 5))
+    out = np.zeros((len(share), values.shape[1]))
     for p in range(len(share)):
-        total = share[p].sum()
-        for e in range(share.shape[1]):
-            if share[p, e] != 0.0:
-                weight, row = share[p, e] / total, rows[first[p] + e]
-                out[p, 0] += weight * delay[row]
-                out[p, 1] += weight * radius[row]
-                for x in range(3):
-                    out[p, 2 + x] += weight * centroid[facet[row], x]
+        total, least = share[p].sum(), HEARD * share[p].max()
+        for x in range(values.shape[1]):
+            mean, low, high = 0.0, np.inf, -np.inf
+            for e in range(share.shape[1]):
+                if share[p, e] != 0.0:
+                    value = values[first[p] + e, x]
+                    mean += share[p, e] / total * value
+                    if share[p, e] >= least:
+                        low, high = min(low, value), max(high, value)
+            out[p, x] = min(max(mean, low), high)
     return out
 
 

@@ -110,18 +110,20 @@ def _from_targets(
 ) -> tuple[Floats, Floats]:
     """Range (point,) of where the echoes of points were made, and distance (point,) of the places (point, xyz) that the
     sonar gives them from the target, where sound met it and the array (m)."""
-    arrivals, owner = attributed.arrivals, attributed.owner[points]
-    columns = attributed.rows, arrivals.delay, arrivals.radius, arrivals.facet
+    arrivals, owner, rows = attributed.arrivals, attributed.owner[points], attributed.rows
+    delay, target, facet = arrivals.delay[rows], arrivals.target[rows], arrivals.facet[rows]
+    times = np.stack([delay, delay - arrivals.radius[rows] / arrivals.sound_speed], axis=1)
     ranges, distance = np.empty((2, len(points)))
     for group in np.unique(owner):
-        at, body = owner == group, moment.bodies[attributed.target[group]]
-        own = points[at]
-        mean = kernels.means(attributed.share[own], attributed.first[own], *columns, body.mesh.centroid)
-        met = mean[:, 0] - mean[:, 1] / arrivals.sound_speed
-        placed = body.later(float(met.mean()))
-        moved = (met[:, None] - met.mean()) * placed.velocity
-        array = listening.pose.position + mean[:, :1] * listening.velocity
-        ranges[at] = np.linalg.norm(placed.pose.to_world(mean[:, 2:]) + moved - array, axis=1)
+        at, number = owner == group, attributed.target[group]
+        shares = attributed.share[points[at]], attributed.first[points[at]]
+        heard, met = kernels.means(*shares, times).T
+        placed = moment.bodies[number].later(float(met.mean()))
+        spots = placed.pose.to_world(placed.mesh.centroid[np.where(target == number, facet, 0)])
+        spots += np.outer(times[:, 1] - met.mean(), placed.velocity) - np.outer(delay, listening.velocity)
+        away = np.linalg.norm(spots - listening.pose.position, axis=1)
+        ranges[at] = kernels.means(*shares, away[:, None])[:, 0]
+        array = listening.pose.position + np.outer(heard, listening.velocity)
         place = array + listening.pose.turn_to_world(places[at])
-        distance[at] = surface_distances(placed, place - moved)
+        distance[at] = surface_distances(placed, place - np.outer(met - met.mean(), placed.velocity))
     return ranges, distance

@@ -298,6 +298,28 @@ def test_a_smooth_ball_in_a_narrow_band_is_where_it_glints() -> None:
     assert label["target"] == 0 and abs(label["true_range"] - away) < 0.004
 
 
+@pytest.mark.parametrize("seed", [0, 2])
+def test_a_true_range_is_one_of_the_body_where_its_echoes_cancel(seed: int) -> None:
+    """Faces of a smooth box against each other in a narrow band, at 60 delays from its first echo to its last: the mean
+    of all that echoes, by what it adds to the sum, is up to 36 cm off it there."""
+    recipe = point_scene((12.0, 2.0, -52.0), (9.0, -5.0, -60.0), array=ARRAY, band=ReceiverBand(low=35e3, high=50e3))
+    size = tuple(np.random.default_rng(seed).uniform(0.2, 1.0, 3))
+    box = replace(
+        recipe.scene.world.targets[0], shape=Box(size=size), motion=Still(position=(12.0, 2.0, -52.0), heading=seed)
+    )
+    world, physics = replace(recipe.scene.world, targets=(box,)), replace(recipe.scene.physics, scattering=Kirchhoff())
+    case = made(replace(recipe, scene=replace(recipe.scene, world=world, physics=physics)), focus=None)
+    echoes, (body,) = case.arrivals.delay[~case.arrivals.direct], case.frame.moment.bodies
+    delay = np.linspace(echoes.min(), echoes.max(), 60)
+    towards = case.frame.sonar_pose.to_body(body.pose.position)
+    found = labels_at(case, np.tile(towards / np.linalg.norm(towards), (60, 1)), delay)
+    array = case.frame.sonar_pose.position
+    nearest = surface_distances(body, array[None])[0]
+    farthest = np.linalg.norm(body.pose.to_world(body.mesh.vertices) - array, axis=1).max()
+    true = np.array([label["true_range"] for label in found if label["target"] == 0])
+    assert len(true) > 50 and true.min() > nearest - 1e-4 and true.max() < farthest + 1e-4
+
+
 def test_true_ranges_are_of_where_the_sound_met_what_moves() -> None:
     """At 25 m/s, with a snap 50 ms before the instant: the meeting solved for here, by straight paths."""
     recipe = point_scene((20.0, 2.0, -50.0), (12.0, 5.0, -60.0), array=ARRAY)
