@@ -15,6 +15,8 @@ from sonarsynth.conventions import Bools, Floats, Ints
 
 QUANTITIES = ("delay", "amplitude", "phase", "delay_variance")
 """What varies over the aperture."""
+FIRST_OF_DEGREE = (0, 1, 4, 10, 20, 35)
+"""Of `aperture_terms`, the first of each degree."""
 
 
 def aperture_terms(position: npt.ArrayLike, aperture: float, terms: int = 20) -> Floats:
@@ -100,6 +102,14 @@ class ArrayExpansion(Columns):
         gain = self.amplitude + np.eye(1, terms)
         basis = _terms_at(points, self.aperture, terms)
         return np.asarray(np.einsum("pt,pt->p", gain @ (basis.T @ basis / len(points)), gain))
+
+    @property
+    def amplitude_degrees(self) -> Floats:
+        """How much of each degree (path, degree) there is in 1 + amplitude b(q): the moduli of its terms, summed."""
+        terms = self.amplitude.shape[1]
+        gain = np.abs(self.amplitude + np.eye(1, terms)) if terms else np.ones((len(self.amplitude), 1))
+        starts = [n for n in FIRST_OF_DEGREE if n < gain.shape[1]]
+        return np.asarray(np.add.reduceat(gain, starts, axis=1))
 
     def gradient(self, points: Floats, *names: str) -> Floats:
         """Gradient (xyz, point, term) in 1/m of as many polynomials as some quantities have, at places (point, xyz)."""

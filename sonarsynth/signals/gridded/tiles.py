@@ -11,7 +11,6 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.receiver import Elements
 from sonarsynth.signals.array_paths import NEPER, Wavefronts, reference_of
-from sonarsynth.signals.gridded.amplitude_nodes import degrees, variation
 from sonarsynth.signals.gridded.interpolation import Axes, box_nodes, columns
 from sonarsynth.signals.gridded.low_rank import PLAIN, Term, terms_for
 from sonarsynth.signals.gridded.nodes import MOST_NODES, SpectralQuantiles, nodes_for
@@ -74,7 +73,6 @@ class _Probes(NamedTuple):
     """Where directions are looked at: the corners of the array's box and its centre; near it, all hydrophones."""
 
     points: Floats  # (point, xyz)
-    corners: tuple[int, int, int]  # how many along x, y, z; they come first
     size: Floats  # (xyz) m: half of the box
 
 
@@ -84,8 +82,7 @@ def _probes(elements: Elements, near: bool) -> _Probes:
     axes = [np.unique([a, b]) for a, b in zip(low, high, strict=True)]
     corners = np.stack([g.ravel() for g in np.meshgrid(*axes, indexing="ij")], axis=1)
     points = elements.position if near else np.concatenate([corners, 0.5 * (low + high)[None]])
-    x, y, z = (int(a.size) for a in axes)
-    return _Probes(points, (x, y, z), 0.5 * (high - low))
+    return _Probes(points, 0.5 * (high - low))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +91,7 @@ class _Views:
 
     front: Wavefronts
     columns: Floats  # (column, path): direction, curvature, absorption, delay terms; slownesses at probes
-    amplitude: Floats  # (row, path) of `variation`
+    amplitude: Floats  # (degree, path) Pa: terms of each degree that it has over the aperture
     probes: _Probes
     gradient: Floats  # (xyz, point, term) of the aperture terms; empty where there are none
     bend: Floats  # (xyz, path) rad/m: how fast pulses change over the aperture (`pulse_variation.slopes`)
@@ -108,7 +105,8 @@ def _views(front: Wavefronts, aim: TileSettings, missed: bool) -> _Views:
     gradient = aperture_gradient(front, probes.points)
     columns = _columns(front, probes.points, gradient)
     bend = slopes(front, gradient, aim.weights[0] * aim.highest, aim.highest)
-    return _Views(front, columns, variation(front, elements), probes, gradient, bend, near or missed)
+    amplitude = (np.abs(front.amplitude)[:, None] * front.expansion.amplitude_degrees).T
+    return _Views(front, columns, amplitude, probes, gradient, bend, near or missed)
 
 
 def _columns(front: Wavefronts, probes: Floats, gradient: Floats) -> Floats:
@@ -153,9 +151,8 @@ class _Trial:
 def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     if paths.size == 1:
         return _Trial(_alone(paths, views.front, aim), None)
-    from sonarsynth.signals.gridded.tile_kernels import extremes
-
-    low, high = extremes(views.columns, paths)
+    columns = np.take(views.columns, paths, axis=1)
+    low, high = columns.min(axis=1), columns.max(axis=1)
     over = rest(views.front, paths, aim.changes, 0.1 * aim.tolerance)
     reference = reference_of(views.front, 0.5 * (low + high), over.phase, over.delay_variance)
     probes = views.probes
@@ -165,17 +162,19 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     _, dy, dz = slope.tolist()
     wave = aim.highest / reference.sound_speed  # 1/m
     turn, loss = (aim.elements.face * wave * dy, aim.elements.face * wave * dz), float(far[4])
-    bend = extremes(views.bend, paths)[1]
+    bend = np.take(views.bend, paths, axis=1).max(axis=1)
     phase = np.full(3, np.inf) if views.own else (2.0 * np.pi * wave * slope + bend) * probes.size
     modes, sizes = np.zeros((0, 0)), PLAIN
     if views.front.modes.shape[1]:
         modes, sizes = main_modes(*pulses(views.front, paths, over, aim.changes))
     farther = views.front.attenuation * float(slope @ np.abs(aim.elements.position).max(axis=0))  # dB
+    degrees = views.amplitude[:, paths].sum(axis=1)
+    shares = tuple((degrees / max(float(degrees.sum()), 1e-300)).tolist())
     extent = _Extent(
         paths=paths.size,
         phase=tuple(phase.tolist()),
         drift=tuple(_drift(reference, aim).tolist()),
-        degrees=degrees(views.amplitude, paths),
+        degrees=tuple(shares if wide > 0.0 else (1.0,) for wide in probes.size.tolist()),
         turn=turn,
         decay=NEPER * (loss * aim.steepest + farther * aim.fading),
         modes=sizes,
@@ -187,7 +186,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
 def _drift(front: Wavefronts, aim: TileSettings) -> Floats:
     """Half range (xyz, rad) of the phase that is left over a face, along each axis of the box, the largest of fronts:
     du_j/dq_i is -(e_i - u_i u)_j k/n; and of what absorption varies by (Np). inf about the source."""
-    _, _, size = _probes(aim.elements, False)
+    size = _probes(aim.elements, False).size
     k = front.curvature
     nearest = 1.0 - k * float(np.linalg.norm(np.abs(aim.elements.position).max(axis=0)))
     if not nearest.min() > 0.2:
