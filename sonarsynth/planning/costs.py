@@ -143,9 +143,8 @@ def _chorus_paths(plan: Plan) -> float:
     chorus, reach = plan.scene.world.chorus, plan.chorus
     if chorus is None or reach is None:
         return 0.0
-    snaps = np.pi * np.diff(reach.edges**2) / reach.stands_for
     record = plan.sizes["sample"] / plan.scene.sonar.sampling_frequency
-    return float(chorus.rate * record * snaps.sum() * (1 + reach.images))
+    return float(chorus.rate * record * np.pi * reach.reach**2 * (1 + reach.images))
 
 
 def _traced(plan: Plan) -> str:

@@ -170,7 +170,7 @@ def test_windows_that_overlap_hear_the_same_snaps(clusters: Clusters | None) -> 
         both = [(n, index[row]) for n, row in enumerate(map(tuple, part.key.tolist())) if row in index]
         assert len(both) > 20 and (against is other or len(both) == len(part.key))
         a, b = (one.select(np.array(n)) for one, n in zip((part, against), zip(*both, strict=True), strict=True))
-        for name in ("position", "time", "level", "width", "sign", "thinning"):
+        for name in ("position", "time", "level", "width", "sign"):
             assert (getattr(a, name) == getattr(b, name)).all(), name
 
 

@@ -1,4 +1,4 @@
-"""How far, and by how many images, a chorus is heard one snap at a time, and where few snaps may stand for many."""
+"""How far, and by how many images, a chorus is heard one snap at a time."""
 
 from __future__ import annotations
 
@@ -38,11 +38,9 @@ HORIZON = 3e4
 """m: beyond, nothing is heard."""
 NEAREST = 1.0
 """m: the innermost ring, from the height of the array on outwards."""
-GAUSSIAN = 0.1
-"""Excess kurtosis that snaps which stand for many may add, all together: Gaussian noise has none."""
-LEFT = 1e4
-"""1/s: snaps of a ring where one stands for many are as many at least: ten come in each ms, also where no near one
-is heard, of which most of the kurtosis is."""
+GAUSSIAN, CROWDED = 0.1, 3e4
+"""Excess kurtosis that snaps beyond an automatic reach may have, all together, to be Gaussian noise though they bring
+more; and how many of them a second (1/s) come from each ring at least: thirty in each ms."""
 BINS = 64
 """Frequencies of the band that moments are taken at."""
 
@@ -59,8 +57,7 @@ class ChorusWater(NamedTuple):
 def chorus_reach(scene: Scene, profile: Profile, position: Floats, absorption: Floats) -> ChorusReach | None:
     """What a scene's chorus needs, for an array at a position (xyz) in m; none without a chorus, or with no snaps.
 
-    absorption: (bin,) dB/m at `band_frequencies`. One snap stands for many in rings far off, of a factor of two in
-    distance each, where all of these together keep within `GAUSSIAN`; these all have the mean energy.
+    absorption: (bin,) dB/m at `band_frequencies`.
     """
     chorus = scene.world.chorus
     if chorus is None or chorus.rate == 0.0:
@@ -116,15 +113,11 @@ def _reach(chorus: Chorus, water: ChorusWater, absorption: tuple[float, ...]) ->
     square = np.array([m.square for m in rings])
     outside = np.append(np.cumsum(square[::-1])[::-1], 0.0) / square.sum()
     if chorus.reach == "auto":
-        reach = float(min(edges[int(np.argmax(outside <= BEYOND))], FARTHEST))
+        reach = min(float(edges[int(np.argmax(outside <= BEYOND))]), FARTHEST, _crowded(chorus, edges, rings))
     else:
         reach = chorus.reach
     inner = np.append(edges[edges < reach], reach)
     rings = moments(bounces, inner)
-    square, fourth = np.array([m.square for m in rings]), np.array([m.fourth for m in rings])
-    ring_kurtosis = np.array([excess_kurtosis(chorus.rate, chorus.deviation, square.sum(), x) for x in fourth])
-    spread = float(level_moment(0.0, chorus.deviation, 4) / level_moment(0.0, chorus.deviation, 2) ** 2)
-    stands_for = _thinning(ring_kurtosis, np.pi * np.diff(inner**2), spread, LEFT / chorus.rate)
     spectrum = power_spectrum(
         chorus.rate,
         level_moment(chorus.level, chorus.deviation, 2),
@@ -137,10 +130,7 @@ def _reach(chorus: Chorus, water: ChorusWater, absorption: tuple[float, ...]) ->
         reach=reach,
         images=bounces,
         edges=inner,
-        stands_for=stands_for,
-        mean_level=10.0 * np.log10(level_moment(chorus.level, chorus.deviation, 2)) + 120.0,
-        kurtosis=float(ring_kurtosis.sum()),
-        thinned=float(ring_kurtosis @ np.where(stands_for > 1.0, stands_for / spread - 1.0, 0.0)),
+        kurtosis=float(_kurtosis(chorus, rings).sum()),
         beyond=float(10.0 * np.log10(max(more, 1e-12))),
         level=float(10.0 * np.log10(mean) + 120.0),
     )
@@ -150,17 +140,16 @@ _ORDERS = (0, 1, 2, 4, 6, 8, 12, 16, 20, 24, 32, 40, 48, MOST_IMAGES)
 """Numbers of reflections to choose from."""
 
 
-def _thinning(kurtosis: Floats, area: Floats, spread: float, least: float) -> Floats:
-    """How many snaps one stands for (ring,): the fewest snaps in all whose added kurtosis keeps within `GAUSSIAN`.
+def _kurtosis(chorus: Chorus, rings: list[RingMoments]) -> Floats:
+    """Excess kurtosis (ring,) that each ring brings, of all of them together."""
+    square = sum(m.square for m in rings)
+    return np.array([excess_kurtosis(chorus.rate, chorus.deviation, square, m.fourth) for m in rings])
 
-    kurtosis (ring,) is what each ring brings as it is: `spread` times less where all are equally loud, n times more
-    where one stands for n. area (ring,) m2: the sum of area/n is least, for a given sum of kurtosis n, where n goes as
-    sqrt(area/kurtosis). area/n is no less than `least` (m2).
-    """
-    best = np.sqrt(area / np.maximum(kurtosis, 1e-300))
-    scale = np.geomspace(1e-3, 1e6, 400) / best.max()
-    many = np.maximum(np.floor(np.minimum(np.multiply.outer(scale, best), area / least)), 1.0)
-    added = np.where(many > 1.0, np.maximum(many / spread - 1.0, 0.0), 0.0) @ kurtosis
-    alike = np.where(many > 1.0, kurtosis, 0.0).sum(axis=1)  # levels of these have no law of their own
-    within = np.flatnonzero((added <= GAUSSIAN) & (alike <= GAUSSIAN))
-    return np.asarray(many[within[-1]] if within.size else np.ones(len(area)))
+
+def _crowded(chorus: Chorus, edges: Floats, rings: list[RingMoments]) -> float:
+    """Distance (m) from which on snaps are so many that they are as well Gaussian noise."""
+    if not chorus.distant:
+        return np.inf
+    beyond = np.cumsum(_kurtosis(chorus, rings)[::-1])[::-1]
+    crowded = (beyond <= GAUSSIAN) & (chorus.rate * np.pi * np.diff(edges**2) >= CROWDED)
+    return float(edges[:-1][crowded][0]) if crowded.any() else np.inf

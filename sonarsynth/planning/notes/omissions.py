@@ -120,12 +120,6 @@ def _chorus_left_out(plan: Plan) -> list[Omission]:
     ]
     faint = f"paths of the chorus under {reach.level - FAINT:.0f} dB re 1 uPa"
     rows.append(Omission(faint, "faint", f"each {-FAINT:g} dB re the rms pressure of all of it"))
-    many = np.flatnonzero(reach.stands_for > 1.0)
-    if many.size:
-        snaps = f"most snaps beyond {reach.edges[many[0]]:.4g} m"
-        count = int(reach.stands_for.max())
-        bound = f"excess kurtosis {reach.thinned:+.2g}, of {reach.kurtosis:.3g}; no power"
-        rows.append(Omission(snaps, f"one stands for up to {count} far off, where the sum is Gaussian", bound))
     return rows
 
 

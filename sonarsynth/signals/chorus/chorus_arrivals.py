@@ -23,15 +23,12 @@ FAINT = 40.0
 
 
 class ChorusReach(NamedTuple):
-    """How far, and by how many images, snaps are heard one by one; and where few stand for many."""
+    """How far, and by how many images, snaps are heard one by one."""
 
     reach: float  # m, horizontally
     images: int  # reflections, in all
     edges: Floats  # (ring + 1,) m
-    stands_for: Floats  # (ring,) snaps that one stands for, with their energy: 1 of those near
-    mean_level: float  # dB re 1 uPa at 1 m: of the mean energy of snaps
     kurtosis: float  # excess kurtosis of the chorus
-    thinned: float  # what this gains from one snap standing for many
     beyond: float  # dB: power of what is beyond the reach, re all of it
     level: float  # dB re 1 uPa: of the whole chorus in the band
 
@@ -154,15 +151,9 @@ def chorus_arrivals(
     the phase of its reflections is lost (2 pi f sigma > 1 in the middle of the band) keeps its energy, with a random
     sign. Paths that are `FAINT` are left out.
     """
-    distance = np.hypot(*(snaps.position - receiver.pose.position[:2]).T)
-    ring = np.clip(np.searchsorted(reach.edges, distance), 1, None) - 1
-    stands_for = reach.stands_for[np.minimum(ring, len(reach.stands_for) - 1)]
-    chosen = np.flatnonzero(snaps.thinning * stands_for < 1.0)
-    snaps, louder = snaps.select(chosen), np.sqrt(stands_for[chosen])
-    levels = np.where(louder > 1.0, reach.mean_level, snaps.level)
     heights = image_heights(medium.profile, medium.depth, float(depth(receiver.pose.position)), reach.images)
     emitted, at = (snaps.time - time)[:, None], receiver.pose.position[:2]
-    level = np.broadcast_to((snaps.position - at)[:, None], (len(chosen), len(heights.climb), 2))
+    level = np.broadcast_to((snaps.position - at)[:, None], (len(snaps.time), len(heights.climb), 2))
     velocity = np.zeros(2) if receiver.track is None else receiver.track.velocity[:2]
     delay = emitted + np.hypot(np.hypot(level[..., 0], level[..., 1]), heights.climb) * heights.slowness
     if velocity.any():
@@ -186,10 +177,10 @@ def chorus_arrivals(
         delay=delay,
         direction=receiver.turn_to_array(towards, delay),
         length=length,
-        gain=np.where(lost, sign, 1.0) * louder[snap] * bounced.modulus / np.maximum(length, CAVITY),
+        gain=np.where(lost, sign, 1.0) * bounced.modulus / np.maximum(length, CAVITY),
         phase=np.where(lost, 0.0, bounced.phase),
         delay_std=np.where(lost, 0.0, bounced.delay_std),
-        level=levels[snap],
+        level=snaps.level[snap],
         width=snaps.width[snap],
         snap=number,
         boundaries=own.surface + own.bottom,

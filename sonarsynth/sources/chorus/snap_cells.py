@@ -33,7 +33,6 @@ class Draw(IntEnum):
     LEVEL = 4
     WIDTH = 5
     SIGN = 6
-    THINNING = 7
     CLUSTER_COUNT = 8
     CLUSTER_RADIUS = 9
     CLUSTER_ANGLE = 10
@@ -61,7 +60,6 @@ class ChorusSnaps(Columns):
     level       (snap,)      dB   peak source level re 1 uPa at 1 m
     width       (snap,)      -    number of the width, of `Chorus.widths`
     sign        (snap,)      -    evenly in 0 to 1: what random signs of its reflections are drawn from
-    thinning    (snap,)      -    evenly in 0 to 1: whether it is one of those that stand for many
     key         (snap, 5)    -    cell along x, y and time, number in the cell, number in the cluster
     """
 
@@ -70,7 +68,6 @@ class ChorusSnaps(Columns):
     level: Floats
     width: Ints
     sign: Floats
-    thinning: Floats
     key: Ints
 
 
@@ -109,7 +106,6 @@ def draw_snaps(chorus: Chorus, seed: int, listening: ListeningWindow) -> ChorusS
         level=chorus.level + chorus.deviation * _normal(drawn(Draw.LEVEL)),
         width=np.floor(WIDTHS * drawn(Draw.WIDTH)).astype(np.int64),
         sign=drawn(Draw.SIGN),
-        thinning=drawn(Draw.THINNING),
         key=key,
     )
 
