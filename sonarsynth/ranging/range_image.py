@@ -44,15 +44,21 @@ def range_image(received: ReceivedWindow, ranges: Floats, track: Track | None = 
 
 
 @compiled
-def _place(r: float, beam: Any, source: Any, drift: Any, speed: float) -> float:
-    """When (s) an echo from a range in the direction of a beam is heard, after the direct pulse."""
-    away, late = np.sqrt(source[0] ** 2 + source[1] ** 2 + source[2] ** 2), 0.0
-    for _ in range(3):  # the sonar makes way at a hundredth of the speed of sound, or less
-        square = 0.0
-        for x in range(3):
-            square += (r * beam[x] - source[x] - late * drift[x]) ** 2
-        late = (r + np.sqrt(square) - away) / speed
-    return late
+def _edges(
+    ranges: Any, beam: Any, source: Any, drift: Any, speed: float, first: float, step: float, edges: Any
+) -> None:
+    """When echoes from ranges (range,) in the direction of a beam are heard, into edges (range,): in steps after the
+    first delay."""
+    x, y, z = source
+    away = np.sqrt(x * x + y * y + z * z)
+    for k in range(len(ranges)):
+        r, late = ranges[k], 0.0
+        for _ in range(3):  # the sonar makes way at a hundredth of the speed of sound, or less
+            a = r * beam[0] - x - late * drift[0]
+            b = r * beam[1] - y - late * drift[1]
+            c = r * beam[2] - z - late * drift[2]
+            late = (r + np.sqrt(a * a + b * b + c * c) - away) / speed
+        edges[k] = (late - first) / step
 
 
 @compiled
@@ -62,11 +68,12 @@ def _largest(
     """Raise cells (range, azimuth) to the powers (azimuth, delay) of beams (azimuth, xyz): in the middle of a cell, by
     lines between delays, and at all delays in it."""
     half = 0.5 * (ranges[1] - ranges[0]) if len(ranges) > 1 else 0.0
-    last = power.shape[1] - 1
+    last, edges = power.shape[1] - 1, np.empty(len(ranges) + 1)
+    bounds = np.append(ranges - half, ranges[-1] + half)
     for a in range(len(beams)):
-        end = (_place(ranges[0] - half, beams[a], source, drift, speed) - first) / step
+        _edges(bounds, beams[a], source, drift, speed, first, step, edges)
         for k in range(len(ranges)):
-            begin, end = end, (_place(ranges[k] + half, beams[a], source, drift, speed) - first) / step
+            begin, end = edges[k], edges[k + 1]
             middle = 0.5 * (begin + end)
             n = int(np.floor(middle))
             if n < 0 or n + 1 > last:

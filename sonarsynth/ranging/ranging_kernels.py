@@ -158,7 +158,7 @@ def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int
 
 @compiled(fastmath=True, forceinline=True)
 def _mean_square(values: Any, share: Any) -> Any:
-    total = 0.0
+    total = np.float32(0.0)
     for k in range(len(values)):
         total += share[k] * values[k] * values[k]
     return total
@@ -168,10 +168,11 @@ def _mean_square(values: Any, share: Any) -> Any:
 def match(beams: Any, across: Any, up: Any, first: float, spacing: float, share: Any, matched: Any, out: Any) -> None:
     """Write beams (beam, bin) times `face_responses`, over their root mean square by share (bin,), and times matched
     (bin,), into out (beam, bin)."""
-    face, turns = np.empty(beams.shape[1]), np.empty((4, TURNS))
+    face, turns = np.empty(beams.shape[1], np.float32), np.empty((4, TURNS))
+    share, matched = share.astype(np.float32), matched.astype(np.complex64)
     for b in range(beams.shape[0]):
         _face_response(across[b], up[b], first, spacing, turns, face)
-        scale = 1.0 / np.sqrt(_mean_square(face, share))
+        scale = np.float32(1.0 / np.sqrt(_mean_square(face, share)))
         for k in range(beams.shape[1]):
             out[b, k] = beams[b, k] * (face[k] * scale * matched[k])
 
@@ -257,7 +258,11 @@ def loudest_near(
         for i in range(max(row[b] - up, 0), min(row[b] + up + 1, rows)):
             for j in range(max(column[b] - across, 0), min(column[b] + across + 1, columns)):
                 neighbour = index[i, j]
-                if neighbour >= 0 and np.sum((beam[b] - beam[neighbour]) ** 2) <= reach * reach:
+                if neighbour < 0:
+                    continue
+                x, y = beam[b, 0] - beam[neighbour, 0], beam[b, 1] - beam[neighbour, 1]
+                z = beam[b, 2] - beam[neighbour, 2]
+                if x * x + y * y + z * z <= reach * reach:
                     for t in range(low, high):
                         loudest[b] = max(loudest[b], power[neighbour, t])
     return loudest

@@ -15,6 +15,7 @@ from sonarsynth.equations.noise.ambient_noise import power_density
 from sonarsynth.equations.noise.filters import duration
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
+from sonarsynth.randomness import normal_waves
 from sonarsynth.receiver import Converter, Electronics, Elements, Filter, Sonar
 from sonarsynth.signals.filtered_pulse import filter_response, fir
 from sonarsynth.signals.segments import fast_length
@@ -23,6 +24,8 @@ QUIETEST = 1e-7
 """Bins of less noise power than this, relative to the loudest, are left empty."""
 
 
+AT_ONCE = 8
+"""Hydrophones whose own noise is drawn at once: numbers stay in the cache."""
 MATRIX_ELEMENTS = 1 << 22
 """Of cross spectral densities that are made at once."""
 
@@ -82,8 +85,9 @@ def add_noise(
         position = elements.position if pose is None else pose.to_world(elements.position)
         _draw_correlated(spectrum[:, low:high], noise, frequency, gain, position, fast)
     else:
-        drawn = fast.standard_normal((sensors, 2 * (high - low)), dtype=np.float32).view(np.complex64)
-        np.multiply(drawn, size, out=spectrum[:, low:high])
+        for first in range(0, sensors, AT_ONCE):
+            some = spectrum[first : first + AT_ONCE, low:high]
+            some[...] = normal_waves(np.broadcast_to(size**2, some.shape), fast)
     if not np.all(elements.gain == 1.0):
         spectrum *= elements.gain[:, None].astype(np.float32)
     return replace(signals, pressure=signals.pressure + irfft(spectrum, length, axis=1, overwrite_x=True)[:, :samples])

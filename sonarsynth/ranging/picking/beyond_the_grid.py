@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from sonarsynth.conventions import Floats, Ints, azimuth_elevation
-from sonarsynth.ranging.picking.peak_kernels import farthest
+from sonarsynth.ranging.picking.peak_kernels import farthest, loudest_lines
 from sonarsynth.ranging.range_profiles import BEAMS_AT_ONCE, Profiles
 from sonarsynth.ranging.received_window import ReceivedWindow
 
@@ -63,12 +62,8 @@ def louder_beyond(
 def _lines(profiles: Profiles, f: Floats, b: Ints, t: Ints, steps: int) -> tuple[Floats, Floats]:
     """Frequencies (peak,) at which the spectra of peaks are largest, about their delays, and the power that the part of
     the spectrum about it that is f/steps wide, or `LINE`, would bring a peak by itself."""
-    turn = np.exp(2j * np.pi * profiles.step * t[:, None] * (f - f[0]))
-    spectrum = profiles.spectra[b] * turn
     spacing = f[1] - f[0] if len(f) > 1 else LINE
     width = max(int(LINE / spacing), 1)
-    smooth = [uniform_filter1d(part, width, axis=1, mode="constant") for part in (spectrum.real, spectrum.imag)]
-    power = smooth[0] ** 2 + smooth[1] ** 2
-    line = f[power.argmax(axis=1)]
-    bins = np.minimum(np.maximum(width, line / (steps * spacing)), len(f))
-    return line, power.max(axis=1) * (bins / profiles.filter.length) ** 2
+    line, power = loudest_lines(profiles.spectra, b, profiles.step * spacing * t, width)
+    bins = np.minimum(np.maximum(width, f[line] / (steps * spacing)), len(f))
+    return f[line], power * (bins / profiles.filter.length) ** 2

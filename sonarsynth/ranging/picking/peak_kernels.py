@@ -126,13 +126,14 @@ def farthest(position: Any) -> Any:
 
 
 @compiled(fastmath=True, forceinline=True)
-def _lobe(x: float, y: float, z: float, at: float, across: Any, weight: Any, real: Any, imaginary: Any) -> Any:
-    """Modulus of the sum over sensors of what a table (delay,) has at `at` and what positions (xyz, sensor) add."""
-    a = b = 0.0
+def _lobe(x: Any, y: Any, z: Any, at: Any, across: Any, weight: Any, real: Any, imaginary: Any) -> Any:
+    """Modulus of the sum over sensors of what a table (delay,) has at `at` and what positions (xyz, sensor) add, all
+    float32."""
+    a = b = np.float32(0.0)
     for q in range(weight.size):
         delay = across[0, q] * x + across[1, q] * y + across[2, q] * z + at
         n = np.int32(delay)
-        fraction = delay - n
+        fraction = delay - np.float32(n)
         a += weight[q] * (real[n] + fraction * (real[n + 1] - real[n]))
         b += weight[q] * (imaginary[n] + fraction * (imaginary[n + 1] - imaginary[n]))
     return np.sqrt(a * a + b * b)
@@ -153,19 +154,19 @@ def over_lobes(
     peaks = len(power)
     own, reach = np.zeros(peaks, np.bool_), farthest(position)
     lasting = 2.0 / (frequency[-1] - frequency[0])
-    across = np.ascontiguousarray(position.T)
-    real, imaginary = np.ascontiguousarray(table[0]), np.ascontiguousarray(table[1])
+    across, sensor_weight = np.ascontiguousarray(position.T).astype(np.float32), weight.astype(np.float32)
+    real, imaginary = table[0].astype(np.float32), table[1].astype(np.float32)
     middle = 0.5 * (table.shape[1] - 1)
     for i in range(peaks):
         low = high = 0.0
         for j in range(i if least[i] < np.inf else 0):
-            apart = direction[i] - direction[j]
-            far = np.sqrt(np.sum(apart**2))
-            late = delay[i] - delay[j]
+            x, y = direction[i, 0] - direction[j, 0], direction[i, 1] - direction[j, 1]
+            z, late = direction[i, 2] - direction[j, 2], delay[i] - delay[j]
+            far = np.sqrt(x * x + y * y + z * z)
             if far <= near or abs(late) > reach * far + lasting:
                 continue
-            x, y, z = apart[0] * rate, apart[1] * rate, apart[2] * rate
-            size = _lobe(x, y, z, late * rate + middle, across, weight, real, imaginary)
+            x, y, z = np.float32(x * rate), np.float32(y * rate), np.float32(z * rate)
+            size = _lobe(x, y, z, np.float32(late * rate + middle), across, sensor_weight, real, imaginary)
             low += power[j] * max(size - error, 0.0) ** 2
             high += power[j] * (size + error) ** 2
             if low >= least[i]:
@@ -175,6 +176,42 @@ def over_lobes(
                 i, direction, delay, power, position, weight, frequency, taper, near
             )
     return own
+
+
+@compiled
+def loudest_lines(spectra: Any, b: Any, turn: Any, width: int) -> Any:
+    """Bins (peak,) about which the means over `width` bins of spectra (beam, bin) are largest, and these, squared.
+
+    b (peak,): the beam of each; turn (peak,): turns that its spectrum is turned by from bin to bin, to its own delay.
+    Beyond the ends there is nothing.
+    """
+    bins, line, power = spectra.shape[1], np.zeros(len(b), np.int64), np.full(len(b), -1.0)
+    turned, before = np.zeros(bins + width, np.complex128), width // 2
+    for p in range(len(b)):
+        phasor, step, total = 1.0 + 0j, np.exp(2j * np.pi * turn[p]), 0j
+        for k in range(bins + width - 1 - before):
+            if k < bins:
+                turned[k] = spectra[b[p], k] * phasor
+                phasor *= step
+            total += turned[k]
+            if k >= width:
+                total -= turned[k - width]
+            loud = total.real**2 + total.imag**2
+            centre = k + 1 - width + before  # of the bins that are summed
+            if centre >= 0 and loud > power[p]:
+                line[p], power[p] = centre, loud
+    return line, power / width**2
+
+
+@compiled(fastmath=True, forceinline=True)
+def _faded(power: Any, first: int, last: int, least: Any, fade: Any, late: Any) -> Any:
+    """Sums of `fade` times power (delay,) from first to last where it is `least` or more, and of that times `late`."""
+    faded = later = np.float32(0.0)
+    for s in range(first, last):
+        loud = fade[s] * (power[s] if power[s] >= least else np.float32(0.0))
+        faded += loud
+        later += loud * late[s]
+    return faded, later
 
 
 @compiled
@@ -190,7 +227,7 @@ def power_centres(
     rows, columns = index.shape
     centre = np.zeros((len(b), 3))
     reach = [int(min(np.ceil(2.0 * about / max(width[x], 1e-9)), power.size)) for x in range(3)]
-    late, fade = np.empty(power.shape[1]), np.empty(power.shape[1])
+    late, fade = np.empty(power.shape[1], np.float32), np.empty(power.shape[1], np.float32)
     for p in range(len(b)):
         i0, j0, total = row[b[p]], column[b[p]], 0.0
         first, last = max(t[p] - reach[2], 0), min(t[p] + reach[2] + 1, power.shape[1])
@@ -204,11 +241,7 @@ def power_centres(
                 beam = index[i, j]
                 if beam < 0:
                     continue
-                faded, later = 0.0, 0.0
-                for s in range(first, last):
-                    if power[beam, s] >= least[beam]:
-                        faded += fade[s] * power[beam, s]
-                        later += fade[s] * power[beam, s] * late[s]
+                faded, later = _faded(power[beam], first, last, np.float32(least[beam]), fade, late)
                 aside = np.exp(-0.5 * (up**2 + right**2) / about**2)
                 total += aside * faded
                 centre[p, 0] += aside * faded * up

@@ -13,6 +13,7 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.environment.noise.directions import NoiseDirections
 from sonarsynth.equations.noise.lattice_coherence import lag_covariance, periodic_powers
 from sonarsynth.equations.noise.wave_directions import quadrature
+from sonarsynth.randomness import normal_waves
 from sonarsynth.receiver import Elements
 
 TORUS = (1.0, 1.15, 1.4)
@@ -26,7 +27,6 @@ POWERS = 1 << 28
 """Largest number of powers that are kept."""
 BLOCK = 1 << 16
 """Waves that are drawn at once."""
-HALF, UNIT, TURN = np.float32(0.5), np.float32(2.0**-32), np.float32(2.0 * np.pi)
 Complexes64 = npt.NDArray[np.complex64]
 
 
@@ -154,7 +154,7 @@ def draw(field: PeriodicField, elements: Elements, frequency: Floats, random: np
         bins = slice(first, first + many)
         below = powers[low[bins]]
         power = below + fraction[bins] * (powers[low[bins] + 1] - below)
-        near = along_y @ (_normal_waves(power, random).reshape(-1, power.shape[2]) @ along_z.T).reshape(
+        near = along_y @ (normal_waves(power, random).reshape(-1, power.shape[2]) @ along_z.T).reshape(
             power.shape[:2] + along_z.shape[:1]
         )
         out[:, bins] = near[:, y, z].T
@@ -165,18 +165,3 @@ def _fourier(waves: int, places: Ints) -> Complexes64:
     """Matrix (place, wave) of the sum of waves, of unit columns over all places that an FFT would make."""
     turns = np.outer(np.arange(places.max() + 1), np.arange(waves)) % waves
     return np.exp(2j * np.pi / waves * turns).astype(np.complex64) / np.float32(np.sqrt(waves))
-
-
-def _normal_waves(power: npt.NDArray[np.float32], random: np.random.Generator) -> Complexes64:
-    """Complex normal numbers (...) whose real and imaginary part have these powers (...) each.
-
-    On whole arrays: in a third of the generator's time. Source: Box and Muller (1958), Ann. Math. Statist. 29, 610.
-    """
-    even = random.integers(0, 1 << 64, power.shape, np.uint64)
-    radius, turn = (half.astype(np.uint32).astype(np.float32) for half in (even >> np.uint64(32), even))
-    size = np.sqrt(np.float32(-2.0) * power * np.log((radius + HALF) * UNIT))
-    turn *= TURN * UNIT
-    wave = np.empty(power.shape, np.complex64)
-    np.multiply(size, np.cos(turn), out=wave.real)
-    np.multiply(size, np.sin(turn), out=wave.imag)
-    return wave
