@@ -47,30 +47,41 @@ def test_a_time_errs_by_what_the_reflection_below_it_turns(bed: str, distance: f
     assert np.abs(late).max() > 2e-7 * (7.0 / distance) ** 2
 
 
-@pytest.mark.parametrize(("boundary", "strength"), [("surface", -1.0), ("bottom", 0.9), ("bottom", 0.3)])
-def test_a_snap_beside_its_image_errs_by_what_is_predicted(boundary: str, strength: float) -> None:
-    """Pulses that overlap come from the boundary, or from between it and the snap: up to a degree off, and late by what
-    the image is where that is taken for the snap. Lags do not show it: by them it is thousands of standard errors."""
-    random, held, told = np.random.default_rng(3), [], []
-    depth, described = 14.0, Sonar(array=ARRAY, assumed_sound_speed=C, sound_speed_error=0.0)
-    for beside in np.linspace(0.03, 0.6, 20):
-        height = depth / 2 if boundary == "surface" else -depth / 2
-        away = random.uniform(6.0, 20.0)
-        source = np.array([away, random.uniform(-2.0, 2.0), height - np.sign(height) * beside])
-        places = np.stack([source, source * [1.0, 1.0, (height + np.sign(height) * beside) / source[2]]])
+@pytest.mark.parametrize(("earliest", "latest"), [(0.0, 33e-6), (33e-6, 160e-6), (160e-6, 640e-6)])
+def test_a_snap_beside_its_image_errs_by_what_is_predicted(earliest: float, latest: float) -> None:
+    """Images that overlap the pulse, that only the window of its lags holds, and later ones: from micrometres and
+    nanoseconds off to a degree and all that the image is late. Lags do not show it: by them it is thousands of errors.
+    """
+    random, rows = np.random.default_rng(3), []
+    described = Sonar(array=ARRAY, assumed_sound_speed=C, sound_speed_error=0.0)
+    for _ in range(60):
+        depth, place = random.uniform(6.0, 30.0), random.uniform(0.2, 0.8)
+        strength = random.choice([-1.0, 0.9, 0.6, 0.3])  # of the surface, and of bottoms
+        height = depth * (place if strength < 0 else place - 1.0)
+        away, late = random.uniform(5.0, 25.0), random.uniform(earliest, latest)
+        beside = min(0.5 * C * late * float(np.hypot(away, height)) / abs(height), 0.5 * abs(height))
+        source = np.array([away, away * random.uniform(-0.3, 0.3), height - np.sign(height) * beside])
+        image = source + [0.0, 0.0, 2.0 * np.sign(height) * beside]
         distance = float(np.linalg.norm(source))
-        start = round((distance / C - 2e-3) * RATE) / RATE
-        heard = hear(
-            silence(elements(ARRAY), start, 1024), elements(ARRAY), places, np.zeros(2), np.array([1, strength])
+        heard = silence(elements(ARRAY), round((distance / C - 2e-3) * RATE) / RATE, 2048)
+        for at, amplitude in ((source, 1.0), (image, strength)):
+            heard = hear(heard, elements(ARRAY), at[None], np.zeros(1), np.array([amplitude]))
+        heard = add_noise(heard, 10 ** random.uniform(-3.0, -1.5) / distance, random)
+        receiver = Receiver(
+            Pose(np.array([0.0, 0.0, -depth * place]), quaternion(np.pi / 2)), elements(ARRAY), described
         )
-        heard = add_noise(heard, 1e-2 / distance, random)
-        receiver = Receiver(Pose(np.array([0.0, 0.0, -depth / 2]), quaternion(np.pi / 2)), elements(ARRAY), described)
-        for reflected, pulls in ((True, held), (False, told)):
+        for reflected in (True, False):
             method = SensorDelays(on_bottom=False, reflected=reflected)
             found = method.locate(heard, receiver, Survey(depth, WATER), 1)
-            error, late = found.position[0] - source, found.time[0] - distance / C - envelope_late()
-            off = error @ np.linalg.solve(found.position_covariance[0], error)
-            pulls.append((np.sqrt(off), abs(late) / found.time_error[0]))
-    assert np.isfinite(held).all(axis=1).sum() > 8
-    assert np.nanmax(held) < 3.0 and np.nanmax(told) > 50.0
-    assert np.nanmedian(np.array(held)[:, 0]) > 0.1
+            slow = found.time[0] - distance / C - envelope_late()
+            lift = found.elevation[0] - np.arcsin(source[2] / distance)
+            error = found.position[0] - source
+            off = np.sqrt(error @ np.linalg.solve(found.position_covariance[0], error) / 3.0)
+            rows.append((reflected, slow / found.time_error[0], lift / found.elevation_error[0], off))
+    pulls = np.abs(np.array(rows))
+    held, told = (pulls[pulls[:, 0] == reflected][:, 1:] for reflected in (1, 0))
+    held = held[np.isfinite(held).all(axis=1)]
+    assert len(held) > 30 and (held > 4.0).sum() <= 1
+    rms = np.sqrt(np.mean(held**2, axis=0))
+    assert (rms > 0.3).all() and (rms < 2.0).all()
+    assert np.nanmax(told) > 10.0

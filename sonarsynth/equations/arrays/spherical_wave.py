@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Complexes, Floats
 
 RANK_TOLERANCE = 1e-6
 """Singular values of the sensor positions below this share of the largest count as zero."""
@@ -185,3 +185,19 @@ def envelope_peak(
         return nothing
     power = np.broadcast_to(np.asarray(noise, float), f.shape)
     return time, float(np.sqrt(0.5 * np.sum(((omega - carrier) * taper) ** 2 * power)) / abs(curve))
+
+
+def envelope_spread(frequency: Floats, spectrum: Complexes, low: float, high: float) -> float:
+    """How far (s) the envelope of a pulse reaches from where it is largest, root mean square by its sixth power.
+
+    Of two pulses as loud that is 0.7 of what is between them; of a pulse and its image of strength s somewhat less than
+    s^2 of that, which moves the mean of their powers. frequency (bin,) Hz, spectrum (bin,), band as `envelope_peak`;
+    NaN of fewer than three.
+    """
+    if len(frequency) < 3:
+        return float("nan")
+    taper = np.sin(np.pi * np.clip((frequency - low) / (high - low), 0.0, 1.0)) ** 2
+    envelope = np.abs(np.fft.ifft(taper * spectrum, 8 * len(frequency)))
+    since = np.fft.fftfreq(len(envelope)) / (frequency[1] - frequency[0])
+    weight = (envelope / max(float(envelope.max()), 1e-300)) ** 6
+    return float(np.sqrt(weight @ (since - since[envelope.argmax()]) ** 2 / max(float(weight.sum()), 1e-300)))

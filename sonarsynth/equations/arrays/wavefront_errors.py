@@ -8,10 +8,6 @@ from sonarsynth.conventions import Floats
 
 WITHIN = 3.0
 """Standard errors within which a source may be next to a boundary."""
-TAILS = 4.0
-"""Paths of an image, in those that are heard apart, up to which its pulse and that of the source touch."""
-LEAKS = 0.05
-"""What that moves the source by, of what an image does that is heard as one with it: 0.002 to 0.1 were seen."""
 
 
 def bending_covariance(
@@ -33,28 +29,30 @@ def bending_covariance(
 
 
 def image_covariance(
-    by_angle: Floats, slope: float, curvature: float, covariance: Floats, height: float, path: float,
-    deepest: float, sound_speed: float,
+    by_angle: Floats, slope: float, curvature: float, covariance: Floats, height: float, sound_speed: float, *,
+    window: float, spread: tuple[float, float], deepest: float,
 ) -> Floats:  # fmt: skip
     """Covariance (4, 4) of a wavefront's parameters where a source may be next to a boundary that mirrors it.
 
-    The pulse of its image follows by a path that is longer by 2 d |sin a|, d the distance from the boundary and a the
-    grazing angle. Up to `path` (m) the two are heard as one, from between them: from a point of the boundary if they
-    are alike, whatever d is. So a source that seems to be within path/(2 |sin a|) may be anywhere there; a little
-    farther from it (`TAILS`), what is left of its image in the window of its pulse moves it by a part (`LEAKS`).
+    The pulse of its image is later by t = 2 d |sin a|/c, d the distance from the boundary, a the grazing angle. Where t
+    is within `window` (s, half of that in which lags are measured) they are heard as one, from between them by their
+    powers: off by what the spread (s) of both together says, times c/|sin a|. Of later ones what is left in the window
+    moves lags by (window/t)^4 of that. The time moves by the spread, where pulses overlap and where either may be taken
+    for the pulse; of what is heard apart, by (2 spread/t)^2 of that. Errors of 2 000 places 0.02 to 3 m from surface or
+    bottom are 0.3 to 1.1 of it, root mean square, whatever t; under 1 % are over 4.
 
     slope is the sine of the elevation of the wavefront, by_angle (2,) its derivatives along the tangents, curvature
     that of the wave (1/m), covariance (4, 4) what they err by besides; height (m): of the boundary over the array,
-    negative below it; deepest (m): most that a source may be from the boundary; sound_speed: m/s.
+    negative below it; spread: `spherical_wave.envelope_spread` of the pulse as lags, and as the time, are measured by;
+    deepest (m): most that a source may be from the boundary; sound_speed: m/s.
     """
     if not slope * height > 0:
         return np.zeros((4, 4))
-    near, within = slope / height, min(0.5 * path / abs(slope), deepest)
-    row = np.array([*by_angle, -height])
+    near, row = slope / height, np.array([*by_angle, -height])
     error = WITHIN * float(np.sqrt(row @ covariance[:3, :3] @ row))
-    beside = (abs(curvature * height - slope) - error) / (within * near)
-    moved = within / np.sqrt(3.0) * (1.0 if beside <= 1.0 else LEAKS * (beside <= TAILS))  # evenly over all distances
+    later = max(2.0 * (abs(curvature * height - slope) - error) * abs(height) / sound_speed, 1e-300)
+    moved = min(spread[0] * sound_speed / abs(slope) * min(window / later, 1.0) ** 4, deepest)
     column = moved * np.array([*by_angle * near, -slope * near**2, 0.0])
     covariance = np.outer(column, column)
-    covariance[3, 3] = (path / sound_speed) ** 2 / 12.0 * (beside <= 1.0)  # either may be taken for the pulse
+    covariance[3, 3] = (spread[1] * min(2.0 * spread[1] / later, 1.0) ** 2) ** 2
     return covariance

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sonarsynth.conventions import Floats, azimuth_elevation
-from sonarsynth.equations.arrays.spherical_wave import Wavefront, envelope_peak
+from sonarsynth.equations.arrays.spherical_wave import Wavefront, envelope_peak, envelope_spread
 from sonarsynth.equations.arrays.wavefront_errors import bending_covariance, image_covariance
 from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS, SourceEstimates
@@ -101,7 +101,7 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
     fall = -knowledge.bottom_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
     slope, by_angle = float(pose.rotation[2] @ wave.direction), wave.tangents @ pose.rotation[2]
     from_depth = fall / slope if slope * fall > 0 else np.nan
-    full = _straight_covariance(wave, timing, by_angle / from_depth, pulse.window, knowledge)
+    full = _straight_covariance(wave, timing, by_angle / from_depth, pulse, knowledge)
     tilt = by_angle * (KINKED * knowledge.kink * elements.aperture / sonar.assumed_sound_speed)
     straight, spread = full, full[:2, :2] + np.outer(tilt, tilt)
     from_pole = float(np.hypot(*bent.direction[:2]))  # its azimuth is anybody's guess where it may be beyond
@@ -145,12 +145,11 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
 
 
 def _straight_covariance(
-    wave: Wavefront, timing: Floats, by_height: Floats, window: float, knowledge: SonarKnowledge
+    wave: Wavefront, timing: Floats, by_height: Floats, pulse: Pulse, knowledge: SonarKnowledge
 ) -> Floats:
     """Covariance (4, 4) of a wavefront's parameters along straight rays, from that of its delays.
 
     by_height (2,): change of its tangents with the height of a source on the bottom, 1/m; NaN where that is not seen.
-    window: length (s) of what was cut out about the pulse.
     """
     sonar, up, own = knowledge.sonar, knowledge.pose.rotation[2], float(knowledge.pose.position[2])
     full = timing + np.outer(wave.by_sound_speed, wave.by_sound_speed) * sonar.sound_speed_error**2
@@ -163,10 +162,17 @@ def _straight_covariance(
         bent = 0.5 * (PHASE_SLOPE * float(np.std(height)) * float(np.linalg.norm(by_height))) ** 2
         full[3, 3] += (bent / (2.0 * np.pi * sonar.band.centre)) ** 2
     elif knowledge.reflected and not knowledge.on_bottom:
-        c, depth, seen = sonar.assumed_sound_speed, knowledge.bottom_depth, (wave.tangents @ up, up @ wave.direction)
+        depth, seen = knowledge.bottom_depth, (wave.tangents @ up, up @ wave.direction, wave.curvature, full)
+        spread, half = (_spread(pulse, sonar), _spread(pulse.longer or pulse, sonar)), 0.5 * pulse.window
         for height in (-own, -depth - own):
-            full = full + image_covariance(*seen, wave.curvature, full, height, 0.5 * window * c, depth, c)
+            full = full + image_covariance(
+                *seen, height, sonar.assumed_sound_speed, window=half, spread=spread, deepest=depth
+            )
     return full
+
+
+def _spread(pulse: Pulse, sonar: Sonar) -> float:
+    return envelope_spread(pulse.frequency, pulse.template, sonar.band.low, sonar.band.high)
 
 
 def _fuse(wave: Wavefront, covariance: Floats, fall: float, knowledge: SonarKnowledge) -> Fix:
