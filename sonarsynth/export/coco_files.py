@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from sonarsynth.conventions import Progress
 from sonarsynth.description import FieldError
 from sonarsynth.evaluation.detectors import true_objects
 from sonarsynth.evaluation.detectors.true_objects import TrueObjects, category_names
+from sonarsynth.labels.views.range_cells_met import box_of
 from sonarsynth.store import splits_of
 
 if TYPE_CHECKING:
@@ -22,11 +23,26 @@ DECIBELS: Final = 40.0
 """Range of the grey values, below the brightest beam of each image: 255 is that beam, 0 all that is fainter."""
 LOST: Final = (
     f"images are grey values of a byte, {DECIBELS:g} dB below the brightest beam of each: how bright that is, is lost",
-    "row 0 is the lowest elevation and column 0 the beam farthest to starboard, as pixel_box has them",
+    "row 0 is the lowest elevation, in range images the nearest range, and column 0 the beam farthest to starboard",
     "signals, beams against delay, points, source estimates, meshes, poses and the link budget are left out",
     "clutter has no annotation: what a detector finds there is a false alarm",
 )
 """What an export lacks, a line each."""
+
+
+class _Pictures(NamedTuple):
+    """Pictures of a store, and where they go."""
+
+    group: str
+    folder: str
+    file: str  # ending of the JSON files
+    whose: str  # path of the targets of their pixels
+
+
+PICTURES: Final = (
+    _Pictures("image", "images", "", "truth/beams/target"),
+    _Pictures("range_image", "range_images", "_ranges", "range_image/target"),
+)
 
 
 def write_coco(
@@ -36,30 +52,40 @@ def write_coco(
     progress: Progress | None = None,
 ) -> tuple[Path, ...]:
     """Write images and annotations of some frames of a store: `images/<frame>.png` and, of each split, `<split>.json`
-    (train.json of a recipe without splits).
+    (train.json of a recipe without splits); of range images `range_images/<frame>.png` and `<split>_ranges.json`.
 
     An annotation is an object as `evaluate` has it: its `bbox` is `pixel_box`, its mask the beams that point at it (the
     box, where none does), and beside what COCO asks for it has `track_id` (the slot of the target), `range`, `azimuth`,
-    `elevation`, `aspect`, `visibility` and `snr`. Images and categories have the numbers of detections (see
-    `sonarsynth.detection.read`). Returns the JSON files. Raises FieldError for a store without images, OSError.
+    `elevation`, `aspect`, `visibility` and `snr`. In a range image the mask is of the cells in which beams meet it, and
+    the box is about these: an object that none meets is left out. Images and categories have the numbers of detections
+    (see `sonarsynth.detection.read`). Returns the JSON files. Raises FieldError for a store without images, OSError.
     """
-    if "image" not in tree.children:
+    there = [pictures for pictures in PICTURES if pictures.group in tree.children]
+    if not there:
         raise FieldError(("image",), "the store has no images: it was built without that product")
-    (folder / "images").mkdir(parents=True, exist_ok=True)
-    objects, entries = true_objects(tree, frames), dict[str, dict[str, Any]]()
-    for done, (frame, split) in enumerate(zip(frames.tolist(), splits_of(tree, frames), strict=True), 1):
-        entry = entries.setdefault(split, _head(tree))
-        entry["images"].append(_write_image(tree, folder, frame))
-        whose = np.asarray(tree["truth/beams/target"].isel(frame=frame).values)
-        for row in np.flatnonzero(objects.frame == frame):
-            entry["annotations"].append(_annotation(objects, int(row), whose))
-        if progress is not None:
-            progress(done, len(frames), 0)
-    files = []
-    for split_name, entry in entries.items():
-        files.append(folder / f"{split_name}.json")
-        files[-1].write_text(json.dumps(entry), encoding="utf-8")
+    objects, splits, files = true_objects(tree, frames), splits_of(tree, frames), list[Path]()
+    for n, pictures in enumerate(there):
+        (folder / pictures.folder).mkdir(parents=True, exist_ok=True)
+        entries: dict[str, dict[str, Any]] = {}
+        for done, (frame, split) in enumerate(zip(frames.tolist(), splits, strict=True), 1):
+            entry = entries.setdefault(split, _head(tree))
+            entry["images"].append(_write_image(tree, folder, frame, pictures))
+            whose = np.asarray(tree[pictures.whose].isel(frame=frame).values)
+            entry["annotations"] += _annotations(objects, frame, whose, pictures)
+            if progress is not None:
+                progress(n * len(frames) + done, len(there) * len(frames), 0)
+        for split_name, entry in entries.items():
+            files.append(folder / f"{split_name}{pictures.file}.json")
+            files[-1].write_text(json.dumps(entry), encoding="utf-8")
     return tuple(files)
+
+
+def _annotations(objects: TrueObjects, frame: int, whose: np.ndarray, pictures: _Pictures) -> Iterator[dict[str, Any]]:
+    for row in np.flatnonzero(objects.frame == frame).tolist():
+        mask = whose == objects.target[row]
+        box = tuple(objects.box[row].tolist()) if pictures.group == "image" else box_of(mask)
+        if box is not None:
+            yield _annotation(objects, row, mask, box)
 
 
 def _head(tree: xr.DataTree) -> dict[str, Any]:
@@ -73,15 +99,15 @@ def _head(tree: xr.DataTree) -> dict[str, Any]:
     }
 
 
-def _write_image(tree: xr.DataTree, folder: Path, frame: int) -> dict[str, Any]:
+def _write_image(tree: xr.DataTree, folder: Path, frame: int, pictures: _Pictures) -> dict[str, Any]:
     """Write an image; its entry."""
     from PIL import Image
 
-    energy = np.nan_to_num(np.asarray(tree["image/energy"].isel(frame=frame).values))
-    file = folder / "images" / f"{frame:06d}.png"
+    energy = np.nan_to_num(np.asarray(tree[f"{pictures.group}/energy"].isel(frame=frame).values))
+    file = folder / pictures.folder / f"{frame:06d}.png"
     Image.fromarray(grey(energy)).save(file)
     height, width = energy.shape
-    return {"id": frame, "file_name": f"images/{file.name}", "width": width, "height": height, "license": 1}
+    return {"id": frame, "file_name": f"{pictures.folder}/{file.name}", "width": width, "height": height, "license": 1}
 
 
 def grey(energy: np.ndarray) -> np.ndarray:
@@ -93,9 +119,8 @@ def grey(energy: np.ndarray) -> np.ndarray:
     return np.asarray(np.rint(255.0 * np.clip(1.0 + level / DECIBELS, 0.0, 1.0)), np.uint8)
 
 
-def _annotation(objects: TrueObjects, row: int, whose: np.ndarray) -> dict[str, Any]:
-    mask = whose == objects.target[row]
-    x0, y0, x1, y1 = map(float, objects.box[row])
+def _annotation(objects: TrueObjects, row: int, mask: np.ndarray, box: tuple[float, ...]) -> dict[str, Any]:
+    x0, y0, x1, y1 = box
     corners: list[list[float]] = [[x0, y0, x1, y0, x1, y1, x0, y1]]
     more = {"visibility": "visible", "snr": "snr", "range": "range", "aspect": "aspect"}
     more |= {"azimuth": "azimuth", "elevation": "elevation"}

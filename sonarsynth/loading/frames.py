@@ -24,12 +24,16 @@ class Frames:
     ----------
     store: path of a folder of this machine.
     split: train, validation or test; left out: all frames that were built.
-    image: "db" (level re the brightest beam, -60 at least), "energy" (Pa2 s) or "none".
+    image: "db" (level re the brightest beam, -60 at least), "energy" (Pa2 s), "range_db" (the range image: level re
+        its brightest cell, -60 at least) or "none".
     targets: one or several of
         "boxes": `boxes` (box, 4) as `pixel_box`, `categories` (box,), `targets` (box,), their slots;
         "mask": `mask` (elevation, azimuth), the category that each beam points at, -1 for none;
         "points": `points` (point, xyz), m, sonar frame, and `point_targets` (point,), -1 for none;
-        "range": `range` (elevation, azimuth), m, NaN where a beam meets nothing.
+        "range": `range` (elevation, azimuth), m, NaN where a beam meets nothing;
+        "range_boxes": `range_boxes` (box, 4) about the cells (range, azimuth) that beams meet each target in, as
+            `pixel_box` is in beams, `range_categories` and `range_targets` (box,);
+        "range_mask": `range_mask` (range, azimuth), the category that beams meet in each cell, -1 for none.
     signals: whether `pressure` (sensor, sample), Pa, is with them.
 
     A sample is a dict of NumPy arrays, numbers float32 and labels int64, which torch, JAX and Keras take. It can be

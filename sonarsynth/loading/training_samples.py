@@ -8,12 +8,13 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 
 from sonarsynth.description import FieldError
+from sonarsynth.labels.views.range_cells_met import box_of
 from sonarsynth.products import View
 
 Sample = dict[str, Any]
 """Arrays by name, and `frame`, the number of the frame."""
-Image = Literal["db", "energy", "none"]
-Target = Literal["boxes", "mask", "points", "range"]
+Image = Literal["db", "energy", "range_db", "none"]
+Target = Literal["boxes", "mask", "points", "range", "range_boxes", "range_mask"]
 FLOOR: Final = -60.0
 """dB re the brightest beam: what is fainter, and beams that hold nothing, are so much."""
 _NEEDS: Final[dict[str, tuple[str, ...]]] = {
@@ -21,15 +22,18 @@ _NEEDS: Final[dict[str, tuple[str, ...]]] = {
     "mask": ("truth/beams/target", "truth/targets/category"),
     "range": ("truth/beams/range",),
     "points": tuple(f"cloud/{name}" for name in ("count", "x", "y", "z", "target")),
+    "range_boxes": ("range_image/target", "truth/targets/clutter", "truth/targets/category"),
+    "range_mask": ("range_image/target", "truth/targets/category"),
 }
 
 
 class SampleForm:
     """Which arrays a sample has.
 
-    image: "db" (level re the brightest beam, at least `FLOOR`), "energy" (Pa2 s, NaN where a beam holds nothing) or
-    "none". targets: one or several of "boxes", "mask", "points", "range". signals: whether the pressure of all
-    hydrophones is with them. Raises FieldError for another word.
+    image: "db" (level re the brightest beam, at least `FLOOR`), "energy" (Pa2 s, NaN where a beam holds nothing),
+    "range_db" (level re the brightest cell of the range image) or "none". targets: one or several of "boxes", "mask",
+    "points", "range", "range_boxes", "range_mask". signals: whether the pressure of all hydrophones is with them.
+    Raises FieldError for another word.
     """
 
     def __init__(self, image: str = "db", targets: str | Sequence[str] = "boxes", signals: bool = False) -> None:
@@ -43,7 +47,7 @@ class SampleForm:
     @property
     def needs(self) -> tuple[str, ...]:
         """Paths of the arrays that samples are made of."""
-        own = ("image/energy",) * (self.image != "none") + ("signals/pressure",) * self.signals
+        own = (self._image,) * (self.image != "none") + ("signals/pressure",) * self.signals
         return own + tuple(name for word in self.targets for name in _NEEDS[word])
 
     @property
@@ -51,12 +55,16 @@ class SampleForm:
         """Of a build that has these arrays."""
         return tuple({name.partition("/")[0]: None for name in self.needs if not name.startswith("truth")})
 
+    @property
+    def _image(self) -> str:
+        return "range_image/energy" if self.image == "range_db" else "image/energy"
+
     def sample(self, frame: int, of: Callable[[str], np.ndarray]) -> Sample:
         """The sample of a frame; `of` gives its arrays by path."""
         sample: Sample = {"frame": frame}
         if self.image != "none":
-            energy = of("image/energy")
-            sample["image"] = decibels(energy) if self.image == "db" else energy
+            energy = of(self._image)
+            sample["image"] = energy if self.image == "energy" else decibels(energy)
         if self.signals:
             sample["pressure"] = of("signals/pressure")
         for word in self.targets:
@@ -84,10 +92,23 @@ def _boxes(of: Callable[[str], np.ndarray]) -> Sample:
     }
 
 
-def _mask(of: Callable[[str], np.ndarray]) -> Sample:
-    whose = of("truth/beams/target")
+def _mask(of: Callable[[str], np.ndarray], whose: str = "truth/beams/target") -> Sample:
     category = np.append(of("truth/targets/category"), np.int16(-1))  # of none, which is -1
-    return {"mask": category[whose].astype(np.int64)}
+    return {"mask": category[of(whose)].astype(np.int64)}
+
+
+def _range_mask(of: Callable[[str], np.ndarray]) -> Sample:
+    return {"range_mask": _mask(of, "range_image/target")["mask"]}
+
+
+def _range_boxes(of: Callable[[str], np.ndarray]) -> Sample:
+    whose, clutter = of("range_image/target"), of("truth/targets/clutter")
+    boxes = {n: box_of(whose == n) for n in np.unique(whose[whose >= 0]).tolist() if not clutter[n]}
+    return {
+        "range_boxes": np.array(list(boxes.values()), np.float32).reshape(-1, 4),
+        "range_categories": of("truth/targets/category")[list(boxes)].astype(np.int64),
+        "range_targets": np.array(list(boxes), np.int64),
+    }
 
 
 def _range(of: Callable[[str], np.ndarray]) -> Sample:
@@ -105,6 +126,8 @@ _MAKERS: Final[dict[str, Callable[[Callable[[str], np.ndarray]], Sample]]] = {
     "mask": _mask,
     "range": _range,
     "points": _points,
+    "range_boxes": _range_boxes,
+    "range_mask": _range_mask,
 }
 
 
@@ -118,5 +141,7 @@ def collate(samples: Sequence[Sample]) -> Sample:
     return batch
 
 
-_LISTS: Final = frozenset({"boxes", "categories", "targets", "points", "point_targets"})
+_LISTS: Final = frozenset(
+    {"boxes", "categories", "targets", "points", "point_targets", "range_boxes", "range_categories", "range_targets"}
+)
 """A list in every batch: that two frames have as many boxes is chance."""

@@ -13,7 +13,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 import sonarsynth as ss
-from sonarsynth import schedule
+from sonarsynth import planning, schedule
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.export.coco_files import DECIBELS, grey, write_coco
@@ -60,7 +60,9 @@ MANDATORY = {
 def store(small_text: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three frames of twenty, of a box before 20 hydrophones."""
     path = tmp_path_factory.mktemp("exported") / "s.zarr"
-    assert schedule.build(reading.loads(small_text), path, frames=BUILT, workers=0).ok
+    text = small_text.replace("  trajectory:", "    ranges: {near: 6 m, far: 14 m, step: 10 cm}\n  trajectory:")
+    plan = planning.plan(reading.loads(text), {"signals", "image", "range_image", "cloud"})
+    assert schedule.build(plan, path, frames=BUILT, workers=0).ok
     return path
 
 
@@ -88,6 +90,27 @@ def test_coco_reads_boxes_and_masks(store: Path, coco: Path) -> None:
         assert annotation["area"] == mask.sum() > 0
         centre = tree["truth/targets/box_centre"].values[frame, 0]
         assert annotation["range"] == pytest.approx(np.linalg.norm(centre))
+    assert len(read.anns) == len(BUILT)
+
+
+def test_coco_reads_boxes_and_masks_of_range_images(store: Path, coco: Path) -> None:
+    from faster_coco_eval import COCO
+    from PIL import Image
+
+    tree = ss.open(store)
+    with contextlib.redirect_stdout(io.StringIO()):
+        read = COCO(str(coco / "train_ranges.json"))
+    ranges = tree["range_image/range"].values
+    for annotation in read.anns.values():
+        frame = annotation["image_id"]
+        mask = read.annToMask(annotation).astype(bool)
+        np.testing.assert_array_equal(mask, tree["range_image/target"].values[frame] == 0)
+        x, y, width, height = map(int, annotation["bbox"])
+        assert not np.delete(mask, np.s_[x : x + width], axis=1).any() and mask[:, [x, x + width - 1]].any(axis=0).all()
+        assert not np.delete(mask, np.s_[y : y + height], axis=0).any() and mask[[y, y + height - 1]].any(axis=1).all()
+        assert ranges[y] - 0.1 < annotation["range"] < ranges[y + height - 1] + 1.0, "the near side is met"
+        pixels = np.asarray(Image.open(coco / read.imgs[frame]["file_name"]))
+        assert pixels.shape == mask.shape and pixels[mask].max() > 200, "the target is among the brightest cells"
     assert len(read.anns) == len(BUILT)
 
 
@@ -121,8 +144,10 @@ def test_no_name_of_a_store_leads_out_of_the_folder(store: Path, tmp_path: Path)
     numbers = tree["split"].copy(deep=True)
     meanings = {"flag_meanings": "../../outside <img/src=x> b"}
     tree.dataset = tree.to_dataset().assign_coords(split=("frame", numbers.values, meanings))
-    (file,) = write_coco(tree, tmp_path / "a" / "b", np.array(BUILT))
-    assert file == tmp_path / "a" / "b" / "train.json" and [f.name for f in tmp_path.iterdir()] == ["a"]
+    files = write_coco(tree, tmp_path / "a" / "b", np.array(BUILT))
+    assert files == tuple(tmp_path / "a" / "b" / f"train{of}.json" for of in ("", "_ranges")) and [
+        f.name for f in tmp_path.iterdir()
+    ] == ["a"]
     tree.dataset = tree.to_dataset().assign_coords(split=("frame", numbers.values + 7))
     with pytest.raises(Mismatch, match="7 is no number of a split"):
         write_coco(tree, tmp_path / "c", np.array(BUILT))

@@ -23,7 +23,7 @@ from sonarsynth.store import Damage, Mismatch
 from sonarsynth.store.frame_reading import FrameReader
 
 BUILT = range(2, 18)
-EVERY = ("boxes", "mask", "points", "range")
+EVERY = ("boxes", "mask", "points", "range", "range_boxes", "range_mask")
 ROCK = """- name: rock
         clutter: true
         shape: {kind: sphere, radius: 0.4, edge: 0.1}
@@ -35,7 +35,10 @@ ROCK = """- name: rock
 def recipe(small_text: str) -> Recipe:
     """Ten sequences of two frames, of a box and of clutter, with splits."""
     text = small_text.replace("    sources:", f"      {ROCK}", 1).replace("frames: 20", "frames: 2")
-    text = text.replace("  trajectory:", "    converter: {bits: 16, full_scale: 20 Pa}\n  trajectory:")
+    text = text.replace(
+        "  trajectory:",
+        "    converter: {bits: 16, full_scale: 20 Pa}\n    ranges: {near: 6 m, far: 14 m, step: 10 cm}\n  trajectory:",
+    )
     noise = "{name: noise, path: environment.noise.level, kind: uniform, low: 30 dB, high: 50 dB}"
     splits = "repeats: 10\nsplits: {train: 0.6, validation: 0.2, test: 0.2}\n"
     return reading.loads(f"{text}variations: [{noise}]\n{splits}")
@@ -45,7 +48,7 @@ def recipe(small_text: str) -> Recipe:
 def store(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Sixteen of its twenty frames, in shards of which one is there in part."""
     path = tmp_path_factory.mktemp("training") / "s.zarr"
-    products = {"signals", "image", "cloud", "beams"}
+    products = {"signals", "image", "range_image", "cloud", "beams"}
     assert schedule.build(planning.plan(recipe, products), path, frames=BUILT, workers=0).ok
     return path
 
@@ -97,6 +100,12 @@ def test_samples_are_of_the_built_frames_of_a_split(store: Path, split: str | No
         whose = tree["truth/beams/target"].values[frame]
         names = np.array([*tree["truth/targets/category"].values[frame], -1])
         np.testing.assert_array_equal(sample["mask"], names[whose])
+        cells = tree["range_image/target"].values[frame]
+        np.testing.assert_array_equal(sample["range_mask"], names[cells])
+        assert {0, 1} <= set(cells.ravel()) and sample["range_targets"].tolist() == [0], "the rock is clutter"
+        rows, columns = np.nonzero(cells == 0)
+        box = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+        assert sample["range_boxes"].tolist() == [box] and sample["range_categories"].tolist() == [names[0]]
         count = int(tree["cloud/count"].values[frame])
         np.testing.assert_array_equal(sample["points"][:, 1], tree["cloud/y"].values[frame, :count])
         floats = [value for value in sample.values() if np.asarray(value).dtype.kind == "f"]
@@ -110,6 +119,10 @@ def test_levels_are_re_the_brightest_beam(store: Path) -> None:
         assert level.dtype == np.float32 and level.max() == 0.0 and np.isfinite(level).all()
         expected = np.maximum(10.0 * np.log10(plain / plain.max()), FLOOR)
         np.testing.assert_allclose(level, expected, atol=1e-4)
+    cells, stored = Frames(store, image="range_db"), ss.open(store)["range_image/energy"].values
+    for row, frame in enumerate(cells.frames.tolist()):
+        expected = np.maximum(10.0 * np.log10(np.nan_to_num(stored[frame]) / np.nanmax(stored[frame]) + 1e-30), FLOOR)
+        np.testing.assert_allclose(cells[row]["image"], expected, atol=1e-4)
 
 
 def test_batches_are_the_samples_in_the_order_asked(store: Path) -> None:
@@ -195,8 +208,8 @@ def test_metadata_are_not_believed(store: Path, tmp_path: Path, change: dict[str
 
 def test_what_is_not_there_is_said(store: Path, tmp_path: Path) -> None:
     for options, said in (
-        ({"image": "picture"}, "image: must be one of db, energy, none, not 'picture'"),
-        ({"targets": "box"}, "targets: must be of boxes, mask, range, points, not 'box'"),
+        ({"image": "picture"}, "image: must be one of db, energy, range_db, none, not 'picture'"),
+        ({"targets": "box"}, "targets: must be of boxes, mask, range, points, range_boxes, range_mask, not 'box'"),
         ({"split": "exam"}, "split: must be one of train, validation, test, not 'exam'"),
     ):
         with pytest.raises(ss.FieldError, match=said):

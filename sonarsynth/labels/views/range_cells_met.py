@@ -36,3 +36,12 @@ def met_at_ranges(
         if abs(here - below) < apart * here:
             mark(column, number, min(here, below), max(here, below))
     return met
+
+
+def box_of(cells: npt.NDArray[np.bool_]) -> tuple[float, float, float, float] | None:
+    """x0, y0, x1, y1 about some cells (range, azimuth), in cells, as `pixel_box` is in beams: x along azimuth, y along
+    range; None without any."""
+    rows, columns = (np.flatnonzero(cells.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return None
+    return float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1)
