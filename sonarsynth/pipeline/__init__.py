@@ -248,10 +248,12 @@ def _received(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> Received
         return None
     if not in_record(estimates, signals, plan.windows.echo_start, plan.windows.echo_stop)[:1].any():
         return None
-    loudest, pulse = ranging_kernels.peak(signals.pressure), plan.windows.supports.direct
+    loudest, supports = ranging_kernels.peak(signals.pressure), plan.windows.supports
     elements, sonar = known_elements(plan, frame), plan.scene.sonar
     focus, direct = plan.choices.beamforming.focus, beamformed.signals
-    return ReceivedWindow(elements, sonar, image, beams, loudest, direct, estimates, focus, pulse)
+    return ReceivedWindow(
+        elements, sonar, image, beams, loudest, direct, estimates, focus, supports.late, supports.direct
+    )
 
 
 def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointCloud:

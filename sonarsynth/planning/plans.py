@@ -42,6 +42,7 @@ class PulseDurations:
     clear: float  # after the direct arrival: no echo window begins earlier, unless the direct pulse is taken out
     foot: float  # either side: what is farther out may be cut off an echo
     direct: float = 0.0  # either side of its peak: as long as a direct pulse is loud at a hydrophone
+    late: float = 0.0  # root mean square delay, in ranging, of echoes that motion makes longest or shortest
 
 
 @dataclass(frozen=True, eq=False)

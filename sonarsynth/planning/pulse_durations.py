@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from sonarsynth.conventions import SLOWEST, Floats
 from sonarsynth.environment.boundary_numbers import rms_height
+from sonarsynth.equations.arrays.bistatic_range import MIN_ONE_PLUS_COS
+from sonarsynth.geometry import unit
 from sonarsynth.geometry.mesh import farthest_corner
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import PulseDurations
+from sonarsynth.ranging.range_profiles import StretchedEcho, stretched_echo
 from sonarsynth.receiver import Sonar, elements
-from sonarsynth.recipe.scene import Scene
+from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals import pulse_support
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, envelope_delay, silencing_blur
+from sonarsynth.signals.isolated_paths import whole_spectrum
 from sonarsynth.sources.snap_pulses import Waveform, waveform
+from sonarsynth.state import Emission
 
 SUPPORT = 1e-7
 """The sample window holds every pulse down to this part of its peak; so long after the direct one begin the echoes."""
@@ -26,6 +33,8 @@ ECHO_SUPPORT = 1e-4
 """The echo window holds every echo down to this part of its peak: its feet, under -80 dB, are cut."""
 DIRECT = 0.1
 """What ranging takes out of echoes is the direct pulse where it is over this part of its peak."""
+STILL: tuple[float, float, Waveform | None] = (0.0, 0.0, None)
+"""A row of `stretches` where nothing is met."""
 AT_ONCE = 10e-6
 """s: a pulse that is loudest so soon before or after its time 0 is loudest then."""
 FOOT = 1e-2
@@ -48,7 +57,46 @@ def supports_of(looks: Sequence[SampledScene]) -> PulseDurations:
         clear = min(after, plain + across + TAIL) - min(early, 0.0)  # a turned pulse may never end, and hide all echoes
         echo, foot = (_support(scene, threshold, turned=turned) + across for threshold in (ECHO_SUPPORT, FOOT))
         rows.append((before, after, *echo, clear, foot.max(), _direct(scene)))
-    return PulseDurations(*(float(n) for n in np.max(rows, axis=0)))
+    late = _late(looks, [float(row[-1]) for row in rows])
+    return replace(PulseDurations(*(float(n) for n in np.max(rows, axis=0))), late=late)
+
+
+def _late(looks: Sequence[SampledScene], direct: list[float]) -> float:
+    """`PulseDurations.late` of the scene in which motion does most to pulses, which are `direct` (look,) s long."""
+    worst = [max(stretches(look), key=lambda row: abs(row[0]), default=STILL) for look in looks]
+    look, (stretch, _, shape), _ = max(zip(looks, worst, direct, strict=True), key=lambda row: abs(row[1][0]) * row[2])
+    return ranged_echo(stretch, shape, look.scene.sonar).spread
+
+
+def stretches(look: SampledScene) -> list[tuple[float, float, Waveform]]:
+    """Of each body, emission and frame: `_stretch`, and the pulse."""
+    if not look.scene.physics.doppler:
+        return []
+    rows = [(f, b, s) for f in look.frames for b in f.moment.bodies for s in f.moment.snaps]
+    return [(*_stretch(*row, look.scene.sonar.assumed_sound_speed), row[2].waveform) for row in rows]
+
+
+def _stretch(frame: Frame, body: PlacedTarget, snap: Emission, c: float) -> tuple[float, float]:
+    """By what part echoes of a body last longer than the direct pulse, and metres of range a metre of their path: 0
+    where they have none, next to the line from source to array."""
+    array, velocity = frame.sonar_pose.position, frame.sonar_velocity
+    out, on, past = (
+        unit(b - a)
+        for a, b in ((snap.position, body.pose.position), (body.pose.position, array), (snap.position, array))
+    )
+    longer = out @ (body.velocity - snap.velocity) + on @ (velocity - body.velocity) - past @ (velocity - snap.velocity)
+    both = 1.0 - float(out @ on)
+    return float(longer) / c, 1.0 / both if both > MIN_ONE_PLUS_COS else 0.0
+
+
+@lru_cache(maxsize=64)
+def ranged_echo(stretch: float, shape: Waveform | None, sonar: Sonar) -> StretchedEcho:
+    """What ranging makes of an echo whose pulse lasts 1 + stretch times as long."""
+    if shape is None or stretch == 0.0:
+        return StretchedEcho(0.0, 1.0, 0.0)
+    (f, wave), (_, longer) = (whole_spectrum(shape, sonar, doppler) for doppler in (0.0, stretch))
+    band = slice(*np.searchsorted(f, [sonar.band.low, sonar.band.high]))
+    return stretched_echo(f[band], wave[band], longer[band], sonar.band)
 
 
 def _direct(scene: Scene) -> float:

@@ -43,6 +43,7 @@ def point_cloud(
     solution = placing.place(echoes.delay, beam, source, window.sonar, sonar_pose, profile)
     if velocity.any() or spin.any():
         solution = solution.as_array_moves(source, -echoes.delay[:, None] * (velocity + np.cross(spin, source)))
+    echoes = replace(echoes, delay_error=np.hypot(echoes.delay_error, window.late))
     echoes = _as_focused(echoes, solution.range, window)
     error = range_error(solution, echoes, window.estimates, window.sonar)
     cloud = PointCloud(

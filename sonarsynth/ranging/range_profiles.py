@@ -222,18 +222,29 @@ def matched_filter(f: Floats, wave: Complexes, spacing: float, band: Band) -> tu
     return taper, wave.conj() * taper / (density + WHITENING * density.max()) if density.max() > 0 else 0 * wave
 
 
-def stretched_echo(f: Floats, wave: Complexes, stretched: Complexes, band: Band) -> tuple[float, float]:
-    """How late (s) the profile of an echo is largest, and its power there over that of one like the direct pulse.
+@dataclass(frozen=True)
+class StretchedEcho:
+    """What ranging makes of an echo that motion made longer or shorter than the direct pulse."""
 
-    wave, stretched (bin,): spectra of the direct pulse, and of an echo that motion made longer, at frequencies (bin,).
-    """
+    late: float  # s: where its profile is largest
+    power: float  # there, over that of one like the direct pulse
+    spread: float  # s: root mean square delay of its power, beside that of one like the direct pulse
+
+
+def stretched_echo(f: Floats, wave: Complexes, stretched: Complexes, band: Band) -> StretchedEcho:
+    """Of the spectra of the direct pulse and of the echo: wave, stretched (bin,), at frequencies (bin,)."""
     _, matched = matched_filter(f, wave, f[1] - f[0], band)
     count = 8 * next_fast_len(len(f))
     plain, profile = (np.abs(ifft(of * matched, count)) for of in (wave, stretched))
     top = int(profile.argmax())
     offset, height = parabola(*profile[[top - 1, top, (top + 1) % count]])
-    late = top + float(offset) - count * (top > count / 2)
-    return late / (count * (f[1] - f[0])), float((height / plain[0]) ** 2)
+    delay = (np.arange(count) - count * (np.arange(count) > count / 2)) / (count * (f[1] - f[0]))
+    own, square = (float(delay**2 @ of**2 / np.sum(of**2)) for of in (plain, profile))
+    return StretchedEcho(
+        float(delay[top] + offset * delay[1]),
+        float((height / plain[0]) ** 2),
+        np.sqrt(max(square - own, 0.0)),
+    )
 
 
 def _own_band(f: Floats, density: Floats, spacing: float, band: Band) -> tuple[float, float]:

@@ -22,6 +22,7 @@ class ReceivedWindow:
     direct: Signals  # with the direct pulse in them
     estimates: SourceEstimates
     focus: float | None = None  # m: of the beams; none: plane waves
+    late: float = 0.0  # s: root mean square delay of echoes that motion makes longer or shorter than the direct pulse
     pulse: float = 0.0  # s: how long either side of its peak the direct pulse is heard
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.fft import ifft, irfft, rfft
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, Complexes, Floats
+from sonarsynth.description import FieldError
 from sonarsynth.equations.arrays.spherical_wave import envelope_peak
 from sonarsynth.equations.bubble import pulses
 from sonarsynth.equations.bubble.pulses import Pulse
@@ -231,14 +232,20 @@ def stretched_spectra(
 
 @lru_cache(maxsize=64)
 def stretch_sizes(waveform: Waveform, chosen: Filter, widest: float, sloped: bool = False) -> tuple[float, ...]:
-    """Mean moduli of the coefficients (degree < 16,) of `stretched_spectra` over frequency, over that of the first;
-    of the differentiated snap, if it is sloped."""
+    """Mean moduli of the coefficients (degree,) of `stretched_spectra` over frequency, over that of the first; of the
+    differentiated snap, if it is sloped. As many as it takes until they are nothing: more, the longer the pulse."""
     f = np.linspace(0.0, stop_frequency(chosen), 97)
     filtered = filters.response(f, fir(chosen)) * (f if sloped else 1.0)
-    at = 1.0 + widest * chebyshev(16)
-    pulse = _pulse(waveform, 1.2 * float(f[-1]))
-    value = analysis(16) @ (pulses.stretched_spectra(f, pulse, at) * at[:, None] * filtered)
-    sizes = np.abs(value).sum(axis=1)
+    pulse, sizes = _pulse(waveform, 1.2 * float(f[-1])), np.ones(1)
+    for count in (16, 32, 64, 128, 256, 512):
+        at = 1.0 + widest * chebyshev(count)
+        value = analysis(count) @ (pulses.stretched_spectra(f, pulse, at) * at[:, None] * filtered)
+        sizes = np.abs(value).sum(axis=1)
+        if sizes[-count // 4 :].sum() <= 1e-9 * sizes[0]:
+            break
+    else:
+        message = f"pulses too long to be stretched by {widest:.2g} of themselves, as motion does: take direct_sum"
+        raise FieldError(("scene", "physics", "synthesis"), message)
     return tuple((sizes / sizes[0]).tolist()) if sizes[0] > 0.0 else (1.0, inf)
 
 

@@ -7,18 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sonarsynth.equations.arrays.bistatic_range import MIN_ONE_PLUS_COS
-from sonarsynth.geometry import unit
-from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import context_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plan_tables import Omission
 from sonarsynth.planning.plans import Plan
-from sonarsynth.ranging.range_profiles import stretched_echo
+from sonarsynth.planning.pulse_durations import STILL, ranged_echo, stretches
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.signals.isolated_paths import whole_spectrum
-from sonarsynth.state import Emission, FrameContext
+from sonarsynth.state import FrameContext
 from sonarsynth.tracing.meetings import MeetingTimes, meetings
 
 FAINTER = 1.0
@@ -31,36 +27,17 @@ def stretch_notes(looks: Sequence[SampledScene], allowed: float) -> list[str]:
     worst, lines = 1.0, []
     for look in looks:
         sonar, c = look.scene.sonar, look.scene.sonar.assumed_sound_speed
-        rows = [(f, b, s) for f in look.frames for b in f.moment.bodies for s in f.moment.snaps]
-        met = [(*_stretch(*row, c), row[2].waveform) for row in rows]
-        stretch, by_path, waveform = max(met, key=lambda row: abs(row[0]) * row[1], default=(0.0, 0.0, None))
-        if waveform is None or not look.scene.physics.doppler or stretch == 0.0:
-            continue
-        (f, wave), (_, longer) = (whole_spectrum(waveform, sonar, doppler) for doppler in (0.0, stretch))
-        band = slice(*np.searchsorted(f, [sonar.band.low, sonar.band.high]))
-        late, power = stretched_echo(f[band], wave[band], longer[band], sonar.band)
-        off, lost = by_path * c * late, -10.0 * np.log10(max(power, 1e-30))
+        stretch, by_path, waveform = max(stretches(look), key=lambda row: abs(row[0]) * row[1], default=STILL)
+        echo = ranged_echo(stretch, waveform, sonar)
+        off, lost = by_path * c * echo.late, -10.0 * np.log10(max(echo.power, 1e-30))
         if max(abs(off) / allowed, lost / FAINTER) > worst:
             worst = max(abs(off) / allowed, lost / FAINTER)
             than = f"{1e2 * abs(stretch):.2g} % {'longer' if stretch > 0.0 else 'shorter'} than the direct pulse"
-            ranges = f": ranges are {off:+.2g} m off, which their predicted errors do not hold"
+            ranges = f": ranges are {off:+.2g} m off, which their predicted errors hold"
             fainter = f": the sonar, which looks for such as that, loses {lost:.2g} dB of them"
             over = bool(abs(off) > allowed), bool(lost > FAINTER)
             lines = [f"motion makes echoes {than}" + ranges * over[0] + fainter * over[1]]
     return lines
-
-
-def _stretch(frame: Frame, body: PlacedTarget, snap: Emission, c: float) -> tuple[float, float]:
-    """By what part echoes of a body last longer than the direct pulse, and metres of range a metre of their path: 0
-    where they have none, next to the line from source to array."""
-    array, velocity = frame.sonar_pose.position, frame.sonar_velocity
-    out, on, past = (
-        unit(b - a)
-        for a, b in ((snap.position, body.pose.position), (body.pose.position, array), (snap.position, array))
-    )
-    longer = out @ (body.velocity - snap.velocity) + on @ (velocity - body.velocity) - past @ (velocity - snap.velocity)
-    both = 1.0 - float(out @ on)
-    return float(longer) / c, 1.0 / both if both > MIN_ONE_PLUS_COS else 0.0
 
 
 def motion_left_out(plan: Plan, frame: Frame) -> list[Omission]:
