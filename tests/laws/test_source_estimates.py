@@ -16,8 +16,9 @@ from sonarsynth.equations.arrays.spherical_wave import Wavefront, wavefront_dela
 from sonarsynth.evaluation import snap_located
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.labels.estimate_labels import Direct, emissions
-from sonarsynth.planning.notes.source_notes import off_the_bottom, standing_off
+from sonarsynth.planning.notes.source_notes import locator, off_the_bottom, standing_off
 from sonarsynth.products import REASONS, Signals, SourceEstimates
+from sonarsynth.propagation import AutoTracing
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.locating import fit_wave
 from sonarsynth.ranging.location.pulse_times import Pulse, lag_variance
@@ -379,3 +380,11 @@ def test_the_plan_names_what_stands_off_the_bottom() -> None:
     above, on = (point_scene((20.0, 0.0, -50.0), (12.0, 5.0, -depth)).scene for depth in (60.0, 100.0))
     assert standing_off(above) == ("shrimp",) and standing_off(on) == ()
     assert "not on the bottom" in off_the_bottom(above)[0] and off_the_bottom(on) == []
+
+
+@pytest.mark.parametrize(("height", "bounces", "on"), [(0.0, 1, True), (0.05, 0, True), (0.05, 1, False)])
+def test_a_snap_beside_its_image_in_the_bottom_is_not_taken_to_be_on_it(height: float, bounces: int, on: bool) -> None:
+    """Known to be there its time would be up to 160 predicted errors off, and its elevation 8."""
+    scene = point_scene((20.0, 0.0, -50.0), (12.0, 5.0, -100.0 + height)).scene
+    scene = replace(scene, physics=replace(scene.physics, tracing=AutoTracing(bounces=bounces)))
+    assert locator(scene).on_bottom is on

@@ -34,7 +34,8 @@ class SensorDelays(LocatingMethod):
 
     on_bottom: bool | None = None
     """Whether sources are known to be on the bottom. True: its depth is used where the wavefront agrees;
-    false (pingers, vehicles, fish): places are those of the wavefront alone. Left out: as the sources of the recipe."""
+    false (pingers, vehicles, fish): places are those of the wavefront alone. Left out: as the sources of the recipe,
+    on it within three errors of its depth, and within 0.1 mm where it reflects sound."""
 
     reflected: bool | None = None
     """Whether sources are heard with their reflections at surface and bottom: predicted errors then hold what these
