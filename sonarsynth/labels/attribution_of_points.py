@@ -103,9 +103,16 @@ class Attribution:
 
 
 def attribution(
-    arrivals: Arrivals, band: Band, listening: SonarTiming, beam: Floats, late: Floats, beam_energy: Floats
+    arrivals: Arrivals,
+    band: Band,
+    listening: SonarTiming,
+    beam: Floats,
+    late: Floats,
+    beam_energy: Floats,
+    most_bins: int = MOST_BINS,
 ) -> Attribution:
-    """Whose energy beams (point, xyz) hold at delays (point,) s after the clock; beam_energy (point,): Pa2 s.
+    """Whose energy beams (point, xyz) hold at delays (point,) s after the clock; beam_energy (point,): Pa2 s;
+    most_bins: frequencies that paths are summed at, at most.
 
     The snap itself, not by a target, is taken to bring no more than echoes leave of that: the sonar may have taken it
     out (`ranging.WavefrontCancelling`).
@@ -134,7 +141,7 @@ def attribution(
         owner, share = np.full(len(beam), NO_TARGET), np.zeros((len(beam), 1))
         return Attribution(clock, arrivals, rows, first, *groups, none, none, owner, share)
     across = gate + reach * kernels.farthest(direction, slowness, beam)  # without those that come at other times
-    fine = band.sliced(min(2.0 * width * across, MOST_BINS))
+    fine = band.sliced(min(2.0 * width * across, most_bins))
     focus = 0.0 if listening.focus is None else 1.0 / listening.focus
     curvature, pulse = 1.0 / arrivals.radius[rows], fine.energy[groups[1]]
     columns = kernels.attribute(

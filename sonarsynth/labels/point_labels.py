@@ -22,6 +22,10 @@ FIRST_NULL = 1.9
 EXPLAINED = 0.05
 """Of the energy of a point that the paths of a frame must bring, or noise made it."""
 
+SCATTERED_BINS = 8
+"""Frequencies that scatterers are summed at: of thousands at random, each tells as much. The same labels as of 48, in
+half of the time (`configs/ping.yaml`)."""
+
 
 def label_points(
     cloud: PointCloud,
@@ -44,7 +48,8 @@ def label_points(
     own = np.where(explained, attributed.energy.max(axis=1, initial=0.0), EXPLAINED * energy)
     lit = np.full(len(cloud), NO_TARGET)  # by which snap, of what scatters more than that
     if scattered is not None and len(cloud):
-        brought = attribution(scattered, band, replace(listening, clock=attributed.clock), beam, late, energy)
+        heard = replace(listening, clock=attributed.clock)
+        brought = attribution(scattered, band, heard, beam, late, energy, SCATTERED_BINS)
         lit = np.where(brought.energy.sum(axis=1) > own, np.append(brought.snap, NO_TARGET)[brought.owner], NO_TARGET)
     explained &= lit == NO_TARGET
     labels: dict[str, np.ndarray] = {

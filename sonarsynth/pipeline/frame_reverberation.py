@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +18,6 @@ from sonarsynth.products.array_expansion import ArrayExpansion
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import reverberation_pressure
 from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
-
-MOST_PATHS = 1000
-"""Scatterers that labels of points take of a frame: of more, one in so many stands for all, as loud as they are."""
 
 
 def frame_reverberation(plan: Plan, frame: Frame) -> ReverberationArrivals | None:
@@ -49,27 +47,25 @@ def with_reverberation(plan: Plan, frame: Frame, signals: Signals, arrivals: Rev
 
 
 def scattered_paths(plan: Plan, arrivals: Arrivals, scattered: ReverberationArrivals | None) -> Arrivals | None:
-    """Reverberation as labels of points take it: paths as the arrivals of a frame, spheres, at most `MOST_PATHS`."""
+    """Reverberation as labels of points take it: paths as the arrivals of a frame, spheres."""
     if scattered is None or not len(scattered.delay):
         return None
-    every = -(-len(scattered.delay) // MOST_PATHS)
-    some = scattered.select(np.arange(0, len(scattered.delay), every))
-    count, length = len(some.delay), some.length + some.before
+    count, length = len(scattered.delay), scattered.length + scattered.before
     loss = length * float(plan.absorption(np.array([arrivals.centre]))[0])
     nothing = {
         n: np.zeros((count, *v.shape[1:]), v.dtype) for n, v in vars(arrivals).items() if isinstance(v, np.ndarray)
     }
-    known = {
-        "delay": some.delay,
-        "direction": some.direction,
-        "radius": some.length,
+    known: dict[str, Any] = {
+        "delay": scattered.delay,
+        "direction": scattered.direction,
+        "radius": scattered.length,
         "length": length,
-        "amplitude": np.sqrt(every) * some.gain * 10.0 ** (-loss / 20.0),
+        "amplitude": scattered.gain * 10.0 ** (-loss / 20.0),
         "absorption": loss,
-        "phase": some.phase,
-        "delay_std": some.delay_std,
+        "phase": scattered.phase,
+        "delay_std": scattered.delay_std,
         "kind": np.full(count, Kind.REVERBERATION, np.int8),
-        "snap": some.emission,
+        "snap": scattered.emission,
         "target": np.full(count, NO_TARGET),
         "facet": np.full(count, NO_TARGET),
     }

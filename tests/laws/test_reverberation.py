@@ -18,7 +18,6 @@ from sonarsynth.frontiers.signal_knobs import speckle_points
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Still, Waypoint, Waypoints, pose
 from sonarsynth.pipeline import render, synthesise, trace_at
-from sonarsynth.pipeline.frame_reverberation import scattered_paths
 from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.planning import Plan, arrivals_of, frame_start, plan
 from sonarsynth.planning.measured.reverberation_levels import frame_scatterers, sent_energy
@@ -263,13 +262,9 @@ def test_many_scatterers_make_gaussian_noise_and_few_the_law() -> None:
         assert (power**2).mean() / power.mean() ** 2 == pytest.approx(2.0 + SINC / per_pulse, rel=0.02)
 
 
-@pytest.mark.parametrize(("most", "explained"), [(10**6, 0.98), (1000, 0.9)])
-def test_points_that_scatterers_make_say_so_and_those_of_targets_stay(
-    most: int, explained: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where nothing else is heard every point is of reverberation, if all scatterers are asked, and 9 in 10 if some
-    are; a target in the midst of it keeps what is its own."""
-    monkeypatch.setitem(scattered_paths.__globals__, "MOST_PATHS", most)
+def test_points_that_scatterers_make_say_so_and_those_of_targets_stay() -> None:
+    """Where nothing else is heard every point is of reverberation; a target in the midst of it keeps what is its own.
+    Of one scatterer in five for all, a tenth of the points had none."""
     array = PlanarLattice(columns=12, rows=10, pitch=0.05)
     base = remus(2, array=array, beams=BeamGrid(elevation_span=np.deg2rad(60), azimuth_span=np.deg2rad(60)))
     base = replace(base, accuracy=replace(base.accuracy, speckle=0.2))
@@ -282,8 +277,8 @@ def test_points_that_scatterers_make_say_so_and_those_of_targets_stay(
     alone, beside = labels
     origin = ORIGINS.index("reverberation")
     assert alone.sizes["point"] > 20
-    assert (alone.origin == origin).mean() > explained
-    assert (alone.emission == 0).mean() > explained
+    assert (alone.origin == origin).mean() > 0.98
+    assert (alone.emission == 0).mean() > 0.98
     assert (alone.target == -1).all()
     echo = beside.isel(point=np.flatnonzero(beside.target == 0))
     assert echo.sizes["point"] > 0
