@@ -40,8 +40,8 @@ EDGE = 0.1
 """Share of the band, at either end, within which a pulse may end and be tapered over all of the band: by 0.1 there."""
 FLAT = 0.75
 """Share of the window about a pulse in which that is whole, as `pulse_times.align` cuts."""
-RESIDUE = 1e-6
-"""Of the loudest pressure: what single precision and the cut tail of a pulse (1e-7 of its peak) may leave anywhere."""
+RESIDUE = 1e-7
+"""Of the loudest pressure: what the tail of the direct pulse may still be in the echo window, as synthesis cuts it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,22 +109,20 @@ class Profiles:
         return max(round(0.7 * self.resolution / self.step), 1)
 
 
-def over_threshold(image: EnergyImage, threshold: float, loudest: float = 0.0) -> npt.NDArray[np.bool_]:
-    """The beams (elevation, azimuth) within `threshold` dB of the loudest; none in silence or where none was heard.
-
-    loudest: largest pressure (Pa) in the signals.
-    """
-    energy = np.where(np.isfinite(image.energy), image.energy, 0.0)
+def over_threshold(received: ReceivedWindow, threshold: float) -> npt.NDArray[np.bool_]:
+    """The beams (elevation, azimuth) within `threshold` dB of the loudest; none in silence or where none was heard."""
+    energy = np.where(np.isfinite(received.image.energy), received.image.energy, 0.0)
     peak = float(energy.max(initial=0.0))
-    if not peak > residue(image, loudest):
+    if not peak > residue(received):
         return np.zeros(energy.shape, bool)
     return np.asarray(energy >= peak * 10 ** (-threshold / 10))
 
 
-def residue(image: EnergyImage, loudest: float) -> float:
-    """Energy (Pa2 s) of `RESIDUE` of the loudest pressure (Pa) all through the window: what rounding and the tail of
-    the direct pulse leave in a beam, no echo."""
-    return float((RESIDUE * loudest) ** 2 * (image.stop - image.start))
+def residue(received: ReceivedWindow) -> float:
+    """Energy (Pa2 s) of `RESIDUE` of the loudest pressure for as long as the direct pulse lasts, as the band lets it:
+    what that leaves in a beam, no echo. Single precision leaves less, for echoes are summed apart from it."""
+    lasts = 2.0 * (received.pulse + 1.0 / (received.sonar.band.high - received.sonar.band.low))
+    return (RESIDUE * received.loudest) ** 2 * lasts
 
 
 def loudest_beams(image: EnergyImage, chosen: npt.NDArray[np.bool_]) -> tuple[tuple[Ints, Ints], int]:

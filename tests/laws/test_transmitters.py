@@ -20,6 +20,7 @@ from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.triggered import Triggered
 from sonarsynth.receiver import Band, BandPass, BeamGrid, PlanarLattice, elements
 from sonarsynth.recipe import Recipe
+from sonarsynth.scattering import Isotropic
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.sources.snap_models import Gabor
 from sonarsynth.sources.transmitter import Sweep, TransmitBeam, Transmitter
@@ -216,6 +217,18 @@ def test_points_out_of_focus_err_as_they_say(below: float) -> None:
         for name, true in {"range": cloud["true_range"], "elevation": 0.0, "azimuth": 0.0}.items():
             assert (np.abs(cloud[name] - true) < 3.0 * cloud[f"{name}_error"]).all(), name
     assert float(cloud["range_error"][0]) < 5e-3 and float(cloud["elevation_error"][0]) < 0.3
+
+
+@pytest.mark.parametrize(("strength", "away"), [(1e-6, 20.0), (1e-12, 2.5)])
+def test_a_faint_echo_is_a_point_and_what_the_ping_leaves_is_none(strength: float, away: float) -> None:
+    """113 dB under the direct sound, where 102 were the end; and what is left of that once it is taken out."""
+    own = scene(Transmitter(position=AT, pulse=SWEEP, source_level=190.0), target=(away, 0.0, -50.0)).scene
+    made = replace(own, physics=replace(own.physics, scattering=Isotropic(strength=strength)))
+    cloud = render(plan(Recipe(scene=made), ["cloud"]), 0)["cloud"]
+    if strength < 1e-9:
+        assert int(cloud["count"]) == 0
+    else:
+        assert int(cloud["count"]) == 1 and abs(float(cloud["range"][0]) - away) < 2e-3
 
 
 def test_the_card_of_a_dataset_says_what_lights_it(tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def axis_echoes(
 ) -> PickedEchoes:
     """The loudest echo of each beam within `threshold` dB of the loudest beam, on its axis; `change`: of what is
     picked, before it is taken."""
-    beams, left_out = loudest_beams(window.image, over_threshold(window.image, threshold, window.loudest))
+    beams, left_out = loudest_beams(window.image, over_threshold(window, threshold))
     if not len(beams[0]):
         return no_echoes(window.image, left_out)
     profiles = range_profiles(window, beams)

@@ -63,7 +63,7 @@ def peak_echoes(
 ) -> PickedEchoes:
     """The peaks of the beams about those over threshold that are echoes, see `Peaks`."""
     image = window.image
-    over = over_threshold(image, threshold, window.loudest)
+    over = over_threshold(window, threshold)
     wide = maximum_filter(over, 2 * BESIDE + 1, mode="constant") & np.isfinite(image.energy)
     beams, left_out = loudest_beams(image, wide)
     if not len(beams[0]):
@@ -78,7 +78,7 @@ def peak_echoes(
     top_offset, gain = _tops(power, index, beams, axes.resolved, b, t)
     height = power[b, t] * gain**2
     energy = _energies(window, profiles, axes, b, height)
-    keep = (height >= least[b]) & (energy > residue(image, window.loudest))
+    keep = (height >= least[b]) & (energy > residue(window))
     keep[keep] = _own(window, profiles, b[keep], t[keep], height[keep], noise[b[keep]])
     if not axes.resolved[:2].all():
         keep[keep] = _once(window, profiles, axes, b[keep], t[keep], height[keep])
