@@ -9,7 +9,7 @@ from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.products import Signals
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Sonar, elements
-from tests.axial import axial_energies
+from tests.lattice import lattice_energies
 
 SPEED = 1540.0
 RATE = 196e3
@@ -46,5 +46,5 @@ def test_whole_turns_between_neighbours():
     parts = elements(PlanarLattice(columns=40, rows=40, pitch=0.1))
     grid = BeamGrid(azimuths=3, azimuth_span=np.pi - 1e-12, elevations=1)
     ones = np.ones((1600, 1), np.complex64)
-    energy = axial_energies(ones, parts, parts.gain / 1600, np.array([15400.0]), grid, SPEED, None)
+    energy = lattice_energies(ones, parts, parts.gain / 1600, np.array([15400.0]), grid, SPEED, None)
     np.testing.assert_allclose(energy, 1.0, rtol=1e-6)

@@ -11,7 +11,7 @@ from sonarsynth.conventions import direction
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
-from tests.axial import axial_energies
+from tests.lattice import lattice_energies
 
 SPEED = 1540.0
 RATE = 196e3
@@ -150,7 +150,7 @@ def test_beam_of_the_508_elements_is_as_wide_as_published():
     azimuth = grid.azimuth
     for frequency, width in [(25e3, 2.88), (50e3, 1.44), (85e3, 0.85)]:
         still = np.ones((508, 1), np.complex64)
-        beams = axial_energies(still, array, array.gain / 508, np.array([frequency]), grid, SPEED, None)[0]
+        beams = lattice_energies(still, array, array.gain / 508, np.array([frequency]), grid, SPEED, None)[0]
         half = azimuth[beams >= 0.5 * beams.max()]
         assert np.rad2deg(half[-1] - half[0]) == pytest.approx(width, abs=0.02)
 
@@ -161,7 +161,7 @@ def test_first_grating_lobe_lies_a_wavelength_per_pitch_off_the_axis():
     grid = BeamGrid(azimuths=2001, azimuth_span=np.deg2rad(50.0), elevations=1)
     azimuth = grid.azimuth
     still = np.ones((508, 1), np.complex64)
-    beams = axial_energies(still, array, array.gain / 508, np.array([85e3]), grid, SPEED, None)[0]
+    beams = lattice_energies(still, array, array.gain / 508, np.array([85e3]), grid, SPEED, None)[0]
     side = azimuth > np.deg2rad(5.0)
     lobe = azimuth[side][np.argmax(beams[side])]
     assert lobe == pytest.approx(np.arcsin(SPEED / 85e3 / 0.04953), abs=np.deg2rad(0.03))

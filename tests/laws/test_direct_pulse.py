@@ -35,7 +35,7 @@ CLOCK = 6.0 / C
 LENGTH = 1e-3
 START = CLOCK - 2.2e-3
 TARGET = 8.0 * direction(0.1, 0.05)
-IMAGE = FocusedDelayAndSum(focus=None, subarrays="axis")
+IMAGE = FocusedDelayAndSum(focus=None)
 
 
 def direct(lag=0.0, gain=1.0, noise=0.0):

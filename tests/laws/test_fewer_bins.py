@@ -17,7 +17,7 @@ from tests.heard import RATE, pulse_spectrum
 
 ARRAY, SONAR = elements(Romanis()), Sonar(array=Romanis())
 WINDOW = (0.5e-3, 6.0e-3)
-FEW, ALL = (FocusedDelayAndSum(focus=None, subarrays="axis", bins=bins) for bins in ("few", "all"))
+FEW, ALL = (FocusedDelayAndSum(focus=None, bins=bins) for bins in ("few", "all"))
 
 
 def echoes(seed, noise=0.0):

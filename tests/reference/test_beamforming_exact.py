@@ -12,9 +12,9 @@ from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.beams import beam_spectra
 from sonarsynth.equations.arrays.gates import fast_length, frequency_spacing, gate_samples, gate_taper, gated_spectra
+from sonarsynth.imaging.delay_and_sum.lattice_beams import LatticeBeams
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, elements
-from tests.axial import axial_energies
-from tests.dense import dense_energies
+from tests.lattice import lattice_energies, stated_energies
 
 SPEED = 1540.0
 
@@ -25,15 +25,12 @@ def random_spectra(sensors, bins, seed=0):
 
 
 def energies(array, grid, spectra, focus, low=25e3, spacing=250.0, weight=None, speed=SPEED):
-    """Energies (elevation, azimuth) from the kernel and from the same delays summed in float64."""
+    """Energies (elevation, azimuth) from the kernel and from the delays that it states, summed in float64."""
     parts = elements(array)
     weight = parts.gain if weight is None else weight
     frequencies = low + spacing * np.arange(spectra.shape[1])
-    fast = axial_energies(spectra, parts, weight, frequencies, grid, speed, focus)
-    beams = direction(grid.azimuth, grid.elevation[:, None]).reshape(-1, 3)
-    on_axis = focus_delay(parts.position, np.array([1.0, 0.0, 0.0]), focus, speed)
-    delay = on_axis + focus_delay(parts.position, beams, None, speed)
-    return fast, dense_energies(spectra, delay, weight, frequencies).reshape(fast.shape)
+    fast = lattice_energies(spectra, parts, weight, frequencies, grid, speed, focus)
+    return fast, stated_energies(spectra, parts, weight, frequencies, grid, speed, focus)
 
 
 def both(array, grid, bins, focus, **more):
@@ -78,24 +75,21 @@ def test_same_bits_whoever_asks():
     array, grid = elements(Romanis()), BeamGrid(azimuths=6, elevations=5)
     spectra = random_spectra(508, 100)
     frequencies = 25e3 + 250.0 * np.arange(100)
-    first, again = (axial_energies(spectra, array, array.gain, frequencies, grid, SPEED, 20.0) for _ in range(2))
+    first, again = (lattice_energies(spectra, array, array.gain, frequencies, grid, SPEED, 20.0) for _ in range(2))
     np.testing.assert_array_equal(first, again)
-    part = axial_energies(spectra[:, :64], array, array.gain, frequencies[:64], grid, SPEED, 20.0)
-    rest = axial_energies(spectra[:, 64:], array, array.gain, frequencies[64:], grid, SPEED, 20.0)
+    part = lattice_energies(spectra[:, :64], array, array.gain, frequencies[:64], grid, SPEED, 20.0)
+    rest = lattice_energies(spectra[:, 64:], array, array.gain, frequencies[64:], grid, SPEED, 20.0)
     np.testing.assert_array_equal(part + rest, first)
 
 
 @pytest.mark.parametrize(("radius", "loss"), [(50.0, 0.02), (20.0, 0.16), (10.0, 0.62), (5.0, 2.23)])
-def test_loss_of_the_separable_focus_in_the_corner(radius, loss):
+def test_loss_of_the_focus_of_the_axis_in_the_corner(radius, loss):
     """Flat spectrum from 25 to 85 kHz, source at (25, 25) deg at the focus: dB lost in its own beam."""
-    array = elements(Romanis())
-    grid = BeamGrid(azimuths=2, azimuth_span=np.deg2rad(50), elevations=2, elevation_span=np.deg2rad(50))
-    corner = grid.azimuth
-    frequencies = 25e3 + 1e3 * np.arange(61)
-    arrival = focus_delay(array.position, direction(corner[1], corner[1]), radius, SPEED)
+    array, corner, frequencies = elements(Romanis()), direction(*np.deg2rad([25.0, 25.0])), 25e3 + 1e3 * np.arange(61)
+    arrival = focus_delay(array.position, corner, radius, SPEED)
     spectra = np.exp(-2j * np.pi * frequencies * arrival[:, None]).astype(np.complex64)
-    energy = axial_energies(spectra, array, array.gain / 508, frequencies, grid, SPEED, radius)[1, 1] / 61
-    assert -10 * np.log10(energy) == pytest.approx(loss, abs=0.02)
+    beam = LatticeBeams(spectra, frequencies, array, array.gain / 508, SPEED, radius)(corner[None])
+    assert -10 * np.log10(np.sum(np.abs(beam) ** 2) / 61) == pytest.approx(loss, abs=0.02)
 
 
 def test_beam_spectra_equal_direct_sums_for_any_array():

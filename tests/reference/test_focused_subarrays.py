@@ -9,16 +9,14 @@ from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging import AutoBeamforming, DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.imaging.delay_and_sum.focus_error import focus_error, subarrays_for
-from sonarsynth.imaging.delay_and_sum.lattice_image import lattice_image, steered_zones
-from sonarsynth.imaging.delay_and_sum.zones import cuts, for_sensors, lens, quadrant, zones_of
+from sonarsynth.imaging.delay_and_sum.zones import cuts
 from sonarsynth.products import Signals
-from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
-from tests.dense import dense_energies
+from sonarsynth.receiver import BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
+from tests.lattice import lattice_energies, stated_delays, stated_energies
 
 SPEED = 1540.0
-BAND = Band(low=25e3, high=85e3)
 ROMANIS = Romanis(dead=(3, 200, 201, 202))
-RECTANGLE = PlanarLattice(columns=20, rows=8, pitch=0.04)
+RECTANGLE, LONG = PlanarLattice(columns=20, rows=8, pitch=0.04), PlanarLattice(columns=96, rows=1, pitch=0.04)
 
 
 def uniform(array):
@@ -32,30 +30,6 @@ def grid(span, count):
         elevation_span=np.deg2rad(0.8 * span),
         elevations=count - 6,
     )
-
-
-def image(array, beams, focus, cut, spectra, frequencies):
-    zones = steered_zones(array, "uniform", beams, focus, SPEED, BAND, cut)
-    return lattice_image(spectra, array, uniform(array), frequencies, beams, zones)
-
-
-def applied(array, beams, focus, cut):
-    """Delays (elevation, azimuth, sensor) that each beam takes by the zones' own account, one beam at a time."""
-    glass = lens(array, focus, SPEED, cut)
-    delay = np.full((beams.elevations, beams.azimuths, array.count), np.nan)
-    for zone in zones_of(glass, for_sensors(array, uniform(array), BAND), beams, cut):
-        for row in range(len(quadrant(beams))):
-            for column in range(zone.near, zone.far):
-                u = quadrant(beams)[row, column]
-                for up in (-1, 1):
-                    for port in (-1, 1):
-                        i = beams.elevations // 2 + row if up > 0 else (beams.elevations - 1) // 2 - row
-                        j = beams.azimuths // 2 + column if port > 0 else (beams.azimuths - 1) // 2 - column
-                        y, z = port * array.position[:, 1], up * array.position[:, 2]
-                        left_out = zone.left_out(glass, y, z, u[None])[0]
-                        towards = direction(beams.azimuth[j], beams.elevation[i])
-                        delay[i, j] = focus_delay(array.position, towards, focus, SPEED) - left_out
-    return delay
 
 
 @pytest.mark.parametrize("cut", [(1, 1), (2, 2), (3, 1), (2, 4)])
@@ -73,40 +47,37 @@ def test_kernel_equals_sums_with_the_delays_that_the_zones_state(array, beams, c
     random = np.random.default_rng(sum(cut))
     spectra = random.normal(size=(array.count, 70)) + 1j * random.normal(size=(array.count, 70))
     frequencies = 25e3 + 800.0 * np.arange(70)
-    fast = image(array, beams, 4.0, cut, spectra.astype(np.complex64), frequencies)
-    delay = applied(array, beams, 4.0, cut).reshape(-1, array.count)
-    exact = dense_energies(spectra, delay, uniform(array), frequencies).reshape(fast.shape)
+    fast = lattice_energies(spectra.astype(np.complex64), array, uniform(array), frequencies, beams, SPEED, 4.0, cut)
+    exact = stated_energies(spectra, array, uniform(array), frequencies, beams, SPEED, 4.0, cut)
     np.testing.assert_allclose(fast, exact, atol=2e-6 * exact.max())
 
 
 def test_subarrays_of_one_hydrophone_leave_nothing_out():
     """Then every beam has the delays of a sphere to each: the image is that of the exact sum."""
     array, beams = elements(PlanarLattice(columns=5, rows=3, pitch=0.2)), grid(50, 13)
-    np.testing.assert_allclose(
-        applied(array, beams, 2.0, (5, 3)),
-        focus_delay(array.position, direction(beams.azimuth, beams.elevation[:, None]).reshape(-1, 3), 2.0, SPEED)
-        .reshape(beams.elevations, beams.azimuths, -1),
-        atol=1e-12,
-    )  # fmt: skip
+    every = focus_delay(array.position, direction(beams.azimuth, beams.elevation[:, None]).reshape(-1, 3), 2.0, SPEED)
+    every = every.reshape(beams.elevations, beams.azimuths, -1)
+    for where, delay in stated_delays(array, beams, SPEED, 2.0, (5, 3)):
+        np.testing.assert_allclose(delay, every[where], atol=1e-12)
 
 
 def test_error_falls_with_subarrays_and_with_distance():
     array, sonar = elements(ROMANIS), Sonar(array=ROMANIS, beams=grid(50, 31))
-    by_cut = [focus_error(array, "uniform", sonar, 10.0, cut) for cut in cuts(array, 10.0)[:6]]
+    by_cut = [focus_error(array, "uniform", sonar, 10.0, cut) for cut in ((1, 1), (2, 2), (4, 4), (8, 8))]
     by_focus = [focus_error(array, "uniform", sonar, focus, (2, 2)) for focus in (2.0, 5.0, 10.0, 20.0, 50.0)]
     assert all(np.diff(by_cut) < 0)
     assert all(np.diff(by_focus) < 0)
-    assert focus_error(array, "uniform", sonar, None, "axis") < 1e-4
+    assert focus_error(array, "uniform", sonar, None, (1, 1)) < 1e-4
 
 
 def test_as_many_subarrays_as_are_needed_and_no_more():
     array, sonar = elements(RECTANGLE), Sonar(array=RECTANGLE, beams=grid(50, 31))
     tried, few = cuts(array, 5.0), subarrays_for(array, "uniform", sonar, 5.0)
-    assert few not in (None, "axis")
+    assert few not in (None, (1, 1))
     errors = [focus_error(array, "uniform", sonar, 5.0, cut) for cut in (few, tried[tried.index(few) - 1])]
     assert errors[0] <= 0.1 < errors[1]
-    assert subarrays_for(array, "uniform", sonar, 1e4) == "axis"
-    assert subarrays_for(array, "uniform", sonar, 0.1) is None
+    assert subarrays_for(array, "uniform", sonar, 1e4) == (1, 1)
+    assert subarrays_for(elements(LONG), "uniform", Sonar(array=LONG, beams=grid(50, 31)), 0.5) is None
 
 
 def heard(array, source, rate=196e3):
@@ -116,7 +87,7 @@ def heard(array, source, rate=196e3):
     return Signals(pressure.astype(np.float32), 0.0, rate, 0.0, 0, 0)
 
 
-def test_auto_is_right_to_a_tenth_of_a_decibel_where_the_axis_is_not():
+def test_auto_is_right_to_a_tenth_of_a_decibel_where_one_subarray_is_not():
     sonar = Sonar(array=RECTANGLE, beams=grid(50, 31))
     array = elements(RECTANGLE)
     signals = heard(array, 5.0 * direction(sonar.beams.azimuth[30], sonar.beams.elevation[24]))
@@ -127,19 +98,20 @@ def test_auto_is_right_to_a_tenth_of_a_decibel_where_the_axis_is_not():
     def error(method):
         return np.abs(10 * np.log10(method.image(signals, array, sonar, *window).energy / dense))[bright].max()
 
-    assert error(FocusedDelayAndSum(focus=5.0, subarrays="axis")) > 0.5
+    assert error(FocusedDelayAndSum(focus=5.0, subarrays=(1, 1))) > 0.2
     assert error(FocusedDelayAndSum(focus=5.0)) < 0.1
     assert error(AutoBeamforming(focus=5.0)) < 0.1
 
 
 def test_auto_is_dense_where_subarrays_will_not_do_and_focused_elsewhere():
     sonar, array = Sonar(array=RECTANGLE, beams=grid(50, 31)), elements(RECTANGLE)
-    assert AutoBeamforming(focus=None).chosen(array, sonar) == FocusedDelayAndSum(focus=None, subarrays="axis")
+    assert AutoBeamforming(focus=None).chosen(array, sonar) == FocusedDelayAndSum(focus=None, subarrays=(1, 1))
     near = AutoBeamforming(focus=5.0, shading="hann").chosen(array, sonar)
     assert isinstance(near, FocusedDelayAndSum)
     assert (near.shading, near.focus) == ("hann", 5.0)
     assert isinstance(near.subarrays, tuple)
-    assert AutoBeamforming(focus=0.1).chosen(array, sonar) == DenseDelayAndSum(focus=0.1)
+    long = Sonar(array=LONG, beams=sonar.beams)
+    assert AutoBeamforming(focus=0.5).chosen(elements(LONG), long) == DenseDelayAndSum(focus=0.5)
     table = elements(PositionTable(positions=((0.0, 0.0, 0.0), (0.0, 0.1, 0.03))))
     assert AutoBeamforming().chosen(table, sonar) == DenseDelayAndSum()
 

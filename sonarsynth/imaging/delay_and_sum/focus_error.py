@@ -31,7 +31,7 @@ def focus_error(elements: Elements, shading: Shading, sonar: Sonar, focus: float
     picture, in the middles of its edges and half-way there. subarrays as for `FocusedDelayAndSum`.
     """
     weight, beams, speed = weights(elements, shading), sonar.beams, sonar.assumed_sound_speed
-    zones = steered_zones(elements, shading, beams, focus, speed, sonar.band, subarrays)
+    zones = steered_zones(elements, beams, focus, speed, subarrays)
     frequency = np.linspace(sonar.band.low, sonar.band.high, BINS)
     u = direction(beams.azimuth, beams.elevation[:, None])
     rows, columns = (n // 2 + np.array([0, (n - n // 2) // 2, n - 1 - n // 2]) for n in u.shape[:2])
@@ -51,7 +51,5 @@ def focus_error(elements: Elements, shading: Shading, sonar: Sonar, focus: float
 @lru_cache(maxsize=64)
 def subarrays_for(elements: Elements, shading: Shading, sonar: Sonar, focus: float | None) -> Subarrays | None:
     """The fewest subarrays whose `focus_error` is allowed, None if all are too few; kept from frame to frame."""
-    if focus is None:
-        return "axis"
     ways = cuts(elements, focus)
     return next((cut for cut in ways if focus_error(elements, shading, sonar, focus, cut) <= ALLOWED), None)

@@ -32,30 +32,20 @@ Count = Annotated[int, Ge(1), Le(16)]
 class FocusedDelayAndSum(Steering):
     """Delay and sum on a lattice; masks, dead elements and weights are free.
 
-    With the delays of the acoustic axis in every direction (`subarrays: axis`), which off the axis are not quite those
-    of a sphere, a source at the focus loses (1.3 m array of 508 elements, flat spectrum from 25 to 85 kHz)
-
-        azimuth, elevation     50 m     20 m     10 m      5 m
-        12.5, 12.5 deg         0.00     0.01     0.05     0.25 dB
-        25, 0 deg              0.01     0.05     0.19     0.78 dB
-        25, 25 deg             0.02     0.16     0.62     2.23 dB
-
-    against 0.3, 1.5 to 1.8, 5 to 6 and 14 dB for plane waves. Rounding: 2e-7 of the brightest beam (241 bins; 1e-6
-    for 20 bins, 6e-6 for 300 elements in a row).
-
-    Cut into subarrays, each with the delays of a sphere about its own middle (`zones.Lens`), it errs by less and takes
-    longer. Same array and band, 50 by 50 degrees, 101 by 101 beams, 241 bins: time, and the largest error (dB) within
-    20 dB of the peak of a source at the focus (`focus_error`),
+    Each half of the picture has the delays of a sphere in its middle, and from there to each beam what of them is
+    separable (`zones`). Cut into subarrays, each with delays of its own, the array errs by less and takes longer. 1.3 m
+    array of 508 elements, 25 to 85 kHz, 50 by 50 degrees, 101 by 101 beams, 241 bins: time (10 ms for [1, 1]), and the
+    largest error (dB) within 20 dB of the peak of a source at the focus (`focus_error`),
 
         subarrays    time     50 m     20 m     10 m      5 m      2 m
-             axis     1.0     0.10     0.87     3.23     8.03    14.05
-           [1, 1]     1.9     0.04     0.25     1.35     3.95     8.48
-           [2, 2]     5.2     0.03     0.16     0.58     2.39     5.80
-           [3, 3]     8.0     0.01     0.03     0.07     0.32     3.65
-           [4, 4]      12     0.02     0.05     0.08     0.21     2.34
-           [6, 6]      22     0.00     0.01     0.04     0.12     0.56
+           [1, 1]     1.0     0.04     0.25     0.86     3.03     8.09
+           [2, 2]     2.6     0.01     0.08     0.29     0.74     3.59
+           [3, 3]     3.2     0.01     0.02     0.06     0.21     1.09
+           [4, 4]     5.8     0.01     0.03     0.05     0.16     0.75
+           [6, 6]      10     0.00     0.01     0.02     0.08     0.43
 
-    What is left out falls as the square of a subarray: 64 by 64 hydrophones 5 cm apart err by 1.0 dB at 20 m in [4, 4].
+    Rounding: 2e-7 of the brightest beam (241 bins; 1e-6 for 20 bins, 6e-6 for 300 elements in a row). What is left out
+    falls as the square of a subarray: 64 by 64 hydrophones 5 cm apart err by 0.5 dB at 20 m in [4, 4].
     Several echoes that interfere can be further wrong where they cancel.
     """
 
@@ -64,10 +54,9 @@ class FocusedDelayAndSum(Steering):
     """Range at which the array is focused; left out (none), plane waves."""
     shading: Shading = "uniform"
     """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
-    subarrays: tuple[Count, Count] | Literal["axis", "auto"] = "auto"
-    """Subarrays across and up that the array is cut into, each focused for every beam; `axis`: none, the delay of the
-    acoustic axis in all directions. Auto: in a plan, the fewest whose measured error is allowed; elsewhere, the fewest
-    whose `focus_error` is under 0.1 dB, or 16 each way."""
+    subarrays: tuple[Count, Count] | Literal["auto"] = "auto"
+    """Subarrays across and up that the array is cut into, each focused for every beam. Auto: in a plan, the fewest
+    whose measured error is allowed; elsewhere, the fewest whose `focus_error` is under 0.1 dB, or 16 each way."""
     bins: Literal["few", "all", "auto"] = "auto"
     """Frequencies of the window that energies are summed over: as few as its sound needs, which is shorter (0.01 dB),
     or all. Auto: few in a plan, by the error that it measures; else all."""
@@ -92,10 +81,9 @@ class FocusedDelayAndSum(Steering):
         return DenseDelayAndSum(focus=self.focus, shading=self.shading)
 
     def cost(self, size: FrameSize) -> float:
-        """As `Method.cost`, of all bins: in units of an image with the delays of the axis."""
-        across, up = self.subarrays if isinstance(self.subarrays, tuple) else (0, 0)
-        images = 1.0 + across if across * up < 2 else 2.0 + across + up
-        return 1.8e-9 * images * size.beams * size.bins
+        """As `Method.cost`, of all bins."""
+        across, up = self.subarrays if isinstance(self.subarrays, tuple) else (1, 1)
+        return 2.4e-9 * (across + up) * size.beams * size.bins
 
     def row(self) -> str:
         """Its kind, and the subarrays where there are some."""
@@ -114,12 +102,10 @@ class FocusedDelayAndSum(Steering):
             widest = sin(0.5 * max(grid.azimuth_span, grid.elevation_span))
             snapshots = fewer_bins(snapshots, widest * elements.aperture / speed)
         spectra, frequency = snapshots.spectra, snapshots.frequency
-        cut = steered_zones(elements, self.shading, grid, self.focus, speed, sonar.band, self._cut(elements, sonar))
-        return snapshots.unit * lattice_image(spectra, elements, weight, frequency, grid, cut)
+        zones = steered_zones(elements, grid, self.focus, speed, self._cut(elements, sonar))
+        return snapshots.unit * lattice_image(spectra, elements, weight, frequency, grid, zones)
 
     def _cut(self, elements: Elements, sonar: Sonar) -> Subarrays:
-        if self.focus is None:
-            return "axis"
         if self.subarrays != "auto":
             return self.subarrays
         return subarrays_for(elements, self.shading, sonar, self.focus) or cuts(elements, self.focus)[-1]

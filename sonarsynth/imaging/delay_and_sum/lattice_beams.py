@@ -22,8 +22,9 @@ class LatticeBeams:
     """Spectra of beams of elements on a lattice, as `beams.beam_spectra` has them, focused in every direction as on the
     axis; several times as fast. The elements are focused once, when the first beam is asked for.
 
-    The delay of focusing is (sqrt(R^2 + q^2) - R)/c: off the axis that is not quite a sphere (`FocusedDelayAndSum` has
-    a table). Beams of one elevation share the sums over rows. Float32 sums: error 1e-6 of the largest |B| (508
+    The delay of focusing is (sqrt(R^2 + q^2) - R)/c: off the axis that is not quite a sphere. A source at the focus, 25
+    degrees to the side and up, loses 0.16 dB at 20 m, 0.6 at 10 m and 2.2 at 5 m (1.3 m array, 25 to 85 kHz). Beams of
+    one elevation share the sums over rows. Float32 sums: error 1e-6 of the largest |B| (508
     elements), 3e-6 for 64 in a row, 1.3e-5 for 300.
     """
 

@@ -11,9 +11,8 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.arrays.beams import first_and_spacing
 from sonarsynth.equations.arrays.lattices import half_coordinates, mirrored_sensors, rows_in_use
-from sonarsynth.imaging.delay_and_sum.zones import Lens, Subarrays, Zone, for_sensors, lens, quadrant, zones_of
-from sonarsynth.imaging.image_window import Shading, weights
-from sonarsynth.receiver import Band, BeamGrid, Elements
+from sonarsynth.imaging.delay_and_sum.zones import Lens, Subarrays, Zone, lens, quadrant, zones_of
+from sonarsynth.receiver import BeamGrid, Elements
 
 
 def check_lattice(elements: Elements) -> None:
@@ -30,7 +29,7 @@ class SteeredZone:
 
     columns: slice  # of the image: those to port that are in the zone
     odd: tuple[bool, bool]  # whether a subarray has an odd number of rows, and of columns
-    places: Ints  # (set, subarray, half column, half row, 4) sensors
+    places: Ints  # (mirror, subarray, half column, half row, 4) sensors
     heights: Ints  # (subarray, half column) rows in use
     delay: Floats  # (subarray, half column, half row, 4) s
     rise: Floats  # (row, subarray, side of y, half column) s
@@ -40,23 +39,17 @@ class SteeredZone:
 
 def steered(zone: Zone, elements: Elements, beams: BeamGrid, glass: Lens) -> SteeredZone:
     """The delays and the steps of a zone on a lattice."""
-    columns = slice(beams.azimuths // 2 + zone.near, beams.azimuths // 2 + zone.far)
+    middle_column = beams.azimuths // 2
+    columns = slice(middle_column + zone.columns.start, middle_column + zone.columns.stop)
     half = 0.5 * elements.pitch
     y, z = (half_coordinates(count, elements.pitch) for count in (glass.subarray_columns, glass.subarray_rows))
     odd = glass.subarray_rows % 2 == 1, glass.subarray_columns % 2 == 1
     places, heights = _fold(elements, glass)
-    if zone.shared:
-        places = np.stack([places[0], places[0][..., [1, 0, 3, 2]]])  # the middle column is at +y alone
-        up, port = zone.sines(glass, beams.elevation[beams.elevations // 2 :], beams.azimuth[columns])
-        delay = np.repeat(glass.even(y[:, None], z, zone.centre)[None, ..., None], 4, axis=-1)
-        across = (half / glass.sound_speed) * np.sqrt(1.0 - up * up)[:, None] * port
-        rise = np.repeat((half / glass.sound_speed) * up[:, None, None, None], len(y), axis=-1)
-        return SteeredZone(columns, odd, places, heights, delay, rise, across[None], np.zeros((1, *across.shape)))
     middle_z, middle_y = (m.ravel()[:, None, None] for m in np.meshgrid(*_middles(glass), indexing="ij"))
     delay = np.stack(
         [glass.bulge(middle_y + b * y[:, None], middle_z + a * z, zone.centre) for a in (1, -1) for b in (1, -1)], -1
     )
-    u = quadrant(beams)[:, zone.near : zone.far]
+    u = quadrant(beams)[:, zone.columns]
     level = np.stack(np.broadcast_arrays(zone.centre[0], u[:, 0, 1]), axis=-1)[:, None, None, None, :]
     rise = glass.slope_along_z(middle_y + np.stack([y, -y]), middle_z, level, zone.centre)
     rise = level[..., 1] / glass.sound_speed - rise
@@ -92,9 +85,8 @@ def _fold(elements: Elements, glass: Lens) -> tuple[Ints, Ints]:
 
 @lru_cache(maxsize=16)
 def steered_zones(
-    elements: Elements, shading: Shading, beams: BeamGrid, focus: float | None, sound_speed: float, band: Band,
-    subarrays: Subarrays,
-) -> tuple[SteeredZone, ...]:  # fmt: skip
+    elements: Elements, beams: BeamGrid, focus: float | None, sound_speed: float, subarrays: Subarrays
+) -> tuple[SteeredZone, ...]:
     """The zones of a beam grid for an array cut into subarrays, ready for `lattice_image`; kept from frame to
     frame. Focus in m, None for plane waves.
 
@@ -102,8 +94,7 @@ def steered_zones(
     """
     check_lattice(elements)
     glass = lens(elements, focus, sound_speed, subarrays)
-    cut = zones_of(glass, for_sensors(elements, weights(elements, shading), band), beams, subarrays)
-    return tuple(steered(zone, elements, beams, glass) for zone in cut)
+    return tuple(steered(zone, elements, beams, glass) for zone in zones_of(beams))
 
 
 def lattice_image(
@@ -121,11 +112,15 @@ def lattice_image(
     padded = padded_bins(spectra, elements.count + 1, LANES)
     pairs, bins = padded.view(np.float32).ravel(), padded.shape[1]
     live = np.append(weight, 0.0).astype(np.float32)
-    image = np.empty((beams.elevations, beams.azimuths))
+    image = np.zeros((beams.elevations, beams.azimuths))
     for zone in zones:
         sensors, steps = (zone.places, live, zone.delay, zone.heights, *zone.odd), (zone.rise, zone.across, zone.middle)
         energy = np.asarray(lattice_energies(pairs, bins, *sensors, *steps, *first_and_spacing(frequencies)))
-        # From the far corner on: beams on an axis are their own mirror images, and are taken from the zone itself.
-        for mirror, seen in ((3, image[::-1, ::-1]), (2, image[::-1]), (1, image[:, ::-1]), (0, image)):
-            seen[beams.elevations // 2 :, zone.columns] = energy[mirror]
+        for mirror, seen in enumerate((image, image[:, ::-1], image[::-1], image[::-1, ::-1])):
+            seen[beams.elevations // 2 :, zone.columns] += energy[mirror]
+    # beams on an axis are their own mirror images: the mean of both, so that images of what is mirrored are
+    if beams.elevations % 2:
+        image[beams.elevations // 2] *= 0.5
+    if beams.azimuths % 2:
+        image[:, beams.azimuths // 2] *= 0.5
     return image

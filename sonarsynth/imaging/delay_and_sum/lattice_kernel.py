@@ -14,7 +14,6 @@ from sonarsynth.imaging.delay_and_sum.lattice_sums import (
     focus,
     group_turns,
     groups_on,
-    lower,
     sums_over_rows,
     term_sums,
     upper,
@@ -62,30 +61,21 @@ def _add_beams(
 
 
 @compiled(forceinline=True)
-def _with_powers(powers: Any, sums: Any, shared: bool) -> Any:
-    """|B|^2 added, of both sets, and of the beam at -az where sums are shared."""
-    a, b, c, d = powers
-    x, y, p, q = upper(sums)
-    a, b = a + x * x + y * y, b + p * p + q * q
-    if shared:
-        x, y, p, q = lower(sums)
-        c, d = c + x * x + y * y, d + p * p + q * q
-    return a, b, c, d
+def _with_powers(powers: Any, x: Any, y: Any, p: Any, q: Any) -> Any:
+    """|B|^2 added, of both sets."""
+    return powers[0] + x * x + y * y, powers[1] + p * p + q * q
 
 
 @compiled(forceinline=True)
-def _put_powers(energy: Any, mirror: int, row: int, column: int, powers: Any, shared: bool) -> None:
+def _put_powers(energy: Any, mirror: int, row: int, column: int, powers: Any) -> None:
     energy[mirror, row, column] += total(powers[0])
     energy[mirror + 2, row, column] += total(powers[1])
-    if shared:
-        energy[1, row, column] += total(powers[2])
-        energy[3, row, column] += total(powers[3])
 
 
 @compiled(forceinline=True)
 def _add_powers(
     lines: Any, start: int, columns: int, odd: bool, across: Any, turns: Any, at: int, frequency: float, spacing: float,
-    groups: int, energy: Any, mirror: int, row: int, shared: bool,
+    groups: int, energy: Any, mirror: int, row: int,
 ) -> None:  # fmt: skip
     """Add |B|^2 of the beams of one elevation, of an array that is its only subarray: half steps from `at` on."""
     azimuths = energy.shape[2]
@@ -93,17 +83,16 @@ def _add_powers(
         j = min(i + 1, azimuths - 1)
         c, s = phasors(across[at + i], frequency, spacing)
         d, t = phasors(across[at + j], frequency, spacing)
-        zero = splat(ZERO)
-        near, far = (zero, zero, zero, zero), (zero, zero, zero, zero)
+        near, far = (splat(ZERO), splat(ZERO)), (splat(ZERO), splat(ZERO))
         for group in range(groups):
             first = start + group * columns * TERM
             inner, outer = term_sums(lines, first, first + columns * TERM, odd, c, s, d, t)
-            near, far = _with_powers(near, inner, shared), _with_powers(far, outer, shared)
+            near, far = _with_powers(near, *upper(inner)), _with_powers(far, *upper(outer))
             c, s = groups_on(c, s, turns, at + i)
             d, t = groups_on(d, t, turns, at + j)
-        _put_powers(energy, mirror, row, i, near, shared)
+        _put_powers(energy, mirror, row, i, near)
         if j > i:
-            _put_powers(energy, mirror, row, j, far, shared)
+            _put_powers(energy, mirror, row, j, far)
 
 
 @compiled(forceinline=True)
@@ -112,14 +101,12 @@ def _add_powers_of_beams(beams: Any, groups: int, energy: Any, mirror: int) -> N
     _, elevations, azimuths = energy.shape
     for i in range(elevations):
         for j in range(azimuths):
-            zero = splat(ZERO)
-            powers = zero, zero, zero, zero
+            powers = splat(ZERO), splat(ZERO)
             for group in range(groups):
                 at = (i * azimuths + j) * BEAM + group * 4 * LANES
                 x, y = load(beams, at), load(beams, at + LANES)
-                p, q = load(beams, at + 2 * LANES), load(beams, at + 3 * LANES)
-                powers = powers[0] + x * x + y * y, powers[1] + p * p + q * q, zero, zero
-            _put_powers(energy, mirror, i, j, powers, False)
+                powers = _with_powers(powers, x, y, load(beams, at + 2 * LANES), load(beams, at + 3 * LANES))
+            _put_powers(energy, mirror, i, j, powers)
 
 
 @compiled
@@ -130,25 +117,23 @@ def lattice_energies(
     """Sum over bins of |B|^2 in a quadrant, or a part of it, and its mirror images: (mirror, elevation, azimuth).
 
     mirror: 0 the quadrant above and to port, 1 at -az, 2 at -el, 3 both. pairs: spectra (sensor + 1, bins) as float32
-    pairs, bins a multiple of 16, the last sensor silent; places (set, subarray, column, row, 4), a set for each mirror,
-    from the middle of a subarray outwards: sensors at (+z, +y), (+z, -y), (-z, +y), (-z, -y), the silent one for none;
+    pairs, bins a multiple of 16, the last sensor silent; places (mirror, subarray, column, row, 4), from the middle of
+    a subarray outwards: sensors at (+z, +y), (+z, -y), (-z, +y), (-z, -y), the silent one for none;
     weight (sensor + 1,) float32; delay (subarray, column, row, 4) s, of focusing; heights (subarray, column) rows in
     use; rise (elevation, subarray, side of y, column) and across (subarray, elevation, azimuth): half of what a wave is
     sooner (s) at the next row up and at the next column to port; middle (subarray, elevation, azimuth): what it is
-    later (s) in the middle of the subarray; frequency, spacing: of bin 0 and between bins (Hz). One side of y only:
-    delays and rise are even, there is one subarray, and its columns at +y and at -y are the sets.
+    later (s) in the middle of the subarray; frequency, spacing: of bin 0 and between bins (Hz).
     """
     _, count, columns, rows, _ = places.shape
-    sides, elevations, azimuths = rise.shape[2], across.shape[1], across.shape[2]
-    size = sides * columns * rows * TERM
+    _, elevations, azimuths = across.shape
+    size = 2 * columns * rows * TERM
     folded, lines = np.empty(GROUPS * size, np.float32), np.empty(2 * GROUPS * columns * TERM, np.float32)
     beams = np.empty(elevations * azimuths * BEAM if count > 1 else 0, np.float32)
     up, port, later = group_turns(rise, spacing), group_turns(across, spacing), group_turns(middle, spacing)
     rise, across, middle = rise.ravel(), across.ravel(), middle.ravel()
     delays, energy = np.stack((delay, delay)), np.zeros((4, elevations, azimuths))
-    for mirror in range(sides):
-        other = mirror + 2 if sides == 2 else 1
-        sets = np.stack((places[mirror], places[other]))
+    for mirror in range(2):
+        sets = np.stack((places[mirror], places[mirror + 2]))
         for low in range(0, bins, CHUNK):
             groups, first = min(GROUPS, (bins - low) // LANES), frequency + low * spacing
             beams[:] = ZERO
@@ -157,15 +142,14 @@ def lattice_energies(
                     at = low + group * LANES
                     focus(
                         pairs, bins, at, sets[:, part], weight, delays[:, part],
-                        frequency + at * spacing, spacing, sides, folded[group * size :],
+                        frequency + at * spacing, spacing, folded[group * size :],
                     )  # fmt: skip
                 for row in range(0, elevations, 2):
-                    inner = (row * count + part) * sides * columns
-                    outer = (min(row + 1, elevations - 1) * count + part) * sides * columns
+                    inner = (row * count + part) * 2 * columns
+                    outer = (min(row + 1, elevations - 1) * count + part) * 2 * columns
                     sums_over_rows(
-                        folded, rows, heights[part], sides, odd_rows, rise, up, inner, outer, first, spacing, groups,
-                        lines,
-                    )  # fmt: skip
+                        folded, rows, heights[part], odd_rows, rise, up, inner, outer, first, spacing, groups, lines
+                    )
                     for which in range(min(2, elevations - row)):
                         start, at = which * GROUPS * columns * TERM, (part * elevations + row + which) * azimuths
                         if count > 1:
@@ -176,7 +160,7 @@ def lattice_energies(
                         else:
                             _add_powers(
                                 lines, start, columns, odd_columns, across, port, at, first, spacing, groups, energy,
-                                mirror, row + which, sides == 1,
+                                mirror, row + which,
                             )  # fmt: skip
             if count > 1:
                 _add_powers_of_beams(beams, groups, energy, mirror)
@@ -194,7 +178,7 @@ def focused_halves(
     folded = np.empty(bins // LANES * size, np.float32)
     for low in range(0, bins, LANES):
         into = folded[low // LANES * size :]
-        focus(pairs, bins, low, places, weight, delay, frequency + low * spacing, spacing, 2, into)
+        focus(pairs, bins, low, places, weight, delay, frequency + low * spacing, spacing, into)
     return folded
 
 
@@ -219,7 +203,7 @@ def lattice_beams(
         chunk = folded[low // LANES * size :]
         for level in range(0, levels, 2):
             inner, outer = level * 2 * columns, min(level + 1, levels - 1) * 2 * columns
-            sums_over_rows(chunk, rows, heights, 2, odd_rows, rise, up, inner, outer, first, spacing, groups, lines)
+            sums_over_rows(chunk, rows, heights, odd_rows, rise, up, inner, outer, first, spacing, groups, lines)
             for which in range(min(2, levels - level)):
                 start, at, stop = which * GROUPS * columns * TERM, bounds[level + which], bounds[level + which + 1]
                 beams[:] = ZERO

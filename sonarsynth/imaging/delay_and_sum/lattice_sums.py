@@ -10,8 +10,7 @@ sums and differences of sensors at +-z, s and d those of columns at +-y,
 
 t_y and t the phases of what a wave is sooner at the next row of column y, and at the next column to port. Every sum
 runs over two sets of sensors at once, for two directions: the beam at (-el, az) hears the array as that at (+el, az)
-hears its mirror image. Where the delays of focusing are even in y and z, the columns at +-y are the two sets, and the
-sums of one beam are those of its three mirror images: only signs of D and d differ.
+hears its mirror image.
 
 Cosines and sines come from Chebyshev's c_(j+1) = 2 cos(2t) c_j - c_(j-1). Sixteen frequencies are summed at once,
 energies in chunks of 64, whatever asks for them: always the same bits.
@@ -85,13 +84,6 @@ def upper(sums: Any) -> Any:
 
 
 @compiled(forceinline=True)
-def lower(sums: Any) -> Any:
-    """The same plus: of the mirrored direction."""
-    a, a_, b, b_, c, c_, d, d_ = sums
-    return a - c_, a_ + c, b - d_, b_ + d
-
-
-@compiled(forceinline=True)
 def _fold(terms: Any, at: int, plus: Any, minus: Any) -> None:
     """Store a term: sums and differences of what is at + and at -, of both sets."""
     for_sums, for_differences = at, at + 4 * LANES
@@ -114,15 +106,14 @@ def _focused(pairs: Any, at: int, weight: float, delay: float, frequency: float,
 
 @compiled(forceinline=True)
 def focus(
-    pairs: Any, bins: int, low: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float,
-    sides: int, folded: Any,
+    pairs: Any, bins: int, low: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float, folded: Any
 ) -> None:  # fmt: skip
     """Fill `folded` [side of y][column][row][S D] for the sixteen frequencies from bin `low` on; places, delay
     (set, column, row, 4)."""
     _, columns, rows, _ = places.shape
     for n in range(columns):
         for m in range(rows):
-            for side in range(sides):
+            for side in range(2):
                 a, b = places[0, n, m, side], places[1, n, m, side]
                 c, d = places[0, n, m, side + 2], places[1, n, m, side + 2]
                 above = (
@@ -160,13 +151,10 @@ def groups_on(c: Any, s: Any, turns: Any, i: int) -> Any:
 
 
 @compiled(forceinline=True)
-def _put_line(lines: Any, at: int, sums: Any, side: int, sides: int) -> None:
-    """The term of a column at +y and at -y, which come one after the other; or are the sets, for both elevations."""
+def _put_line(lines: Any, at: int, sums: Any, side: int) -> None:
+    """The term of a column at +y and at -y, which come one after the other."""
     x, y, p, q = upper(sums)
-    if sides == 1:
-        u, v, g, h = lower(sums)
-        _fold(lines, at, (x, y, u, v), (p, q, g, h))
-    elif side == 0:
+    if side == 0:
         store(lines, at, x)
         store(lines, at + LANES, y)
         store(lines, at + 2 * LANES, p)
@@ -178,21 +166,21 @@ def _put_line(lines: Any, at: int, sums: Any, side: int, sides: int) -> None:
 
 @compiled(forceinline=True)
 def sums_over_rows(
-    folded: Any, rows: int, heights: Any, sides: int, odd: bool, rise: Any, turns: Any, inner: int, outer: int,
+    folded: Any, rows: int, heights: Any, odd: bool, rise: Any, turns: Any, inner: int, outer: int,
     frequency: float, spacing: float, groups: int, lines: Any,
 ) -> None:  # fmt: skip
     """Sums over rows at two elevations, whose half steps `rise` (s) [side][column], and turns, are from `inner` and
     `outer` on: lines [two][group][column][s d]."""
     columns = len(heights)
     for n in range(columns):
-        for side in range(sides):
+        for side in range(2):
             i, j = inner + side * columns + n, outer + side * columns + n
             c, s = phasors(rise[i], frequency, spacing)
             d, t = phasors(rise[j], frequency, spacing)
             for group in range(groups):
-                start = ((group * sides + side) * columns + n) * rows * TERM
+                start = ((group * 2 + side) * columns + n) * rows * TERM
                 upper, lower = term_sums(folded, start, start + heights[n] * TERM, odd, c, s, d, t)
                 c, s = groups_on(c, s, turns, i)
                 d, t = groups_on(d, t, turns, j)
-                _put_line(lines, (group * columns + n) * TERM, upper, side, sides)
-                _put_line(lines, ((GROUPS + group) * columns + n) * TERM, lower, side, sides)
+                _put_line(lines, (group * columns + n) * TERM, upper, side)
+                _put_line(lines, ((GROUPS + group) * columns + n) * TERM, lower, side)
