@@ -39,6 +39,8 @@ PHASE_SLOPE = 8.0
 which moves the time: by 0.1 to 3 times that below the critical angle (sand to rock, 7 to 14 m), by less above."""
 LEFT = 0.05
 """Of what a longer window changes of a time, what it leaves: 0.001 to 0.1 were seen, 0.05 root mean square."""
+LEFT_OF_IMAGE = 0.3
+"""The same where the longer window holds a reflection that the other does not: 0.05 to 0.7."""
 ACCEPTED, SILENT, ARRAY, BAND, UNFIT, UNRESOLVED, OUTSIDE, ECHO, RANGE = range(len(REASONS))
 
 
@@ -163,16 +165,13 @@ def _straight_covariance(
         full[3, 3] += (bent / (2.0 * np.pi * sonar.band.centre)) ** 2
     elif knowledge.reflected and not knowledge.on_bottom:
         depth, seen = knowledge.bottom_depth, (wave.tangents @ up, up @ wave.direction, wave.curvature, full)
-        spread, half = (_spread(pulse, sonar), _spread(pulse.longer or pulse, sonar)), 0.5 * pulse.window
+        both = pulse, pulse.longer or pulse
+        spread = [envelope_spread(p.frequency, p.template, sonar.band.low, sonar.band.high) for p in both]
+        short, time = (_peak(p, sonar, knowledge.rounding)[0] for p in both)
+        windows = pulse.window, both[1].window, LEFT_OF_IMAGE * abs(float(np.nan_to_num(time - short)))
         for height in (-own, -depth - own):
-            full = full + image_covariance(
-                *seen, height, sonar.assumed_sound_speed, window=half, spread=spread, deepest=depth
-            )
+            full = full + image_covariance(*seen, height, sonar.assumed_sound_speed, spread, windows, deepest=depth)
     return full
-
-
-def _spread(pulse: Pulse, sonar: Sonar) -> float:
-    return envelope_spread(pulse.frequency, pulse.template, sonar.band.low, sonar.band.high)
 
 
 def _fuse(wave: Wavefront, covariance: Floats, fall: float, knowledge: SonarKnowledge) -> Fix:
@@ -243,19 +242,24 @@ def _in_water(
 def _arrival(pulse: Pulse, fitted: float, sonar: Sonar, rounding: float) -> tuple[float, float]:
     """When (s) the pulse's envelope peaks at the array centre, and the standard error of that time (s).
 
-    The error is that of the envelope of the mean pulse in all that the model does not explain (what is in phase with it
-    changes its shape), and that of the wavefront's time, of variance `fitted` (s2), which that pulse does not show.
+    The error is that of `_peak` and that of the wavefront's time, of variance `fitted` (s2), which pulses do not show.
     """
+    time, error = _peak(pulse, sonar, rounding)
+    if pulse.longer is not None:
+        short, (time, error) = time, _peak(pulse.longer, sonar, rounding)
+        error = float(np.hypot(error, LEFT * np.nan_to_num(time - short)))
+    return time, float(np.hypot(error, np.sqrt(fitted)))
+
+
+def _peak(pulse: Pulse, sonar: Sonar, rounding: float) -> tuple[float, float]:
+    """When (s) the envelope of the mean pulse peaks, and the standard error of that (s) in all that the model does not
+    explain: what is in phase with it changes its shape."""
     # `waveform` holds it down
     undamped = np.minimum(1 + pulse.deaf * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)
     noise = max(pulse.noise, pulse.rest, rounding) / np.maximum(pulse.power, 1e-300)
     low, high = sonar.band.low, sonar.band.high
     time, error = envelope_peak(pulse.frequency, pulse.template * undamped, low, high, noise)
-    time, error = pulse.time + time, float(np.hypot(error, np.sqrt(fitted)))
-    if pulse.longer is None:
-        return time, error
-    short, (time, error) = time, _arrival(pulse.longer, fitted, sonar, rounding)
-    return time, float(np.hypot(error, LEFT * np.nan_to_num(time - short)))
+    return pulse.time + time, error
 
 
 def refused(reason: int) -> SourceFix:
