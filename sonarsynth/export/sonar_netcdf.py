@@ -17,6 +17,7 @@ from sonarsynth.conventions import PINGS, Floats, Progress
 from sonarsynth.description import FieldError
 from sonarsynth.detection import beam_width
 from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll
+from sonarsynth.export.transmit_beams import KINDS, TransmitBeams, transmit_beams
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
 METRES_A_DEGREE: Final = 111_195.0
 """Of latitude, and of longitude at the equator, where there is the origin of the world."""
 LOST: Final = (
-    "what the convention asks of a transmitter is NaN, for snaps and for pings, and no equation converts to target "
-    "strength",
+    "what the convention asks of a transmitter is NaN for snaps, and for pulses that are no sweep what it asks of a "
+    "sweep; no equation converts to target strength",
     "positions are metres east and north of 0 N 0 E; times are counted from the start of the motions, or the first "
     "frame where that is earlier, as 1970-01-01",
     "the truth, points, source estimates, meshes and the link budget are left out",
@@ -42,7 +43,7 @@ _ENUMS: Final = {
     "beam_stabilisation_t": {"not_stabilised": 0, "stabilised": 1},
     "beam_t": {"single": 0, "split_aperture_angles": 1, "split_aperture_4_subbeams": 2},
     "conversion_equation_t": {f"type_{n}": n for n in range(1, 7)},
-    "transmit_t": {"CW": 0, "LFM": 1, "HFM": 2},
+    "transmit_t": KINDS,
 }
 
 
@@ -72,7 +73,7 @@ def write_sonar_netcdf(
     beams, else the energy (Pa2 s) of each as one sample. Returns the files. Raises FieldError for a store with neither
     signals nor beams nor images, ImportError without h5netcdf, OSError.
     """
-    groups = list(_groups(tree))
+    groups, sent = list(_groups(tree)), transmit_beams(tree)
     if not groups:
         raise FieldError(("signals",), "the store has neither signals nor beams nor images")
     folder.mkdir(parents=True, exist_ok=True)
@@ -80,7 +81,7 @@ def write_sonar_netcdf(
     files = []
     for number in np.unique(sequence).tolist():
         files.append(folder / f"sequence_{number}.nc")
-        _write(tree, files[-1], frames[sequence == number], groups)
+        _write(tree, files[-1], frames[sequence == number], groups, sent)
         if progress is not None:
             progress(int((sequence <= number).sum()), len(frames), 0)
     return tuple(files)
@@ -126,7 +127,7 @@ def _groups(tree: xr.DataTree) -> Iterator[_Beams]:
     )
 
 
-def _write(tree: xr.DataTree, path: Path, frames: np.ndarray, groups: list[_Beams]) -> None:
+def _write(tree: xr.DataTree, path: Path, frames: np.ndarray, groups: list[_Beams], sent: TransmitBeams) -> None:
     import h5netcdf
 
     with h5netcdf.File(path, "w") as file:
@@ -145,7 +146,7 @@ def _write(tree: xr.DataTree, path: Path, frames: np.ndarray, groups: list[_Beam
             }
         )
         _environment(tree, file)
-        _platform(tree, file)
+        _platform(tree, file, sent)
         provenance = {"conversion_software_name": "sonarsynth", "conversion_time": now}
         provenance["conversion_software_version"] = str(tree.attrs.get("sonarsynth_version", ""))
         file.create_group("Provenance").attrs.update(provenance)
@@ -153,7 +154,7 @@ def _write(tree: xr.DataTree, path: Path, frames: np.ndarray, groups: list[_Beam
         sonar.attrs.update({"sonar_manufacturer": "none", "sonar_model": "sonarsynth", "sonar_type": "omni-sonar"})
         kinds = {name: sonar.create_enumtype(np.int8, name, words) for name, words in _ENUMS.items()}
         for number, group in enumerate(groups, 1):
-            _beam_group(tree, sonar.create_group(f"Beam_group{number}"), frames, group, kinds)
+            _beam_group(tree, sonar.create_group(f"Beam_group{number}"), frames, group, sent, kinds)
 
 
 def _environment(tree: xr.DataTree, file: Any) -> None:
@@ -167,14 +168,15 @@ def _environment(tree: xr.DataTree, file: Any) -> None:
     _put(group, "sound_speed_indicative", (), speed, "m/s", "Indicative sound speed")
 
 
-def _platform(tree: xr.DataTree, file: Any) -> None:
-    """The hydrophones: transducers that receive alone."""
+def _platform(tree: xr.DataTree, file: Any, sent: TransmitBeams) -> None:
+    """The hydrophones, transducers that receive alone, and after them the transmitters."""
     group = file.create_group("Platform")
-    position = np.asarray(tree["signals/position"].values) if "signals" in tree.children else np.zeros((1, 3))
+    hydrophones = np.asarray(tree["signals/position"].values) if "signals" in tree.children else np.zeros((1, 3))
+    position = np.concatenate([hydrophones, sent.position])
     group.dimensions = {"transducer": len(position), "position": 1, "MRU": 1, "gyro": 1}
     kind = group.create_enumtype(np.int8, "transducer_type_t", {"Receive_only": 0, "Transmit_only": 1, "Monostatic": 3})
     function = group.create_variable("transducer_function", ("transducer",), kind, fillvalue=np.int8(3))
-    function[:] = np.zeros(len(position), np.int8)
+    function[:] = (np.arange(len(position)) >= len(hydrophones)).astype(np.int8)
     for n, (axis, sign) in enumerate((("x", 1.0), ("y", -1.0), ("z", -1.0))):  # ours are port and up
         values = (sign * position[:, n]).astype(np.float32)
         _put(group, f"transducer_offset_{axis}", ("transducer",), values, "m", f"{axis}-offset of the transducer")
@@ -182,12 +184,14 @@ def _platform(tree: xr.DataTree, file: Any) -> None:
         group.create_group(name)
 
 
-def _beam_group(tree: xr.DataTree, group: Any, frames: np.ndarray, beams: _Beams, kinds: dict[str, Any]) -> None:
+def _beam_group(
+    tree: xr.DataTree, group: Any, frames: np.ndarray, beams: _Beams, sent: TransmitBeams, kinds: dict[str, Any]
+) -> None:
     import h5py
 
     count, rows = len(beams.names), len(frames)
     group.attrs.update({"beam_mode": "inspection", "conversion_equation_type": np.int8(2)})
-    group.dimensions = {"ping_time": rows, "beam": count, "subbeam": 1, "tx_beam": 1}
+    group.dimensions = {"ping_time": rows, "beam": count, "subbeam": 1, "tx_beam": sent.beams}
     names = group.create_variable("beam", ("beam",), h5py.string_dtype())
     names.attrs["long_name"] = "Beam name"
     names[:] = np.array(beams.names, object)
@@ -203,39 +207,48 @@ def _beam_group(tree: xr.DataTree, group: Any, frames: np.ndarray, beams: _Beams
         cells = np.empty((count, 1), object)
         cells[:, 0] = list(values)
         samples[row] = cells
-    enums: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-        ("beam_stabilisation", "beam_stabilisation_t", ("ping_time",)),
-        ("beam_type", "beam_t", ()),
-        ("transmit_type", "transmit_t", ("ping_time", "tx_beam")),
+    enums: tuple[tuple[str, str, tuple[str, ...], Any], ...] = (
+        ("beam_stabilisation", "beam_stabilisation_t", ("ping_time",), 0),
+        ("beam_type", "beam_t", (), 0),
+        ("transmit_type", "transmit_t", ("ping_time", "tx_beam"), sent.kind),
     )
-    for name, kind, dims in enums:
+    for name, kind, dims, number in enums:
         shape = tuple(group.dimensions[dim].size for dim in dims)
-        group.create_variable(name, dims, kinds[kind], fillvalue=np.int8(max(_ENUMS[kind].values())))[...] = np.zeros(
-            shape, np.int8
-        )
+        unused = set(_ENUMS[kind].values()) - set(np.ravel(number).tolist())  # readers mask what stands for nothing
+        variable = group.create_variable(name, dims, kinds[kind], fillvalue=np.int8(max(unused, default=0)))
+        variable[...] = np.broadcast_to(np.int8(number), shape)
     processing = group.create_variable(
         "non_quantitative_processing", ("ping_time",), np.int16, data=np.zeros(rows, np.int16)
     )
     processing.attrs.update({"flag_meanings": "no_non_quantitative_processing", "flag_values": np.array([0], np.int16)})
-    if beams.units == "Pa":
-        index = np.arange(count, dtype=np.int32)
-        group.create_variable("receive_transducer_index", ("beam",), np.int32, data=index)
-    for name, (dims, values, units) in _numbers(tree, frames, beams, start).items():
+    _transducers(tree, group, beams, sent)
+    for name, (dims, values, units) in _numbers(tree, frames, beams, start, sent).items():
         shape = tuple(group.dimensions[dim].size for dim in dims)
         data = np.broadcast_to(np.asarray(values), shape)
         precise = np.float64 if name in ("platform_latitude", "platform_longitude") else np.float32
         _put(group, name, dims, data.astype(precise), units, name.replace("_", " "))
 
 
+def _transducers(tree: xr.DataTree, group: Any, beams: _Beams, sent: TransmitBeams) -> None:
+    """Which transducers of `/Platform` hear each hydrophone's beam, and send the transmit beams."""
+    hydrophones, pings = len(tree["signals/position"]) if "signals" in tree.children else 1, len(group["ping_time"])
+    if beams.units == "Pa":
+        index = np.arange(hydrophones, dtype=np.int32)
+        group.create_variable("receive_transducer_index", ("beam",), np.int32, data=index)
+    if len(sent.position):
+        index = np.tile(np.arange(hydrophones, hydrophones + sent.beams, dtype=np.int32), (pings, 1))
+        group.create_variable("transmit_transducer_index", ("ping_time", "tx_beam"), np.int32, data=index)
+
+
 def _numbers(
-    tree: xr.DataTree, frames: np.ndarray, beams: _Beams, start: np.ndarray
+    tree: xr.DataTree, frames: np.ndarray, beams: _Beams, start: np.ndarray, sent: TransmitBeams
 ) -> dict[str, tuple[tuple[str, ...], Any, str]]:
     """Numeric variables of a group of beams: dimensions, values, units."""
     truth = tree["truth"].dataset.isel(frame=frames)
     position = np.asarray(truth["sonar_position"].values)
     heading, pitch, roll = heading_pitch_roll(np.asarray(truth["sonar_orientation"].values))
     phi, theta = beam_rotation(beams.azimuth, beams.elevation)
-    ping, beam, sent = ("ping_time",), ("ping_time", "beam"), ("ping_time", "tx_beam")
+    ping, beam, sending = ("ping_time",), ("ping_time", "beam"), ("ping_time", "tx_beam")
     solid = 4.0 * np.pi if beams.width >= 360.0 else 0.25 * np.pi * np.deg2rad(beams.width) ** 2
     return {
         "beamwidth_receive_major": (beam, beams.width, "arc_degree"),
@@ -252,11 +265,8 @@ def _numbers(
         "rx_beam_rotation_theta": (beam, theta, "arc_degree"),
         "rx_beam_rotation_psi": (beam, 0.0, "arc_degree"),
         "sample_interval": (ping, beams.interval, "s"),
-        "sample_time_offset": (sent, -start, "s"),  # subtracted from the time of each sample
-        "transmit_duration_nominal": (sent, np.nan, "s"),
-        "transmit_frequency_start": (sent, tree.attrs["band_low"], "Hz"),
-        "transmit_frequency_stop": (sent, tree.attrs["band_high"], "Hz"),
-        **{f"tx_beam_rotation_{name}": (sent, np.nan, "arc_degree") for name in ("phi", "theta", "psi")},
+        "sample_time_offset": (sending, -start, "s"),  # subtracted from the time of each sample
+        **{name: (sending, values, units) for name, (values, units) in sent.numbers.items()},
     }
 
 

@@ -64,6 +64,11 @@ class SoundSource(Method):
         """What targets are seen by, as cards of datasets say it."""
         return self.kind.replace("_", " ")
 
+    @property
+    def transmission(self) -> dict[str, str | float] | None:
+        """What a store says of what the sonar sends: its attribute `transmitters`; None of what is not its own."""
+        return None
+
     def position_at(self, bottom: float, time: float = 0.0) -> Floats:
         """Where it is (xyz) in m, over a bottom at this depth (m), at a time (s) since the start of the motions."""
         raise NotImplementedError(f"{type(self).__name__} is nowhere")

@@ -129,6 +129,20 @@ class Transmitter(SoundSource):
         return PINGS
 
     @property
+    def transmission(self) -> dict[str, str | float]:
+        """As `SoundSource.transmission`: place (m), level (dB), and what a sweep and a beam are (Hz, s, degrees)."""
+        said: dict[str, str | float] = dict(zip(("name", *"xyz"), (self.name, *self.position), strict=True))
+        said["source_level"] = self.source_level
+        if isinstance(self.pulse, Sweep):
+            start, stop = self.pulse.start, self.pulse.stop
+            kind = "CW" if start == stop else {"linear": "LFM", "hyperbolic": "HFM"}[self.pulse.law]
+            said |= {"type": kind, "start": start, "stop": stop, "duration": self.pulse.duration}
+        if self.beam is not None:
+            angles = ("azimuth", "elevation", "azimuth_width", "elevation_width")
+            said |= {name: float(np.rad2deg(getattr(self.beam, name))) for name in angles}
+        return said
+
+    @property
     def times(self) -> tuple[float, ...]:
         """As `SoundSource.times`."""
         return self.ping_times

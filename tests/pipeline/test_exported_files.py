@@ -16,6 +16,7 @@ import sonarsynth as ss
 from sonarsynth import planning, schedule
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
+from sonarsynth.description import FieldError
 from sonarsynth.export.coco_files import DECIBELS, grey, write_coco
 from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll
 from sonarsynth.export.sonar_netcdf import write_sonar_netcdf
@@ -199,6 +200,44 @@ def test_netcdf_reads_what_the_convention_asks_and_the_same_numbers(store: Path)
         ours = [np.cos(elevation) * np.cos(azimuth), -np.cos(elevation) * np.sin(azimuth), -np.sin(elevation)]
         np.testing.assert_allclose(axes, np.stack(ours, axis=-1).reshape(-1, 3), atol=1e-6)
         assert str(steered["beam"][0]).startswith("azimuth -15")
+
+
+def test_netcdf_reads_what_a_transmitter_sends(small_text: str, tmp_path: Path) -> None:
+    import netCDF4
+
+    projector = """{kind: transmitter, name: projector, position: [0 m, 5 cm, 20 cm], source_level: 190 dB,
+           pulse: {kind: sweep, start: 70 kHz, stop: 40 kHz, duration: 1 ms, law: hyperbolic},
+           beam: {azimuth_width: 50 deg, elevation_width: 30 deg, azimuth: -10 deg, elevation: 5 deg}}"""
+    head, _, tail = small_text.partition("    sources:")
+    recipe = reading.loads(f"{head}    sources:\n      - {projector}\n  sonar:{tail.partition('  sonar:')[2]}")
+    assert schedule.build(planning.plan(recipe, {"signals"}), tmp_path / "s.zarr", frames=BUILT, workers=0).ok
+    tree = ss.open(tmp_path / "s.zarr")
+    (file,) = write_sonar_netcdf(tree, tmp_path / "out", np.array(BUILT))
+    hydrophones = tree.sizes.get("sensor", tree["signals"].sizes["sensor"])
+    with netCDF4.Dataset(file) as read:
+        assert read.keywords.startswith("active")
+        heard, platform = read["Sonar/Beam_group1"], read["Platform"]
+        sent = {name: heard[name][:, 0] for name in heard.variables if heard[name].dimensions[-1:] == ("tx_beam",)}
+        assert (sent["transmit_type"] == 2).all() and (sent["transmit_transducer_index"] == hydrophones).all()
+        assert platform["transducer_function"][:].tolist() == [0] * hydrophones + [1]
+        place = [float(platform[f"transducer_offset_{axis}"][-1]) for axis in "xyz"]
+        assert place == pytest.approx([0.0, -0.05, -0.2], abs=1e-6)
+        expected = {
+            "duration_nominal": 1e-3, "frequency_start": 70e3, "frequency_stop": 40e3, "source_level": 190.0 - 3.0103,
+        }  # fmt: skip
+        expected = {f"transmit_{name}": value for name, value in expected.items()}
+        expected |= {"beamwidth_transmit_major": 50.0, "beamwidth_transmit_minor": 30.0}
+        for name, value in expected.items():
+            np.testing.assert_allclose(sent[name], value, rtol=1e-6)
+        turns = [sent[f"tx_beam_rotation_{name}"][0] for name in ("psi", "theta", "phi")]
+        axis = Rotation.from_euler("ZYX", turns, degrees=True).apply([0.0, 0.0, 1.0])
+        azimuth, elevation = np.deg2rad([-10.0, 5.0])
+        ours = [np.cos(elevation) * np.cos(azimuth), -np.cos(elevation) * np.sin(azimuth), -np.sin(elevation)]
+        np.testing.assert_allclose(axis, ours, atol=1e-6)
+    for wrong in ("a ping", [{"x": "1"}], [{"x": 0, "y": 0, "z": np.nan}], [{"x": 0, "y": 0, "z": 1, "type": "FM"}]):
+        tree.attrs["transmitters"] = wrong
+        with pytest.raises(FieldError, match=r"transmitters\.0: must have x, y and z"):
+            write_sonar_netcdf(tree, tmp_path / "wrong", np.array(BUILT))
 
 
 def test_beams_of_one_delay_have_no_interval(store: Path, tmp_path: Path) -> None:

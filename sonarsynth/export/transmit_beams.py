@@ -1,0 +1,71 @@
+"""What SONAR-netCDF4 asks of transmit beams, by the attribute `transmitters` of a store."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.description import FieldError
+from sonarsynth.export.platform_angles import beam_rotation
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+KINDS: Final = {"CW": 0, "LFM": 1, "HFM": 2}
+"""`transmit_t` of the convention."""
+RMS: Final = 10.0 * np.log10(2.0)
+"""dB: the root mean square of a tone under its peak, which the source level of a store is."""
+_NUMBERS: Final = (
+    "start", "stop", "duration", "source_level", "azimuth", "elevation", "azimuth_width", "elevation_width",
+)  # fmt: skip
+
+
+class TransmitBeams(NamedTuple):
+    """Beams of transmitters, one that says nothing where there is none."""
+
+    position: Floats  # (transmitter, xyz) m, sonar frame; of none where there is none
+    kind: np.ndarray  # (tx_beam,) numbers of `KINDS`
+    numbers: dict[str, tuple[Floats, str]]  # (tx_beam,) of each variable, and its units
+
+    @property
+    def beams(self) -> int:
+        """How many."""
+        return len(self.kind)
+
+
+def transmit_beams(tree: xr.DataTree) -> TransmitBeams:
+    """The beams of the transmitters of a store. Raises FieldError for an attribute that no build writes."""
+    listed = tree.attrs.get("transmitters", [])
+    rows = [_row(entry, n) for n, entry in enumerate(listed if isinstance(listed, list | tuple) else [None])]
+    band = {"start": float(tree.attrs["band_low"]), "stop": float(tree.attrs["band_high"])}
+    told = [row for row, _ in rows] or [band]
+    column = {name: np.array([row.get(name, np.nan) for row in told]) for name in _NUMBERS}
+    phi, theta = beam_rotation(np.deg2rad(column["azimuth"]), np.deg2rad(column["elevation"]))
+    numbers = {
+        "transmit_duration_nominal": (column["duration"], "s"),
+        "transmit_frequency_start": (column["start"], "Hz"),
+        "transmit_frequency_stop": (column["stop"], "Hz"),
+        "transmit_source_level": (column["source_level"] - RMS, "dB"),
+        "beamwidth_transmit_major": (column["azimuth_width"], "arc_degree"),
+        "beamwidth_transmit_minor": (column["elevation_width"], "arc_degree"),
+        "tx_beam_rotation_phi": (phi, "arc_degree"),
+        "tx_beam_rotation_theta": (theta, "arc_degree"),
+        "tx_beam_rotation_psi": (0.0 * phi, "arc_degree"),
+    }
+    position = np.array([[row[axis] for axis in "xyz"] for row, _ in rows]).reshape(-1, 3)
+    return TransmitBeams(position, np.array([kind for _, kind in rows] or [0], np.int8), numbers)
+
+
+def _row(entry: Any, number: int) -> tuple[dict[str, float], int]:
+    """The numbers of a transmitter, and that of the kind of its pulse."""
+    said = entry if isinstance(entry, dict) else {}
+    row = {name: said[name] for name in (*_NUMBERS, *"xyz") if name in said}
+    numbers = all(isinstance(value, int | float) and np.isfinite(value) for value in row.values())
+    kind = said.get("type", "CW")
+    if not numbers or not {*"xyz"} <= row.keys() or kind not in KINDS:
+        raise FieldError(("transmitters", str(number)), "must have x, y and z, numbers, and a type of CW, LFM or HFM")
+    if "type" not in said:
+        row.pop("source_level", None)  # it is of a peak
+    return row, KINDS[kind]
