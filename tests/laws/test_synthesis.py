@@ -183,14 +183,13 @@ def test_absorption_is_relative_to_the_band_centre() -> None:
 # ---- the fast synthesis against the exact sum ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_many_echoes_of_one_sign_keep_the_error_of_each(seed: int) -> None:
+def test_many_echoes_of_one_sign_keep_the_error_of_each() -> None:
     """Isotropic facets in a narrow band: where the filter stops the snap, long waves add up over all of them."""
-    rng, count = np.random.default_rng(seed), 4000
+    rng, count = np.random.default_rng(0), 4000
     sonar, method = Sonar(filter=BandPass(low=60e3, high=63e3)), GriddedSynthesis(width=8, tolerance=1e-3)
     spread = rng.uniform(-1, 1, (count, 3)) * [0.1, 0.03, 0.03]
     found = arrivals(0.02 + 1.5e-4 * rng.random(count), [1.0, 0.0, 0.0] + spread, np.full(count, 20.0), np.ones(count))
-    array = some_of(FACES, 100, 0.0)
+    array = some_of(FACES, 250, 0.0)
     exact, _ = DirectSum().pressure(found, SNAPS, Reception(array, sonar, None, 0.0185, 1024))
     fast, _ = method.pressure(found, SNAPS, Reception(array, sonar, None, 0.0185, 1024))
     assert np.abs(fast - exact).max() < deposit_error(method) * np.abs(exact).max()

@@ -1,13 +1,11 @@
-"""Kirchhoff's facets, roughness, Fock's field and smoothed meshes at their limits."""
+"""Kirchhoff's facets, roughness and smoothed meshes at their limits."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.equations.scattering.convex_bodies import surface_field
 from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude, triangle_integral
 from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
-from sonarsynth.equations.scattering.modal_series import sphere_amplitude
 from sonarsynth.equations.scattering.roughness import coherent_factor, incoherent_power, roughness_parameter
 from sonarsynth.geometry.surfaces import volume
 from sonarsynth.receiver import POINT
@@ -16,10 +14,9 @@ from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.targets.generated.generation import sphere
 from sonarsynth.targets.generated.smoothing import curved
 from sonarsynth.targets.meshes import mesh_of
-from sonarsynth.targets.shapes import Box, Sphere
-from sonarsynth.targets.target_strength import target_strength
+from sonarsynth.targets.shapes import Box
 from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, refused, together
-from sonarsynth.validation.extremes.plain_scenes import C, body, snap, synthesised, traced, transfer
+from sonarsynth.validation.extremes.plain_scenes import body, snap, synthesised, traced, transfer
 
 TRIANGLE = np.array([[0.2, -0.1, 0.0], [-0.15, 0.25, 0.0], [-0.05, -0.15, 0.0]])
 
@@ -86,25 +83,6 @@ def _rough_frame() -> CaseResult:
     return off(10.0 * np.log10(power / exact), 0.01, "dB")
 
 
-def _fock() -> CaseResult:
-    """Limits, and spheres of k a 20 to 300 at all angles against the exact series."""
-    lit, dark = surface_field(np.array([-1e9, -1e3, -30.0]), "rigid"), surface_field(np.array([11.9]), "rigid")
-    results = [
-        off(np.abs(lit - 1.0), 1e-5, what="far in the light:"),
-        off(np.abs(surface_field(np.array([0.0]), "rigid") - 0.5 * 1.39937), 1e-5, what="at the edge, g(0)/2:"),
-        holds(bool(np.abs(dark) < 3e-5), f"{abs(dark[0]):.1g} in the dark"),
-    ]
-    incident = np.array([1.0, 0.0, 0.0])
-    for ka in (20.0, 300.0):
-        f = ka * C / (2.0 * np.pi * 0.25)
-        angle = np.radians([0.0, 90.0, 150.0, 180.0])
-        out = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
-        exact = sphere_amplitude(f, angle, radius=0.25, sound_speed=C)
-        level = target_strength(Sphere(radius=0.25), f, incident, out, C)
-        results.append(off(level - 20.0 * np.log10(np.abs(exact)), 0.9, "dB", f"k a = {ka:g}:"))
-    return together(*results)
-
-
 def _large() -> CaseResult:
     """Facets too long for their echo to be a pulse in a window are refused; and a body of one huge facet a side."""
     plate = mesh_of(Box(size=(1.0, 2e3, 2e3)))
@@ -138,7 +116,6 @@ CASES = (
     Case("through the mirror direction", "the sinc of a square, to 1e-14", _mirror),
     Case("roughness from none to 1e200 m", "the smooth echo; shares of power that sum to one", _rough),
     Case("a very rough plate in a frame", "the lobe of its slopes, to 0.01 dB", _rough_frame),
-    Case("Fock's field from light to dark", "its limits; spheres by the exact series, within 0.9 dB", _fock),
     Case("facets of a kilometre", "refused, with the reason", _large),
     Case(
         "smoothing of 20 facets, a cube and a sheet",
