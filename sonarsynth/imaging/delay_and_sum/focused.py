@@ -32,10 +32,11 @@ Count = Annotated[int, Ge(1), Le(16)]
 class FocusedDelayAndSum(Steering):
     """Delay and sum on a lattice; masks, dead elements and weights are free.
 
-    Each half of the picture has the delays of a sphere in its middle, and from there to each beam what of them is
-    separable (`zones`). Cut into subarrays, each with delays of its own, the array errs by less and takes longer. 1.3 m
-    array of 508 elements, 25 to 85 kHz, 50 by 50 degrees, 101 by 101 beams, 241 bins: time (10 ms for [1, 1]), and the
-    largest error (dB) within 20 dB of the peak of a source at the focus (`focus_error`),
+    Each quadrant of the picture is two zones, beside the axis and beyond. A zone has the delays of a sphere in its
+    middle, and from there to each beam what of them is separable (`zones`). Cut into subarrays, each with delays of its
+    own, the array errs by less and takes longer. 1.3 m array of 508 elements, 25 to 85 kHz, 50 by 50 degrees, 101 by
+    101 beams, 241 bins: time (10 ms for [1, 1]), and the largest error (dB) within 20 dB of the peak of a source at the
+    focus (`focus_error`),
 
         subarrays    time     50 m     20 m     10 m      5 m      2 m
            [1, 1]     1.0     0.04     0.25     0.86     3.03     8.09

@@ -58,7 +58,7 @@ class Chorus:
     """How snaps come together; left out: each by itself, in place and time (Poisson)."""
     reach: Literal["auto"] | Annotated[PositiveMetres, Le(3000)] = "auto"
     """Horizontal distance from the array to which snaps are heard one by one; `auto`: where those beyond bring under
-    2 % of the power, but 3000 m at most."""
+    2 % of the power, or are so many that their sum is Gaussian noise (with `distant`), but 3000 m at most."""
     images: Literal["auto"] | Annotated[int, Ge(0), Le(200)] = "auto"
     """Reflections at surface and bottom that are followed, in all; `auto`: until more bring under 1 % of the power."""
 
