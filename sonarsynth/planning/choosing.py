@@ -47,9 +47,6 @@ LESS_FAINT = 0.1
 """Share of the faint echoes left out that is left out, where those are what errs: before the array is cut."""
 FAINT_REACH = 2.0
 """Times its bound on the mean that what faint echoes add to an error comes to, at most."""
-FEWEST_SENSORS = 4
-"""Hydrophones of a part, at most, that is tried next and last where halving the array twice was no gain: in water whose
-layers are finer than the array an error falls only where parts are."""
 DEGREE_TOLERANCE = 0.03
 """Error of the synthesis that measures, over what is allowed."""
 
@@ -176,28 +173,21 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
 def _finer(
     plan: Plan, measures: Sequence[PerSensorReference], seeing: OcclusionPoint, error: float, allowed: float
 ) -> _ArrayModel:
-    """The fewest parts that err by no more than is allowed, of an array that errs by more as a whole; where more parts
-    are no gain, each hydrophone's own view of the targets may be one."""
+    """The fewest parts, a power of two, that err by no more than is allowed, of an array that errs by more as a
+    whole."""
     count, auto = plan.elements.count, plan.scene.physics.dynamic_range == "auto"
     faintest = FAINT_REACH * np.sqrt(FAINT) * plan.recipe.accuracy.cheap if auto else 0.0
     # Cubics err by the fourth power of the width of parts, the square of their number: no fewer will do.
-    n, fewest, stuck = 0, max(int(np.log2(error / allowed) / 2.0), 1), 0
-    while 2**n < count and stuck < 3:
-        if n:
-            before, error = error, _worst(measures, 2**n, seeing, allowed)
-            stuck = stuck + 1 if stuck == 2 or error > WORTHWHILE_GAIN * before else 0
-            own_view = seeing == "centre" and plan.scene.physics.occlusion == "auto"
-            if stuck == 2 and error > allowed and own_view:
-                own = _worst(measures, 2**n, "sensors", allowed)
-                if own < WORTHWHILE_GAIN * error:
-                    seeing, error, stuck = "sensors", own, 0
+    n, fewest = 0, max(int(np.log2(error / allowed) / 2.0), 1)
+    while 2**n < count:
+        error = _worst(measures, 2**n, seeing, allowed) if n else error
         if error <= allowed:
             return _ArrayModel(2**n, seeing, error)
         if error <= allowed + faintest and auto:
             less = _worst(measures, 2**n, seeing, allowed, LESS_FAINT)
             if less <= allowed:
                 return _ArrayModel(2**n, seeing, less, faint=LESS_FAINT)
-        n = max(n + 1 if n else fewest, int(np.ceil(np.log2(count / FEWEST_SENSORS))) if stuck == 2 else 0)
+        n = max(n + 1, fewest)
     return _ArrayModel(count, "centre", 0.0)
 
 

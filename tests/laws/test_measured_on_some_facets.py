@@ -65,7 +65,7 @@ class Falling:
 def parts_for(errors, count=508, allowed=1.0):
     made = SimpleNamespace(
         elements=SimpleNamespace(count=count),
-        scene=SimpleNamespace(physics=SimpleNamespace(dynamic_range="auto", occlusion="auto")),
+        scene=SimpleNamespace(physics=SimpleNamespace(dynamic_range="auto")),
         recipe=SimpleNamespace(accuracy=SimpleNamespace(cheap=0.1 * allowed)),
     )
     return choosing._finer(made, [errors], "centre", errors.of(1), allowed).parts
@@ -80,9 +80,8 @@ def test_an_array_is_cut_into_the_fewest_parts_that_do(count, whole, power):
     assert parts_for(Falling(lambda parts: whole * parts**-power), count) == min(enough, default=count)
 
 
-def test_in_water_of_fine_layers_few_cuts_are_tried():
-    """Where halving is no gain until parts are of a few hydrophones, seven measurements at most, not sixteen."""
-    fine = Falling(lambda parts: 5.0 if parts < 100 else 0.5)
-    assert parts_for(fine) == 128 and len(set(fine.tried)) <= 3
-    never = Falling(lambda parts: 5.0)
-    assert parts_for(never) == 508 and len(never.tried) <= 7
+def test_each_cut_is_tried_once_and_then_each_hydrophone_is_alone():
+    """As in water whose layers are finer than the array, where halving is no gain until parts are of a few."""
+    fine, never = Falling(lambda parts: 5.0 if parts < 100 else 0.5), Falling(lambda parts: 5.0)
+    assert parts_for(fine) == 128 and fine.tried == [2, 4, 8, 16, 32, 64, 128]
+    assert parts_for(never) == 508 and never.tried == [*fine.tried, 256]
