@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,12 +34,19 @@ ECHO_SUPPORT = 1e-4
 """The echo window holds every echo down to this part of its peak: its feet, under -80 dB, are cut."""
 DIRECT = 0.1
 """What ranging takes out of echoes is the direct pulse where it is over this part of its peak."""
-STILL: tuple[float, float, Waveform | None] = (0.0, 0.0, None)
-"""A row of `stretches` where nothing is met."""
 AT_ONCE = 10e-6
 """s: a pulse that is loudest so soon before or after its time 0 is loudest then."""
 FOOT = 1e-2
 """Where the direct pulse is in the way, feet of echoes under this part of their peak may be cut."""
+
+
+class Stretch(NamedTuple):
+    """What motion does to the pulse of an echo."""
+
+    part: float = 0.0  # by which it lasts longer than the direct one
+    by_path: float = 0.0  # m of range a m of its path: 0 where it has none, next to the line from source to array
+    waveform: Waveform | None = None
+    longer: float = 0.0  # s
 
 
 def supports_of(looks: Sequence[SampledScene]) -> PulseDurations:
@@ -57,28 +65,25 @@ def supports_of(looks: Sequence[SampledScene]) -> PulseDurations:
         clear = min(after, plain + across + TAIL) - min(early, 0.0)  # a turned pulse may never end, and hide all echoes
         echo, foot = (_support(scene, threshold, turned=turned) + across for threshold in (ECHO_SUPPORT, FOOT))
         rows.append((before, after, *echo, clear, foot.max(), _direct(scene)))
-    late = _late(looks, [float(row[-1]) for row in rows])
-    return replace(PulseDurations(*(float(n) for n in np.max(rows, axis=0))), late=late)
+    return replace(PulseDurations(*(float(n) for n in np.max(rows, axis=0))), late=_late(looks))
 
 
-def _late(looks: Sequence[SampledScene], direct: list[float]) -> float:
-    """`PulseDurations.late` of the scene in which motion does most to pulses, which are `direct` (look,) s long."""
-    worst = [max(stretches(look), key=lambda row: abs(row[0]), default=STILL) for look in looks]
-    look, (stretch, _, shape), _ = max(zip(looks, worst, direct, strict=True), key=lambda row: abs(row[1][0]) * row[2])
-    return ranged_echo(stretch, shape, look.scene.sonar).spread
+def _late(looks: Sequence[SampledScene]) -> float:
+    """`PulseDurations.late`, of the pulse that motion makes longest or shortest."""
+    worst = [max(stretches(look), key=lambda row: abs(row.longer), default=Stretch()) for look in looks]
+    look, row = max(zip(looks, worst, strict=True), key=lambda pair: abs(pair[1].longer))
+    return ranged_echo(row.part, row.waveform, look.scene.sonar).spread
 
 
-def stretches(look: SampledScene) -> list[tuple[float, float, Waveform]]:
-    """Of each body, emission and frame: `_stretch`, and the pulse."""
+def stretches(look: SampledScene) -> list[Stretch]:
+    """Of each body, emission and frame."""
     if not look.scene.physics.doppler:
         return []
     rows = [(f, b, s) for f in look.frames for b in f.moment.bodies for s in f.moment.snaps]
-    return [(*_stretch(*row, look.scene.sonar.assumed_sound_speed), row[2].waveform) for row in rows]
+    return [_stretch(*row, look.scene.sonar) for row in rows]
 
 
-def _stretch(frame: Frame, body: PlacedTarget, snap: Emission, c: float) -> tuple[float, float]:
-    """By what part echoes of a body last longer than the direct pulse, and metres of range a metre of their path: 0
-    where they have none, next to the line from source to array."""
+def _stretch(frame: Frame, body: PlacedTarget, snap: Emission, sonar: Sonar) -> Stretch:
     array, velocity = frame.sonar_pose.position, frame.sonar_velocity
     out, on, past = (
         unit(b - a)
@@ -86,7 +91,9 @@ def _stretch(frame: Frame, body: PlacedTarget, snap: Emission, c: float) -> tupl
     )
     longer = out @ (body.velocity - snap.velocity) + on @ (velocity - body.velocity) - past @ (velocity - snap.velocity)
     both = 1.0 - float(out @ on)
-    return float(longer) / c, 1.0 / both if both > MIN_ONE_PLUS_COS else 0.0
+    part, shape = float(longer) / sonar.assumed_sound_speed, snap.waveform
+    lasts = shape.width * _lasts(shape._replace(width=1.0), sonar)
+    return Stretch(part, 1.0 / both if both > MIN_ONE_PLUS_COS else 0.0, shape, part * lasts)
 
 
 @lru_cache(maxsize=64)
@@ -101,11 +108,13 @@ def ranged_echo(stretch: float, shape: Waveform | None, sonar: Sonar) -> Stretch
 
 def _direct(scene: Scene) -> float:
     """Longest time (s) before or after the peak of its envelope that any filtered snap exceeds `DIRECT` of its peak."""
-    sonar, longest = scene.sonar, 0.0
-    for shape in extreme_waveforms(scene):
-        (before, after), late = pulse_support(shape, sonar.antialias, DIRECT), envelope_delay(shape, sonar)
-        longest = max(longest, before + late, after - late)
-    return longest
+    return max((_lasts(shape, scene.sonar) for shape in extreme_waveforms(scene)), default=0.0)
+
+
+@lru_cache(maxsize=64)
+def _lasts(shape: Waveform, sonar: Sonar) -> float:
+    (before, after), late = pulse_support(shape, sonar.antialias, DIRECT), envelope_delay(shape, sonar)
+    return max(before + late, after - late)
 
 
 @lru_cache(maxsize=64)

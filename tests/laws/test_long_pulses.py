@@ -117,6 +117,12 @@ def test_a_sweep_ranges_what_moves_as_far_off_as_the_plan_says(speed: float, tmp
     assert float(said) == pytest.approx(off, rel=0.05)
     assert abs(off) < 2.0 * float(cloud["range_error"][0])  # 3 and 17 of them before
 
+    short = SnappingShrimp(name="short", position=(5.0, 0.2, -50.2), source_level=180.0)  # stretched by more
+    sources = (short, *world.sources)
+    both = plan(replace(still, scene=replace(still.scene, world=replace(world, sources=sources))))
+    assert both.windows.supports.late == made.windows.supports.late > 0.0
+    assert f"ranges are {said} m off" in "\n".join(both.warnings)
+
 
 @pytest.mark.parametrize("width", [1e3, 3e3, 10e3, "a long tone"])
 def test_an_echo_window_holds_noise_to_tell_echoes_by(width: float | str) -> None:

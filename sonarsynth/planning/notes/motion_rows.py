@@ -12,7 +12,7 @@ from sonarsynth.planning.measured.sampled_arrivals import context_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plan_tables import Omission
 from sonarsynth.planning.plans import Plan
-from sonarsynth.planning.pulse_durations import STILL, ranged_echo, stretches
+from sonarsynth.planning.pulse_durations import Stretch, ranged_echo, stretches
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.state import FrameContext
 from sonarsynth.tracing.meetings import MeetingTimes, meetings
@@ -27,7 +27,8 @@ def stretch_notes(looks: Sequence[SampledScene], allowed: float) -> list[str]:
     worst, lines = 1.0, []
     for look in looks:
         sonar, c = look.scene.sonar, look.scene.sonar.assumed_sound_speed
-        stretch, by_path, waveform = max(stretches(look), key=lambda row: abs(row[0]) * row[1], default=STILL)
+        rows = stretches(look)
+        stretch, by_path, waveform, _ = max(rows, key=lambda row: abs(row.longer) * row.by_path, default=Stretch())
         echo = ranged_echo(stretch, waveform, sonar)
         off, lost = by_path * c * echo.late, -10.0 * np.log10(max(echo.power, 1e-30))
         if max(abs(off) / allowed, lost / FAINTER) > worst:
