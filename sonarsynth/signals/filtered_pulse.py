@@ -232,11 +232,15 @@ def stretched_spectra(
 
 @lru_cache(maxsize=64)
 def stretch_sizes(waveform: Waveform, chosen: Filter, widest: float, sloped: bool = False) -> tuple[float, ...]:
-    """Mean moduli of the coefficients (degree,) of `stretched_spectra` over frequency, over that of the first; of the
+    """Mean moduli of the coefficients (degree,) of `stretched_spectra` where it is heard, over the first; of the
     differentiated snap, if it is sloped. As many as it takes until they are nothing: more, the longer the pulse."""
-    f = np.linspace(0.0, stop_frequency(chosen), 97)
+    stop = stop_frequency(chosen)
+    pulse, sizes = _pulse(waveform, 1.2 * stop), np.ones(1)
+    fine = np.linspace(0.0, stop, max(int(2.0 * stop * (pulse.end - pulse.start)), 97))  # tones are narrow
+    loud = np.abs(pulses.spectrum(fine, pulse) * filters.response(fine, fir(chosen)))
+    low, high = fine[loud >= 1e-3 * loud.max()][[0, -1]]
+    f = np.linspace(low / (1.0 + widest), min(high / max(1.0 - widest, 0.1), stop), 97)
     filtered = filters.response(f, fir(chosen)) * (f if sloped else 1.0)
-    pulse, sizes = _pulse(waveform, 1.2 * float(f[-1])), np.ones(1)
     for count in (16, 32, 64, 128, 256, 512):
         at = 1.0 + widest * chebyshev(count)
         value = analysis(count) @ (pulses.stretched_spectra(f, pulse, at) * at[:, None] * filtered)
@@ -244,15 +248,14 @@ def stretch_sizes(waveform: Waveform, chosen: Filter, widest: float, sloped: boo
         if sizes[-count // 4 :].sum() <= 1e-9 * sizes[0]:
             break
     else:
-        message = f"pulses too long to be stretched by {widest:.2g} of themselves, as motion does: take direct_sum"
-        raise FieldError(("scene", "physics", "synthesis"), message)
+        said = f"pulses too long to be stretched by {widest:.2g} of themselves, as motion does: take direct_sum"
+        raise FieldError(("scene", "physics", "synthesis"), said)
     return tuple((sizes / sizes[0]).tolist()) if sizes[0] > 0.0 else (1.0, inf)
 
 
 @lru_cache(maxsize=64)
 def heard_part(waveform: Waveform, chosen: Filter) -> float:
-    """Largest modulus of the filtered snap's spectrum over that of the snap, up to the stop band; 0 for one that has
-    nothing there."""
+    """Largest modulus of the filtered snap's spectrum over that of the snap, up to the stop band; 0 if that is 0."""
     f = np.linspace(0.0, stop_frequency(chosen), 513)
     pulse = _pulse(waveform, 1.2 * float(f[-1]))
     bound = np.abs(pulse.strength).sum()  # bounds its spectrum

@@ -139,7 +139,7 @@ class Transmitter(SoundSource):
             said |= {"type": kind, "start": start, "stop": stop, "duration": self.pulse.duration}
         if self.beam is not None:
             angles = ("azimuth", "elevation", "azimuth_width", "elevation_width")
-            said |= {name: float(np.rad2deg(getattr(self.beam, name))) for name in angles}
+            said |= {name: round(float(np.rad2deg(getattr(self.beam, name))), 9) for name in angles}
         return said
 
     @property

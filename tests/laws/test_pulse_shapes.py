@@ -23,7 +23,9 @@ from sonarsynth.signals.filtered_pulse import (
     stretched_spectra,
 )
 from sonarsynth.signals.pulse_shapes import shape_modes
+from sonarsynth.sources.pulse_model import PulseModel
 from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.sources.snap_models import Gabor
 from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.sources.transmitter import Sweep
 from sonarsynth.state import Emission
@@ -274,9 +276,19 @@ def test_a_series_in_doppler_is_the_stretched_snap(widest: float) -> None:
         assert np.abs(row - exact).sum() < (2.0 * left + 1e-11) * np.abs(exact).sum()
 
 
-def test_the_series_of_a_long_pulse_has_as_many_degrees_as_it_takes() -> None:
-    """At 20 m/s, of a sweep of 5 ms: at 16, its echoes were up to 0.4 of their peak off, and up to 4 points each."""
-    long, widest, samples = waveform(Sweep(start=40e3, stop=80e3, duration=5e-3)), 2.0**-5, 2048
+@pytest.mark.parametrize(
+    ("pulse", "widest", "samples"),
+    [
+        (Sweep(start=40e3, stop=80e3, duration=5e-3), 2.0**-5, 2048),
+        *((Gabor(frequency=60e3 + off, cycles=1000.0), 2.0**-9, 16384) for off in (0.0, 200.0, 450.0)),
+    ],
+)
+def test_the_series_of_a_long_pulse_has_as_many_degrees_as_it_takes(
+    pulse: PulseModel, widest: float, samples: int
+) -> None:
+    """At 20 m/s, of a sweep of 5 ms: at 16, its echoes were up to 0.4 of their peak off, and up to 4 points each. Tones
+    of 17 ms fall between frequencies 0.9 kHz apart: at those they had too few, or were refused."""
+    long = waveform(pulse)
     sizes = np.array(stretch_sizes(long, SONAR.antialias, widest))
     count = int(np.flatnonzero(np.cumsum(sizes[::-1])[::-1] <= 1e-6)[0])
     series = stretched_spectra(long, SONAR.antialias, SONAR.sampling_frequency, samples, widest, count)
