@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 HALF, UNIT, TURN = np.float32(0.5), np.float32(2.0**-32), np.float32(2.0 * np.pi)
+"""Of whole numbers of 32 bits: what makes them numbers from 0 to 1, neither, and angles (rad)."""
 
 
 def stream(seed: int, *path: int | str) -> np.random.Generator:
@@ -48,8 +49,8 @@ def uniforms(seed: int, *counters: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return np.asarray(((state >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52)
 
 
-def normal_waves(power: npt.NDArray[np.float32], random: np.random.Generator) -> npt.NDArray[np.complex64]:
-    """Complex normal numbers (...) whose real and imaginary part have these powers (...) each.
+def complex_normals(power: npt.NDArray[np.float32], random: np.random.Generator) -> npt.NDArray[np.complex64]:
+    """Complex normal numbers (...) of mean 0; power (...): variance of the real part, and of the imaginary part.
 
     On whole arrays: in a third of the generator's time. Source: Box and Muller (1958), Ann. Math. Statist. 29, 610.
     """

@@ -168,10 +168,15 @@ def _environment(tree: xr.DataTree, file: Any) -> None:
     _put(group, "sound_speed_indicative", (), speed, "m/s", "Indicative sound speed")
 
 
+def _hydrophones(tree: xr.DataTree) -> Floats:
+    """Positions (sensor, xyz) m, sonar frame; without signals the array is one."""
+    return np.asarray(tree["signals/position"].values) if "signals" in tree.children else np.zeros((1, 3))
+
+
 def _platform(tree: xr.DataTree, file: Any, sent: TransmitBeams) -> None:
     """The hydrophones, transducers that receive alone, and after them the transmitters."""
     group = file.create_group("Platform")
-    hydrophones = np.asarray(tree["signals/position"].values) if "signals" in tree.children else np.zeros((1, 3))
+    hydrophones = _hydrophones(tree)
     position = np.concatenate([hydrophones, sent.position])
     group.dimensions = {"transducer": len(position), "position": 1, "MRU": 1, "gyro": 1}
     kind = group.create_enumtype(np.int8, "transducer_type_t", {"Receive_only": 0, "Transmit_only": 1, "Monostatic": 3})
@@ -231,7 +236,7 @@ def _beam_group(
 
 def _transducers(tree: xr.DataTree, group: Any, beams: _Beams, sent: TransmitBeams) -> None:
     """Which transducers of `/Platform` hear each hydrophone's beam, and send the transmit beams."""
-    hydrophones, pings = len(tree["signals/position"]) if "signals" in tree.children else 1, len(group["ping_time"])
+    hydrophones, pings = len(_hydrophones(tree)), len(group["ping_time"])
     if beams.units == "Pa":
         index = np.arange(hydrophones, dtype=np.int32)
         group.create_variable("receive_transducer_index", ("beam",), np.int32, data=index)

@@ -48,9 +48,10 @@ class SonarTiming:
     elements: Elements
     sound_speed: float  # m/s that beams are steered by
     focus: float | None  # m
-    clock: float  # s: arrival of the direct pulse that delays are counted from
+    clock: float  # s: when the direct pulse that delays are counted from is loudest
     pose: Pose
     velocity: Floats  # (xyz) m/s of the array, world
+    late: Floats  # (snap,) s: when its pulse is loudest, after the time that delays of paths count from
 
 
 @lru_cache(maxsize=16)
@@ -119,7 +120,7 @@ def attribution(
     """
     elements, width = listening.elements, band.high - band.low
     gate, reach = GATE / width, elements.aperture / listening.sound_speed
-    clock, doppler = _clock(arrivals, listening.clock, gate)
+    clock, doppler = _clock(arrivals, listening, gate)
     stretch, shift = _stretches(arrivals, doppler, band)
     moment, longer = clock + late, kernels.largest(arrivals.corner_delays) + shift
     slowness = listening.sound_speed / arrivals.sound_speed
@@ -188,16 +189,16 @@ def _loud(power: Floats, code: Ints) -> Bools:
     return loud
 
 
-def _clock(arrivals: Arrivals, clock: float, gate: float) -> tuple[float, float]:
-    """When (s) the direct pulse that delays are counted from arrives, and its Doppler: as traced, where one does at
-    that time."""
+def _clock(arrivals: Arrivals, listening: SonarTiming, gate: float) -> tuple[float, float]:
+    """When (s) the direct pulse that delays are counted from arrives, and its Doppler: as traced, where one is loudest
+    at that time."""
     rows = np.flatnonzero(arrivals.direct)
     rows = rows[(arrivals.surface[rows] == 0) & (arrivals.bottom[rows] == 0)]
     if not len(rows):
-        return clock, 0.0
-    near = rows[np.argmin(np.abs(arrivals.delay[rows] - clock))]
-    heard, doppler = float(arrivals.delay[near]), float(arrivals.doppler[near])
-    return (heard, doppler) if abs(heard - clock) < gate else (clock, 0.0)
+        return listening.clock, 0.0
+    off = np.abs(arrivals.delay[rows] + listening.late[arrivals.snap[rows]] - listening.clock)
+    near = rows[np.argmin(off)]
+    return (float(arrivals.delay[near]), float(arrivals.doppler[near])) if off.min() < gate else (listening.clock, 0.0)
 
 
 def _stretches(arrivals: Arrivals, doppler: float, band: Band) -> tuple[Floats, Floats]:

@@ -65,20 +65,12 @@ def point_labels(
         known_elements(plan, frame),
         sonar.assumed_sound_speed,
         plan.choices.beamforming.focus,
-        _emitted_clock(plan, frame, arrivals, float(estimates.time[0])) if len(estimates.time) else np.nan,
+        float(estimates.time[0]) if len(estimates.time) else np.nan,
         frame.sonar_pose,
         frame.sonar_velocity * moves,
+        np.array([lateness(snap.waveform, sonar) for snap in frame.moment.snaps]),
     )
     return label_points(cloud, arrivals, band, moment, listening, scattered)
-
-
-def _emitted_clock(plan: Plan, frame: Frame, arrivals: Arrivals, heard: float) -> float:
-    """When time 0 of the direct pulse whose peak is heard at a time (s) arrives: arrivals are of time 0."""
-    late = np.array([lateness(snap.waveform, plan.scene.sonar) for snap in frame.moment.snaps])
-    if not late.any() or not arrivals.direct.any():
-        return heard
-    delays = late[arrivals.snap[arrivals.direct]]
-    return heard - float(delays[np.argmin(np.abs(arrivals.delay[arrivals.direct] + delays - heard))])
 
 
 def frame_values(plan: Plan, frame: Frame) -> Values:

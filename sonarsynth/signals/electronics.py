@@ -15,7 +15,7 @@ from sonarsynth.equations.noise.ambient_noise import power_density
 from sonarsynth.equations.noise.filters import duration
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
-from sonarsynth.randomness import normal_waves
+from sonarsynth.randomness import complex_normals
 from sonarsynth.receiver import Converter, Electronics, Elements, Filter, Sonar
 from sonarsynth.signals.filtered_pulse import filter_response, fir
 from sonarsynth.signals.segments import fast_length
@@ -87,7 +87,7 @@ def add_noise(
     else:
         for first in range(0, sensors, AT_ONCE):
             some = spectrum[first : first + AT_ONCE, low:high]
-            some[...] = normal_waves(np.broadcast_to(size**2, some.shape), fast)
+            some[...] = complex_normals(np.broadcast_to(size**2, some.shape), fast)
     if not np.all(elements.gain == 1.0):
         spectrum *= elements.gain[:, None].astype(np.float32)
     return replace(signals, pressure=signals.pressure + irfft(spectrum, length, axis=1, overwrite_x=True)[:, :samples])

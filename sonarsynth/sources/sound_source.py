@@ -65,8 +65,8 @@ class SoundSource(Method):
         return self.kind.replace("_", " ")
 
     @property
-    def transmission(self) -> dict[str, str | float] | None:
-        """What a store says of what the sonar sends: its attribute `transmitters`; None of what is not its own."""
+    def as_transmitter(self) -> dict[str, str | float] | None:
+        """What a store says of a transmitter of the sonar, in its attribute `transmitters`; None of other sources."""
         return None
 
     def position_at(self, bottom: float, time: float = 0.0) -> Floats:

@@ -129,8 +129,8 @@ class Transmitter(SoundSource):
         return PINGS
 
     @property
-    def transmission(self) -> dict[str, str | float]:
-        """As `SoundSource.transmission`: place (m), level (dB), and what a sweep and a beam are (Hz, s, degrees)."""
+    def as_transmitter(self) -> dict[str, str | float]:
+        """As `SoundSource.as_transmitter`: place (m), level (dB), and what a sweep and a beam are (Hz, s, degrees)."""
         said: dict[str, str | float] = dict(zip(("name", *"xyz"), (self.name, *self.position), strict=True))
         said["source_level"] = self.source_level
         if isinstance(self.pulse, Sweep):

@@ -57,7 +57,8 @@ def made(recipe: Recipe, focus: float | None = 20.0, snap: int = 0) -> Made:
     arrivals, sonar = traced.arrivals, resolved.scene.sonar
     clock = arrivals.delay[arrivals.direct & (arrivals.snap == snap)].min()
     pose, velocity = traced.frame.sonar_pose, traced.frame.sonar_velocity
-    listening = SonarTiming(resolved.elements, sonar.assumed_sound_speed, focus, float(clock), pose, velocity)
+    late = np.zeros(len(traced.frame.moment.snaps))  # the clock is that of their time 0
+    listening = SonarTiming(resolved.elements, sonar.assumed_sound_speed, focus, float(clock), pose, velocity, late)
     return Made(resolved, traced.frame, arrivals, band_of(resolved, traced.frame.moment.snaps), listening)
 
 

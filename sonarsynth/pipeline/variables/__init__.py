@@ -67,7 +67,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
     also: dict[str, Any] = {"other_sounds": others} if others else {}
     if world.sources:
         also["lit_by"] = sorted({source.light for source in world.sources})
-    if sent := [said for source in world.sources if (said := source.transmission) is not None]:
+    if sent := [said for source in world.sources if (said := source.as_transmitter) is not None]:
         also["transmitters"] = sent
     return also | {
         "title": recipe.title,

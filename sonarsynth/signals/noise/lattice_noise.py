@@ -13,7 +13,7 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.environment.noise.directions import NoiseDirections
 from sonarsynth.equations.noise.lattice_coherence import lag_covariance, periodic_powers
 from sonarsynth.equations.noise.wave_directions import quadrature
-from sonarsynth.randomness import normal_waves
+from sonarsynth.randomness import complex_normals
 from sonarsynth.receiver import Elements
 
 TORUS = (1.0, 1.15, 1.4)
@@ -154,7 +154,7 @@ def draw(field: PeriodicField, elements: Elements, frequency: Floats, random: np
         bins = slice(first, first + many)
         below = powers[low[bins]]
         power = below + fraction[bins] * (powers[low[bins] + 1] - below)
-        near = along_y @ (normal_waves(power, random).reshape(-1, power.shape[2]) @ along_z.T).reshape(
+        near = along_y @ (complex_normals(power, random).reshape(-1, power.shape[2]) @ along_z.T).reshape(
             power.shape[:2] + along_z.shape[:1]
         )
         out[:, bins] = near[:, y, z].T
