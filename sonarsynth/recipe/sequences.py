@@ -26,7 +26,7 @@ from sonarsynth.recipe.rising_bottom import with_relief
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import Splits, assign
 from sonarsynth.recipe.variation.grid import Axis, Zip, axes
-from sonarsynth.recipe.variation.random_variations import Choice, Sobol, Variation, as_drawn
+from sonarsynth.recipe.variation.random_variations import Choice, Integers, Sobol, Variation, as_drawn
 from sonarsynth.recipe.variation.setting import Setting, Stamps, file_stamps, mesh_files, plain_scene, with_settings
 from sonarsynth.recipe.variation.values import FRAMES, MOST_FRAMES, Plain, Where, default_name, leads_through, where
 
@@ -211,23 +211,19 @@ class Sequences:
         if self.splits is None:
             return np.zeros(self.count, np.int64)
         stratify, undivided = self.splits.stratify, self.splits.undivided
-        discrete = all(isinstance(v, Choice) for v in self.variations)
+        continuous = [v for v in self.variations if not isinstance(v, Choice | Integers)]
+        unlike = bool(self.base.world.populations) or any(v.when is None for v in continuous)  # no two scenes are one
+        settings_of = self.grid_settings if unlike and len(continuous) == len(self.variations) else self.settings
         groups: list[object] = []
         strata: list[object] = []
         for sequence in range(self.count):
-            named = {} if not (stratify or undivided or discrete) else self._discrete(sequence)
+            settings = settings_of(sequence) if stratify or undivided or not unlike else ()
+            named = {s.name: s.value.text for s in settings}
             strata.append(named.get(stratify or ""))
-            groups.append(
-                tuple(named[n] for n in undivided) if undivided else tuple(named.items()) if discrete else sequence
-            )
+            scene = sequence if unlike else tuple(s.value.text for s in settings if s.paths != (FRAMES,))
+            groups.append(tuple(named[n] for n in undivided) if undivided else scene)
         priority = [number(self.seed, "split", self.key(n)) for n in range(self.count)]
         return assign(self.splits.shares, groups, strata, priority)
-
-    def _discrete(self, sequence: int) -> dict[str, str]:
-        """The values of a sequence that others may have as well: of grid entries and choices."""
-        drawn = self.drawn(sequence) if any(isinstance(v, Choice) for v in self.variations) else ()
-        chosen = [s for s, v in zip(drawn, self.variations, strict=False) if isinstance(v, Choice)]
-        return {s.name: s.value.text for s in (*self.grid_settings(sequence), *chosen)}
 
     def as_json(self) -> dict[str, Any]:
         """What is spanned, for a program."""

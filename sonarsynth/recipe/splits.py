@@ -19,7 +19,7 @@ _Share = Annotated[Number, Ge(0), Le(1)]
 @description
 class Splits:
     """Shares of the sequences for training, validation and test. A sequence is never divided, nor are sequences whose
-    scene is the same.
+    scene is the same, but for its number of frames. Those of which populations are drawn are not the same.
     """
 
     train: _Share = 0.0

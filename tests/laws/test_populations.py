@@ -19,7 +19,7 @@ from sonarsynth.geometry.motion import Still, pose, spin, velocity
 from sonarsynth.pipeline import render
 from sonarsynth.planning.notes.population_notes import population_notes
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Sonar
-from sonarsynth.recipe import Axis, Recipe, reading
+from sonarsynth.recipe import Axis, Choice, Recipe, Splits, reading
 from sonarsynth.recipe.populations.drawn_tracks import AnyOrientation, Hovering, StraightAhead, Upright, Wandering
 from sonarsynth.recipe.populations.population import BodyModel, Population
 from sonarsynth.recipe.populations.regions import Annulus, BoxRegion, FieldOfView, PolygonRegion
@@ -70,6 +70,12 @@ def test_numbers_models_scales_and_headings_are_drawn_as_they_say() -> None:
     assert {target.scale for target in every if target.category == "crate"} == {1.0}
     headings = [target.motion.heading for target in every if isinstance(target.motion, Still)]
     assert kstest(np.array(headings) / (2 * np.pi), "uniform").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("varied", [(), (Choice(path="trajectory.interval", values=(1, 2)),)], ids=["alone", "choice"])
+def test_sequences_of_drawn_bodies_are_split_in_the_shares(varied: tuple[Choice, ...]) -> None:
+    made = recipe(some(), repeats=50, variations=varied, splits=Splits(train=0.8, validation=0.1, test=0.1))
+    assert np.bincount(made.spanned.split, minlength=3).tolist() == [40, 5, 5]
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonarsynth.recipe import Recipe, Splits, reading
-from tests.laws.test_sequences import recipe
+from sonarsynth.recipe import Choice, Integers, Recipe, Splits, Uniform, reading
+from sonarsynth.recipe.variation.random_variations import Condition
+from tests.laws.test_sequences import MOTION, recipe
 from tests.laws.test_splits import HULLS, VARIED
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -20,7 +22,7 @@ CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 def parts(made: Recipe, index: int) -> Iterator[tuple[str, object]]:
     """What a frame is made from, by kind."""
     scene, frame = made.frame(index)
-    yield "scene", scene
+    yield "scene", replace(scene, trajectory=replace(scene.trajectory, frames=1))
     for body in frame.moment.bodies:
         yield "mesh pose", (body.mesh.digest, tuple(body.pose.position), tuple(body.pose.orientation))
     for snap in frame.moment.snaps:
@@ -43,13 +45,23 @@ def test_no_scene_mesh_pose_or_snap_of_a_config_is_in_several_splits(name: str) 
     assert shared(made) == {"scene": 0, "mesh pose": 0, "snap": 0}
 
 
+FEW = (
+    Integers(path=f"{MOTION}.speed", low=0, high=2),
+    Integers(path="trajectory.frames", low=2, high=4),
+    Choice(path=f"{MOTION}.climb", values=(0, 0.1)),
+)
+"""Of values that several sequences have."""
+IN_SPHERES = Uniform(path=f"{MOTION}.pitch", low="-9 deg", high="9 deg", when=Condition(entry="hull", value="sphere"))
+
+
 @st.composite
 def recipes(draw: st.DrawFn) -> Recipe:
-    varied: tuple[Any, ...] = tuple(draw(st.lists(st.sampled_from(VARIED), unique=True, max_size=4)))
+    varied: tuple[Any, ...] = tuple(draw(st.lists(st.sampled_from((*VARIED, *FEW)), unique=True, max_size=4)))
     weights = draw(st.tuples(*[st.integers(0, 4)] * 3).filter(lambda some: sum(w > 0 for w in some) > 1))
     train, validation, test = (w / sum(weights) for w in weights)
     grid = draw(st.sampled_from([(), (HULLS,)]))
     stratify = draw(st.sampled_from([None, "hull"])) if grid else None
+    varied += (IN_SPHERES,) if grid and draw(st.booleans()) else ()
     asked = Splits(train=train, validation=validation, test=test, stratify=stratify)
     return recipe(
         seed=draw(st.integers(0, 2**31)), grid=grid, variations=varied, repeats=draw(st.integers(2, 6)), splits=asked
