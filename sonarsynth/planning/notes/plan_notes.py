@@ -23,7 +23,14 @@ from sonarsynth.planning.notes.source_notes import (
     steering_notes,
     unlocated,
 )
-from sonarsynth.planning.notes.target_notes import law_notes, mirror_notes, overlap_notes, view_notes, where_laws_hold
+from sonarsynth.planning.notes.target_notes import (
+    focus_notes,
+    law_notes,
+    mirror_notes,
+    overlap_notes,
+    view_notes,
+    where_laws_hold,
+)
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import SUPPORT, extreme_waveforms
 from sonarsynth.recipe import Recipe
@@ -72,6 +79,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         lines += unlocated(scene) or lobe_notes(some) + direction_notes(some) + assumed_speed_notes(some)
     for look in noted(looks):
         lines += mirror_notes(look) + overlap_notes(look)
+        lines += focus_notes(look) if plan.products & OF_BEAMS else []
         lines += _extent(look.scene, look.profile)
         lines += _cut(look.scene, look.profile.uniform)
         lines += validity(look.scene, look.profile)
