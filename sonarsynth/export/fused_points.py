@@ -10,7 +10,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description import FieldError
-from sonarsynth.geometry import Pose
+from sonarsynth.geometry import Pose, rotation_matrix, turned
 from sonarsynth.store import open_store
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ def points(
     ----------
     store: path, URL or opened tree.
     frames: numbers of frames; left out: all.
-    relative_to: the axes of `position`: "sonar", those of the array at each frame; "world"; or the name of a target, as
-        it was when the sound met it, so that points on its hull fall together whatever it does.
+    relative_to: the axes of `position`: "sonar", those of the array when it heard the echo; "world"; or the name of a
+        target, as it was when the sound met it, so that points on its hull fall together whatever it and the array do.
 
     Returns
     -------
@@ -79,40 +79,39 @@ def _frame(tree: xr.DataTree, index: int, relative_to: str, names: list[str]) ->
     finite = np.isfinite(cloud["range"].values)
     columns = {name: cloud[name].values[finite] for name in KEPT if name in cloud}
     position = np.stack([cloud[axis].values[finite] for axis in "xyz"], axis=-1).astype(float)
+    normal = _normals(tree, bodies, columns["target"], columns["facet"], columns["emission"], names)
     sonar = Pose(truth["sonar_position"].values, truth["sonar_orientation"].values)
-    turn = _Turn(sonar, bodies, relative_to, names, columns["emission"])
-    return {
-        "position": turn.place(position),
-        "normal": turn.vector(_normals(tree, bodies, columns["target"], columns["facet"], names)),
-        "frame": np.full(len(position), index, np.int32),
-        **columns,
-    }
+    clock = tree["source_estimates"].dataset["time"].values[index, 0]
+    heard, spin = clock + cloud["delay"].values[finite].astype(float), truth["sonar_spin"].values
+    if relative_to == "sonar":
+        normal = sonar.turn_to_body(turned(normal, spin, -heard))
+    else:
+        carried = sonar.position + np.outer(heard, truth["sonar_velocity"].values)
+        position = carried + turned(sonar.turn_to_world(position), spin, heard)
+    if relative_to in names:
+        body = bodies.isel(target=names.index(relative_to))
+        rotations = _rotations(body, columns["emission"])
+        position = np.einsum("pij,pi->pj", rotations, position - _at_echo(body, "position", columns["emission"]))
+        normal = np.einsum("pij,pi->pj", rotations, normal)
+    return {"position": position, "normal": normal, "frame": np.full(len(position), index, np.int32), **columns}
 
 
-class _Turn:
-    """From the sonar's frame, and from the world's, into another."""
-
-    def __init__(self, sonar: Pose, bodies: xr.Dataset, to: str, names: list[str], emission: Ints) -> None:
-        self.sonar, self.to, self.origin = sonar, to, np.zeros((1, 3))
-        self.pose = sonar if to == "sonar" else Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
-        if to in names:
-            body = bodies.isel(target=names.index(to))
-            self.pose = Pose(np.zeros(3), body["orientation"].values)
-            met = body["position_at_echo"].values[np.maximum(emission, 0)]
-            self.origin = np.where(np.isfinite(met), met, body["position"].values)
-
-    def place(self, own: Floats) -> Floats:
-        """Places (point, xyz) of the sonar's frame."""
-        if self.to == "sonar":
-            return own
-        return self.pose.turn_to_body(self.sonar.to_world(own) - self.origin)
-
-    def vector(self, world: Floats) -> Floats:
-        """Vectors (point, xyz) of the world."""
-        return self.pose.turn_to_body(world)
+def _at_echo(body: xr.Dataset, name: str, emission: Ints) -> Floats:
+    """Position or orientation (point, ...) of a body when the snap of each point met it; at the instant of the frame,
+    where that is not known."""
+    met = body[f"{name}_at_echo"].values[np.maximum(emission, 0)]
+    return np.asarray(np.where(np.isfinite(met), met, body[name].values))
 
 
-def _normals(tree: xr.DataTree, bodies: xr.Dataset, target: Ints, facet: Ints, names: list[str]) -> Floats:
+def _rotations(body: xr.Dataset, emission: Ints) -> Floats:
+    """Rotation matrices (point, 3, 3) from a body to the world when the snap of each point met it."""
+    orientations = _at_echo(body, "orientation", emission)
+    return np.array([rotation_matrix(orientation) for orientation in orientations]).reshape(-1, 3, 3)
+
+
+def _normals(
+    tree: xr.DataTree, bodies: xr.Dataset, target: Ints, facet: Ints, emission: Ints, names: list[str]
+) -> Floats:
     """Outward normals (point, xyz), world, of the facets that brought the echoes; NaN where none did."""
     normals = np.full((len(target), 3), np.nan)
     for number in range(len(names)):
@@ -124,5 +123,6 @@ def _normals(tree: xr.DataTree, bodies: xr.Dataset, target: Ints, facet: Ints, n
         a, b, c = np.moveaxis(mesh["vertices"].values.astype(float)[mesh["faces"].values[facet[rows]]], 1, 0)
         across = np.cross(b - a, c - a)
         own = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
-        normals[rows] = Pose(np.zeros(3), bodies["orientation"].values[number]).turn_to_world(own)
+        rotations = _rotations(bodies.isel(target=number), emission[rows])
+        normals[rows] = np.einsum("pij,pj->pi", rotations, own)
     return normals

@@ -82,6 +82,17 @@ class Pose:
         return _times(vectors, self.rotation)
 
 
+def turned(vectors: Floats, spin: Floats, seconds: Floats) -> Floats:
+    """Vectors (row, xyz) that turned for so many seconds (row,) at an angular velocity (xyz) in rad/s (Rodrigues'
+    rotation formula)."""
+    rate = float(np.linalg.norm(spin))
+    if rate == 0.0:
+        return vectors
+    axis, angle = spin / rate, rate * seconds[:, None]
+    along = (vectors @ axis)[:, None] * axis
+    return np.asarray(along + np.cos(angle) * (vectors - along) + np.sin(angle) * np.cross(axis, vectors))
+
+
 def _times(vectors: npt.ArrayLike, matrix: Floats) -> Floats:
     """Vectors (..., 3) times a matrix (3, 3), as one product: many small ones take four times as long."""
     rows = np.asarray(vectors, float)

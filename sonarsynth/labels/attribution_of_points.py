@@ -51,6 +51,7 @@ class SonarTiming:
     clock: float  # s: when the direct pulse that delays are counted from is loudest
     pose: Pose
     velocity: Floats  # (xyz) m/s of the array, world
+    spin: Floats  # (xyz) rad/s of the array, world
     late: Floats  # (snap,) s: when its pulse is loudest, after the time that delays of paths count from
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose
+from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.oriented_box import oriented_box
 from sonarsynth.labels.views.appearance import Appearance, Connect, appearance, lit_fraction
@@ -30,13 +31,13 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     and `view` says why (`views.View`).
     """
     bodies, sonar_pose, beams = context.bodies, context.receiver.pose, context.receiver.sonar.beams
-    medium = context.medium
+    medium, listening = context.medium, context.receiver.track
     connect = partial(propagation.direct.connect, medium.profile, medium.depth)
     bent = connect if propagation.bends else None
     appearances = [appearance(body, bodies, sonar_pose, bent) for body in bodies]
     seen = [(a.corners, b.mesh.faces, a.boxes, a.full_box) for b, a in zip(bodies, appearances, strict=True)]
     met_first = beam_views(seen, beams)
-    tracks = [body.track if context.receiver.track else body.frozen.track for body in bodies]
+    tracks = [body.track if listening else body.frozen.track for body in bodies]
     by_lines = medium.profile.uniform and propagation.straight(medium.profile)
     travel = partial(_straight_times, 1.0 / medium.profile.speed[0]) if by_lines else partial(_direct_times, connect)
     met = meeting_times(tracks, context.snaps, travel)
@@ -47,11 +48,14 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     return Truth(
         sonar_position=sonar_pose.position,
         sonar_orientation=sonar_pose.orientation,
+        sonar_velocity=np.zeros(3) if listening is None else listening.velocity,
+        sonar_spin=np.zeros(3) if listening is None else listening.spin,
         target_position=_rows([b.pose.position for b in bodies], 3),
         target_orientation=_rows([b.pose.orientation for b in bodies], 4),
         target_velocity=_rows([b.velocity for b in bodies], 3),
         meeting_time=met,
         position_at_echo=positions(tracks, met),
+        orientation_at_echo=_orientations(tracks, met),
         **_oriented(bodies, sonar_pose),
         **_boxes(bodies, appearances, sonar_pose, beams),
         visible_fraction=np.array([a.fraction for a in appearances]),
@@ -117,6 +121,14 @@ def _direct_times(connect: Connect, start: Floats, end: Floats) -> Floats:
 def _straight_times(slowness: float, start: Floats, end: Floats) -> Floats:
     """The same of straight lines, all at one slowness (s/m)."""
     return np.asarray(np.linalg.norm(end - start, axis=1) * slowness)
+
+
+def _orientations(tracks: list[Track], times: Floats) -> Floats:
+    """How what is on each track lies (snap, track, wxyz) at times (snap, track) s of the frame; NaN where these are."""
+    orientations = np.full((*times.shape, 4), np.nan)
+    for snap, number in np.argwhere(np.isfinite(times)).tolist():
+        orientations[snap, number] = tracks[number].later(float(times[snap, number])).pose.orientation
+    return orientations
 
 
 def _rows(rows: list[Floats], width: int) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.casting.surface_distances import surface_distances
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, direction
+from sonarsynth.geometry import turned
 from sonarsynth.labels import point_kernels as kernels
 from sonarsynth.labels.attribution_of_points import MOST_BINS, Attribution, SonarTiming, attribution
 from sonarsynth.labels.level_band import Band
@@ -129,6 +130,6 @@ def _from_targets(
         away = np.linalg.norm(spots - listening.pose.position, axis=1)
         ranges[at] = kernels.means(*shares, away[:, None])[:, 0]
         array = listening.pose.position + np.outer(heard, listening.velocity)
-        place = array + listening.pose.turn_to_world(places[at])
+        place = array + turned(listening.pose.turn_to_world(places[at]), listening.spin, heard)
         distance[at] = surface_distances(placed, place - np.outer(met - met.mean(), placed.velocity))
     return ranges, distance

@@ -68,6 +68,7 @@ def point_labels(
         float(estimates.time[0]) if len(estimates.time) else np.nan,
         frame.sonar_pose,
         frame.sonar_velocity * moves,
+        frame.sonar_track.spin * moves,
         np.array([lateness(snap.waveform, sonar) for snap in frame.moment.snaps]),
     )
     return label_points(cloud, arrivals, band, moment, listening, scattered)

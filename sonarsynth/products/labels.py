@@ -58,16 +58,20 @@ class Truth:
     """Exact ground truth of a frame, from the same arrivals that made the signals.
 
     Poses, boxes and beams are those of the frame's instant. What is heard is of when the sound met the target: where it
-    was then is `position_at_echo`, which echoes, images and points are to be judged by.
+    was then, and how it lay, is `position_at_echo` and `orientation_at_echo`, which echoes, images and points are to be
+    judged by; and of where the array was when it heard it.
     """
 
     sonar_position: Floats  # (xyz) m, world
     sonar_orientation: Floats  # (wxyz)
+    sonar_velocity: Floats  # (xyz) m/s, world: while sound is under way
+    sonar_spin: Floats  # (xyz) rad/s, world: the same of its angular velocity
     target_position: Floats  # (target, xyz) m, world
     target_orientation: Floats  # (target, wxyz)
     target_velocity: Floats  # (target, xyz) m/s, world
     meeting_time: Floats  # (snap, target) s: when the sound of each snap, by the direct path, meets the target's origin
     position_at_echo: Floats  # (snap, target, xyz) m, world: the origin then; NaN where no direct path leads to it
+    orientation_at_echo: Floats  # (snap, target, wxyz) then, as target_orientation; or NaN
     box: Floats  # (target, corner 8, xyz) m: oriented bounding box, sonar frame
     box_centre: Floats  # (target, xyz) m, sonar frame
     box_size: Floats  # (target, xyz) m: of the box, along the target's axes

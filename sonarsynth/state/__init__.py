@@ -11,7 +11,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.environment.sea import Environment, Profile
-from sonarsynth.geometry import Pose
+from sonarsynth.geometry import Pose, turned
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements, Sonar
@@ -94,14 +94,9 @@ class Receiver:
 
     def turn_to_array(self, towards: Floats, time: Floats) -> Floats:
         """Unit vectors (path, xyz) of the world in the frame of the array at times (path,), s after the instant of the
-        frame: by then it has turned at its spin of that instant (Rodrigues' rotation formula)."""
-        direction = towards @ self.pose.rotation
-        if self.track is None or not (spin := self.pose.turn_to_body(self.track.spin)).any():
-            return np.asarray(direction)
-        rate = float(np.linalg.norm(spin))
-        axis, turned = spin / rate, -rate * time[:, None]
-        along = (direction @ axis)[:, None] * axis
-        return along + np.cos(turned) * (direction - along) + np.sin(turned) * np.cross(axis, direction)
+        frame: by then it has turned at its spin of that instant."""
+        spin = np.zeros(3) if self.track is None else self.pose.turn_to_body(self.track.spin)
+        return turned(np.asarray(towards @ self.pose.rotation), spin, -time)
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,7 +58,9 @@ def made(recipe: Recipe, focus: float | None = 20.0, snap: int = 0) -> Made:
     clock = arrivals.delay[arrivals.direct & (arrivals.snap == snap)].min()
     pose, velocity = traced.frame.sonar_pose, traced.frame.sonar_velocity
     late = np.zeros(len(traced.frame.moment.snaps))  # the clock is that of their time 0
-    listening = SonarTiming(resolved.elements, sonar.assumed_sound_speed, focus, float(clock), pose, velocity, late)
+    listening = SonarTiming(
+        resolved.elements, sonar.assumed_sound_speed, focus, float(clock), pose, velocity, np.zeros(3), late
+    )
     return Made(resolved, traced.frame, arrivals, band_of(resolved, traced.frame.moment.snaps), listening)
 
 

@@ -11,7 +11,7 @@ from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.export import write_points
 from sonarsynth.geometry import Pose
-from sonarsynth.recipe.reading import load
+from sonarsynth.recipe.reading import load, loads
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +50,54 @@ def test_points_of_a_moving_hull_fall_together_on_it(crossing: Path) -> None:
     assert np.abs(place[:, 0]).max() < 0.9 and np.abs(place[:, 1:]).max() < 0.2
     world = ss.points(crossing, relative_to="world")["position"].values[own]
     assert np.ptp(world[:, 1]) > 5.0 > 3.0 * np.ptp(place[:, 0]), "it crossed 9 m of water"
+
+
+SWIMMING = """
+title: A ball that darts past a crate that swings, before a sonar that turns as it goes
+seed: 3
+scene:
+  world:
+    environment: {depth: 12 m, sound_speed: {kind: isovelocity, speed: 1530 m/s}}
+    targets:
+      - name: ball
+        shape: {kind: sphere, radius: 0.4 m, edge: 8 cm}
+        motion: {kind: course, start: [14, 1, -5], heading: 140 deg, speed: 6 m/s}
+      - name: crate
+        shape: {kind: box, size: [1.2 m, 0.6 m, 0.5 m], edge: 8 cm}
+        motion: {kind: hover, position: [17, -3, -6], heading: 40 deg, pitch: 20 deg, yaw: 60 deg, period: 2 s}
+    sources: [{kind: snapping_shrimp, position: [12, -6], source_level: 188 dB}]
+  sonar:
+    array: {kind: planar_lattice, columns: 16, rows: 12, pitch: 4 cm}
+    assumed_sound_speed: 1530 m/s
+    beams: {azimuth_span: 40 deg, azimuths: 41, elevation_span: 30 deg, elevations: 31}
+  trajectory:
+    frames: 4
+    interval: 0.3 s
+    sonar: {kind: hover, position: [0, 0, -6], heading: 90 deg, surge: 1 m, yaw: 20 deg, period: 4 s}
+"""
+
+
+def test_points_are_on_hulls_that_move_and_turn_before_a_sonar_that_does(tmp_path: Path) -> None:
+    """In the frame of each target, and as far from its sphere or box as their labels say; in the world as well."""
+    path = tmp_path / "s.zarr"
+    assert schedule.build(loads(SWIMMING), path, workers=0, products="cloud").ok
+    tree = ss.open(path)
+    world = ss.points(tree, relative_to="world")["position"].values
+    for number, name in enumerate(("ball", "crate")):
+        cloud = ss.points(tree, relative_to=name)
+        own = (cloud["target"].values == number) & (cloud["origin"].values == 0) & (cloud["family"].values == 0)
+        place, frame = cloud["position"].values[own], cloud["frame"].values[own]
+        beyond = np.abs(place) - [0.6, 0.3, 0.25]
+        boxed = np.linalg.norm(np.maximum(beyond, 0.0), axis=1) - np.minimum(beyond.max(axis=1), 0.0)
+        apart = boxed if number else np.abs(np.linalg.norm(place, axis=1) - 0.4)
+        assert own.sum() > 2 and np.median(apart) < 0.01
+        np.testing.assert_allclose(cloud["distance"].values[own], apart, atol=4e-3)  # a mesh is inside its sphere
+        met = tree["truth/targets/position_at_echo"].values[frame, 0, number]
+        np.testing.assert_allclose(
+            np.linalg.norm(world[own] - met, axis=1), np.linalg.norm(place, axis=1), rtol=0, atol=1e-6
+        )
+        outward = np.einsum("pj,pj->p", cloud["normal"].values[own], place)
+        assert (outward > 0.0).all(), "normals point outwards"
 
 
 def test_files_hold_the_points_with_colours_normals_and_labels(crossing: Path, tmp_path: Path) -> None:

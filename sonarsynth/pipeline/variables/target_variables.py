@@ -42,6 +42,13 @@ TARGETS = group_of(
         attributes=_MEETING,
     ),
     row(
+        "orientation_at_echo",
+        (*EMISSION, "target", "wxyz"),
+        "1",
+        "unit quaternion from the target's frame to the world when the sound of the snap, by the direct path, met it",
+        attributes=_MEETING,
+    ),
+    row(
         "meeting_time",
         (*EMISSION, "target"),
         "s",

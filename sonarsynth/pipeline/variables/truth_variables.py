@@ -21,6 +21,10 @@ _SONAR = group_of(
     "truth",
     row("sonar_position", ("frame", "xyz"), "m", "position of the array centre in the world"),
     row("sonar_orientation", ("frame", "wxyz"), "1", "unit quaternion from the sonar frame to the world"),
+    row("sonar_velocity", ("frame", "xyz"), "m s-1", "velocity of the array in the world while sound is under way"),
+    row(
+        "sonar_spin", ("frame", "xyz"), "rad s-1", "angular velocity of the array in the world while sound is under way"
+    ),
 )
 _EMISSIONS = group_of(
     "/truth/emissions",
