@@ -131,7 +131,7 @@ class Physics:
     """How facets scatter it, of targets that do not say so themselves."""
     subarrays: Literal["auto", "sensors"] | Annotated[int, Ge(1), Le(100_000)] = "auto"
     """Parts that the array is cut into: paths are traced to the middle of each and expanded from there to its
-    hydrophones. `sensors`: every hydrophone by itself; `auto`: as few as the accuracy of the recipe allows."""
+    hydrophones. `sensors`: each by itself; `auto`: as few as accuracy allows. Of images: `processing.beamforming`."""
     occlusion: Literal["auto", "centre", "sensors"] = "auto"
     """From where bodies hide facets: from the middle of the array (or part) for all, or from each sensor by itself.
     `auto`: the latter where the accuracy of the recipe asks for it."""

@@ -29,6 +29,7 @@ from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets import shapes
 from sonarsynth.targets.target import Target
 
+FOCUSED = "  processing: {beamforming: {kind: focused, subarrays: %s}}\n  sonar:"
 WRONG = [
     ("beams:", "beems:", "15: scene.sonar.beems: 'beems' is not a field here; did you mean 'beams'?"),
     ("azimuths: 11", "azimuths: 11.0", "15: scene.sonar.beams.azimuths: must be a valid integer, not 11.0"),
@@ -44,6 +45,8 @@ WRONG = [
     ("[1, 1, 1]", "[1, 2 kHz, 1]", "8: scene.world.targets.0.shape.size.1: has unit 'kHz'; use one of m, km, cm"),
     ("[1, 1, 1]", "[1, 1]", "8: scene.world.targets.0.shape.size.2: is required"),
     ("[1, 1, 1]", "1", "8: scene.world.targets.0.shape.size: must be a list, not 1"),
+    ("  sonar:", FOCUSED % "axis", "13: scene.processing.beamforming.subarrays: must be a list or 'auto', not 'axis'"),
+    ("  sonar:", FOCUSED % "[1, 17]", "13: scene.processing.beamforming.subarrays.1: must be less than or equal to 16"),
     ("      - position: [12, 8]\n", "      - name: a\n", "11: scene.world.sources.0.position: is required"),
     ("depth: 12 m, ", "", "5: scene.world.environment.depth: is required"),
     ("seed: 3", "seed: 3\nseed: 4", "3: seed: is given twice"),

@@ -57,7 +57,8 @@ class FocusedDelayAndSum(Steering):
     """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
     subarrays: tuple[Count, Count] | Literal["auto"] = "auto"
     """Subarrays across and up that the array is cut into, each focused for every beam. Auto: in a plan, the fewest
-    whose measured error is allowed; elsewhere, the fewest whose `focus_error` is under 0.1 dB, or 16 each way."""
+    whose measured error is allowed; elsewhere, the fewest whose `focus_error` is under 0.1 dB, or 16 each way. Those
+    that sound is traced to are `physics.subarrays`."""
     bins: Literal["few", "all", "auto"] = "auto"
     """Frequencies of the window that energies are summed over: as few as its sound needs, which is shorter (0.01 dB),
     or all. Auto: few in a plan, by the error that it measures; else all."""

@@ -22,11 +22,14 @@ def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
         keys, message = error_message(details, error_path(details, source.data), root, source.data)
         if details["type"] == "dataclass_type" and (texts.get(keys) or "").startswith("must be '"):
             texts[keys] = texts[keys].replace("' or '", "', '").replace(", not ", " or a mapping, not ", 1)
+        if details["type"] == "literal_error" and (texts.get(keys) or "").startswith("must be a list, not "):
+            texts[keys] = texts[keys].replace("a list, not ", f"a list or {details['ctx']['expected']}, not ", 1)
         texts.setdefault(keys, message)
         if details["type"] == "too_short":  # only entries that are right are counted
             explained.add(keys)
-    words = {keys for keys, text in texts.items() if text.startswith("must be '") and text.endswith("not a mapping")}
-    for keys in explained | words:  # of a word or a mapping, it is the mapping that was meant
+    meant = ("not a mapping", "not a list")
+    words = {keys for keys, text in texts.items() if text.startswith("must be '") and text.endswith(meant)}
+    for keys in explained | words:  # of a word, or a mapping or list, it is the latter that was meant
         if any(len(longer) > len(keys) and longer[: len(keys)] == keys for longer in texts):
             del texts[keys]
     items = list(texts.items())
