@@ -1,4 +1,5 @@
-"""Angles as ships have them: x forward, y to starboard, z down, turns clockwise as one looks along an axis."""
+"""Angles as ships have them: x forward, y to starboard, z down, turns clockwise as one looks along an axis; and where
+on the Earth they are."""
 
 from __future__ import annotations
 
@@ -8,6 +9,16 @@ from sonarsynth.conventions import Floats
 
 UPRIGHT = 1e-6
 """Sine of the angle from the vertical below which a bow points straight up or down."""
+
+EQUATOR = 6_378_137.0
+"""m: radius of the ellipsoid of WGS 84 (NIMA TR8350.2, 2000)."""
+FLATTENING = 1.0 / 298.257223563
+
+
+def latitude_longitude(position: Floats) -> tuple[Floats, Floats]:
+    """Latitude and longitude (row,) in degrees, WGS 84, of places (row, xyz) in m about 0 N 0 E: x east, y north."""
+    along_meridian = EQUATOR * (1.0 - FLATTENING) ** 2  # radius of curvature there
+    return np.rad2deg(position[:, 1] / along_meridian), np.rad2deg(position[:, 0] / EQUATOR)
 
 
 def heading_pitch_roll(orientation: Floats) -> tuple[Floats, Floats, Floats]:

@@ -16,19 +16,17 @@ import numpy as np
 from sonarsynth.conventions import PINGS, Floats, Progress
 from sonarsynth.description import FieldError
 from sonarsynth.detection import beam_width
-from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll
+from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll, latitude_longitude
 from sonarsynth.export.transmit_beams import KINDS, TransmitBeams, transmit_beams
 
 if TYPE_CHECKING:
     import xarray as xr
 
-METRES_A_DEGREE: Final = 111_195.0
-"""Of latitude, and of longitude at the equator, where there is the origin of the world."""
 LOST: Final = (
     "what the convention asks of a transmitter is NaN for snaps, and for pulses that are no sweep what it asks of a "
     "sweep; no equation converts to target strength",
-    "positions are metres east and north of 0 N 0 E; times are counted from the start of the motions, or the first "
-    "frame where that is earlier, as 1970-01-01",
+    "positions are metres east and north of 0 N 0 E (WGS 84); times are counted from the start of the motions, or the "
+    "first frame where that is earlier, as 1970-01-01",
     "the truth, points, source estimates, meshes and the link budget are left out",
 )
 """What an export lacks, a line each."""
@@ -119,7 +117,7 @@ def _groups(tree: xr.DataTree) -> Iterator[_Beams]:
         names,
         np.deg2rad(azimuth.ravel()),
         np.deg2rad(elevation.ravel()),
-        float(np.rad2deg(beam_width(tree))),
+        min(float(np.rad2deg(beam_width(tree))), 360.0),
         interval,
         units,
         meaning,
@@ -252,17 +250,18 @@ def _numbers(
     truth = tree["truth"].dataset.isel(frame=frames)
     position = np.asarray(truth["sonar_position"].values)
     heading, pitch, roll = heading_pitch_roll(np.asarray(truth["sonar_orientation"].values))
+    latitude, longitude = latitude_longitude(position)
     phi, theta = beam_rotation(beams.azimuth, beams.elevation)
     ping, beam, sending = ("ping_time",), ("ping_time", "beam"), ("ping_time", "tx_beam")
-    solid = 4.0 * np.pi if beams.width >= 360.0 else 0.25 * np.pi * np.deg2rad(beams.width) ** 2
+    disc = (2.0 * np.deg2rad(beams.width) / 1.03) ** 2 / np.pi  # of the width (`beam_width`): lambda^2/area
     return {
         "beamwidth_receive_major": (beam, beams.width, "arc_degree"),
         "beamwidth_receive_minor": (beam, beams.width, "arc_degree"),
         "blanking_interval": (beam, 0.0, "s"),
-        "equivalent_beam_angle": (beam, solid, "sr"),
+        "equivalent_beam_angle": (beam, min(disc, 4.0 * np.pi), "sr"),  # received alone
         "platform_heading": (ping, heading, "degrees_north"),
-        "platform_latitude": (ping, position[:, 1] / METRES_A_DEGREE, "degrees_north"),
-        "platform_longitude": (ping, position[:, 0] / METRES_A_DEGREE, "degrees_east"),
+        "platform_latitude": (ping, latitude, "degrees_north"),
+        "platform_longitude": (ping, longitude, "degrees_east"),
         "platform_pitch": (ping, pitch, "arc_degree"),
         "platform_roll": (ping, roll, "arc_degree"),
         "platform_vertical_offset": (ping, -position[:, 2], "m"),

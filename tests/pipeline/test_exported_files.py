@@ -10,7 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.integrate import quad
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
+from scipy.special import j1
 
 import sonarsynth as ss
 from sonarsynth import planning, schedule
@@ -18,7 +21,6 @@ from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.description import FieldError
 from sonarsynth.export.coco_files import DECIBELS, grey, write_coco
-from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll
 from sonarsynth.export.sonar_netcdf import write_sonar_netcdf
 from sonarsynth.recipe import reading
 from sonarsynth.store import Mismatch
@@ -200,6 +202,14 @@ def test_netcdf_reads_what_the_convention_asks_and_the_same_numbers(store: Path)
         ours = [np.cos(elevation) * np.cos(azimuth), -np.cos(elevation) * np.sin(azimuth), -np.sin(elevation)]
         np.testing.assert_allclose(axes, np.stack(ours, axis=-1).reshape(-1, 3), atol=1e-6)
         assert str(steered["beam"][0]).startswith("azimuth -15")
+        assert np.all(heard["equivalent_beam_angle"][:] == np.float32(4.0 * np.pi))
+        width = np.deg2rad(np.float64(steered["beamwidth_receive_major"][0, 0]))
+        wide = brentq(lambda x: (2.0 * j1(x) / x) ** 2 - 0.5, 1.0, 2.0)  # at half the width, in ka sin(theta)
+        scale = wide / (0.5 * width)
+        lobes = quad(
+            lambda angle: 2.0 * np.pi * angle * (2.0 * j1(scale * angle) / (scale * angle)) ** 2, 1e-9, 90, limit=9000
+        )
+        np.testing.assert_allclose(steered["equivalent_beam_angle"][:], lobes[0], rtol=0.02)
 
 
 def test_netcdf_reads_what_a_transmitter_sends(small_text: str, tmp_path: Path) -> None:
@@ -258,31 +268,6 @@ def test_two_exports_do_not_mix(store: Path, coco: Path, capsys: pytest.CaptureF
     assert run(app, ["export", str(store), "--to", "sonar-netcdf", "--out", str(coco)]) == 2
     assert "exists already and is not an empty folder" in capsys.readouterr().err
     assert sorted(file.name for file in coco.rglob("*")) == before
-
-
-def test_turns_of_ships_are_those_of_the_attitude() -> None:
-    """Against rotation matrices: axes north, east, down of the world, forward, starboard, down of the ship. With
-    the bow upright, where heading and roll are turns about one axis, what they add up to."""
-    random = np.random.default_rng(3)
-    pitch = np.concatenate([random.uniform(-80, 80, 44), [90, -90, 90, -90, 90 - 1e-4, 1e-4 - 90]])
-    angles = np.column_stack([random.uniform(0, 360, 50), pitch, random.uniform(-170, 170, 50)])
-    ship = Rotation.from_euler("ZYX", angles, degrees=True).as_matrix()
-    flip = np.diag([1.0, -1.0, -1.0])
-    swap = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-    ours = Rotation.from_matrix(swap @ ship @ flip).as_quat(scalar_first=True)
-    found = np.column_stack(heading_pitch_roll(ours))
-    np.testing.assert_allclose(found[:44], angles[:44], atol=1e-9)
-    np.testing.assert_allclose(Rotation.from_euler("ZYX", found, degrees=True).as_matrix(), ship, atol=1e-7)
-
-
-def test_every_beam_has_turns_within_their_limits() -> None:
-    azimuth, elevation = np.meshgrid(np.deg2rad(np.linspace(-179, 179, 30)), np.deg2rad(np.linspace(-89, 89, 31)))
-    phi, theta = beam_rotation(azimuth, elevation)
-    assert np.abs(phi).max() <= 180.0 and np.abs(theta).max() <= 90.0
-    turns = np.column_stack([theta.ravel(), phi.ravel()])
-    axes = Rotation.from_euler("YX", turns, degrees=True).apply([0.0, 0.0, 1.0])
-    expected = [np.cos(elevation) * np.cos(azimuth), -np.cos(elevation) * np.sin(azimuth), -np.sin(elevation)]
-    np.testing.assert_allclose(axes, np.stack(expected, axis=-1).reshape(-1, 3), atol=1e-9)
 
 
 @pytest.mark.parametrize(
