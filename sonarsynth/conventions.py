@@ -121,6 +121,8 @@ class Unit:
             plain = "" if self.ambiguous else f"a number in {self.symbol}, or "
             spaced = f"must be {plain}a text such as '1 {self._written}', with a space"
             raise ValueError(f"{spaced}, not {value[:40]!r}") from None
+        if not symbol and not np.isfinite(number):
+            raise ValueError(f"must be a finite number, not {text[:40]}")
         if symbol not in accepted:
             raise ValueError(
                 (f"has unit '{symbol}'" if symbol else "has no unit") + f"; use one of {', '.join(accepted)}"
@@ -168,7 +170,7 @@ def _plain(value: Any, info: ValidationInfo) -> Any:
 def bounded(value: Any, unit: str = "") -> Any:
     """A number of a recipe as it is, and anything else. Raises ValueError for a size that nothing has."""
     if isinstance(value, (int, float)) and LARGEST < abs(value) < np.inf:
-        raise ValueError(f"is more than {LARGEST:g}{unit} in size, which is no number of this world: {str(value)[:30]}")
+        raise ValueError(f"must be at most {LARGEST:g}{unit} in size, not {str(value)[:30]}")
     return value
 
 

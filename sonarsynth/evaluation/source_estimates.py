@@ -90,13 +90,14 @@ def snap_located(tree: Stored, frames: np.ndarray) -> Check:
     good = bool(shares) and shares[worst] >= SHARE
     places, numbers = tally.within["position"], {f"{name}_share": share for name, share in shares.items()}
     median = float(np.median(tally.misses)) if tally.misses else float("nan")
-    result = f"{sum(places)} of {len(places) + tally.strays}, median error {median:.3g} m"
+    result = f"{sum(places)} of {len(places) + tally.strays}"
+    result += f", median error {median:.3g} m" if tally.misses else ""
     if not good and worst != "position":
         result += f"; {worst} in {100 * shares.get(worst, 0.0):.3g} %"
     if tally.strangers:
         result += f"; {tally.strangers} of other snaps"
     if tally.strays:
-        result += f"; {tally.strays} match no snap"
+        result += f"; {tally.strays} farther from every snap than their predicted errors"
     numbers |= {"good": sum(places), "found": tally.rows, "median_m": median, "strays": tally.strays}
     return Check(NAME, EXPECTED, result, good, numbers, numbered(sorted(tally.frames)), _warning(tally))
 

@@ -56,7 +56,7 @@ def read_track(path: Path) -> TrackTable:
     start = data[:400].lstrip(b"\xef\xbb\xbf \t\r\n")
     table = _gpx(path, data) if start[:1] == b"<" or data[:2] in (b"\xff\xfe", b"\xfe\xff") else _csv(path, data)
     if len(table.lines) < 2:
-        raise TrackError(f"{path}: has {len(table.lines)} points; a track has 2 at least")
+        raise TrackError(f"{path}: a track needs two points, and there is {len(table.lines)}")
     if len(table.lines) > MOST_POINTS:
         raise TrackError(f"{path}: has more than {MOST_POINTS} points")
     time = table.columns["time"]
@@ -147,7 +147,7 @@ def _value(quantity: str, cell: str, where: str) -> float:
             raise TrackError(f"{where}: {cell[:40]!r} is not {needed}") from None
         return seconds
     if not np.isfinite(number) or abs(number) > 1e12:
-        raise TrackError(f"{where}: {cell[:40]!r} is not a number of this world")
+        raise TrackError(f"{where}: {cell[:40]!r} is not finite, or too large")
     limit = {"latitude": 90.0, "longitude": 360.0}.get(quantity)
     if limit is not None and abs(number) > limit:
         raise TrackError(f"{where}: {number:g} is no {quantity} in degrees")

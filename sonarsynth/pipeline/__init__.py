@@ -49,7 +49,6 @@ from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.location.association import in_record, light_first
 from sonarsynth.ranging.range_image import range_image
 from sonarsynth.ranging.received_window import ReceivedWindow
-from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.filtered_pulse import snap_levels
 from sonarsynth.threads import in_one_thread
@@ -59,6 +58,8 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
     import xarray as xr
+
+    from sonarsynth.recipe import Recipe
 
 __all__ = [
     "STAGES",
@@ -242,11 +243,9 @@ def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFr
 
 
 def _received(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> ReceivedWindow | None:
-    """What echoes are ranged from; none without an image, or where its echo window is not in the record."""
+    """What echoes are ranged from; none where no image has a clock, which is where no beams are kept."""
     image, signals, estimates, beams = beamformed.image, beamformed.imaged, beamformed.estimates, beamformed.beams
     if image is None or signals is None or estimates is None or beams is None:
-        return None
-    if not in_record(estimates, signals, plan.windows.echo_start, plan.windows.echo_stop)[:1].any():
         return None
     loudest, supports = ranging_kernels.peak(signals.pressure), plan.windows.supports
     elements, sonar = known_elements(plan, frame), plan.scene.sonar
@@ -296,5 +295,5 @@ def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
     ------
     FieldError as `plan` does, IndexError for a frame that is not there.
     """
-    resolved = plan(recipe) if isinstance(recipe, Recipe) else recipe
+    resolved = recipe if isinstance(recipe, Plan) else plan(recipe)
     return frame_tree(resolved, index, values_at(*_checked(resolved, index)))

@@ -150,8 +150,8 @@ def elements(array: Array) -> Elements:
         z = ((rows - 1) / 2 - row) * pitch
         position = np.stack([np.zeros_like(y), y, z], axis=1)
     gain = np.ones(len(position))
-    if any(not 0 <= d < len(gain) for d in array.dead):
-        raise ValueError(f"dead names an element outside 0..{len(gain) - 1}")
+    if beyond := [d for d in array.dead if not 0 <= d < len(gain)]:
+        raise ValueError(f"dead: there is no hydrophone {beyond[0]}; they are 0 to {len(gain) - 1}")
     gain[list(array.dead)] = 0.0
     return Elements(position, gain, float(face), float(pitch), column, row, columns, rows)
 

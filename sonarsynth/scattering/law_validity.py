@@ -105,7 +105,7 @@ def facets_note(body: Scatterer) -> str | None:
     if not edge > COARSE:
         return None
     return (
-        f"facets up to {edge:.2g} m long ({edge / body.shortest:.1g} wavelengths at the top of the band), each "
+        f"facets up to {edge:.2g} m long ({edge / body.shortest:.2g} wavelengths at the top of the band), each "
         "scattering from its centre: set shape.edge to refine"
     )
 

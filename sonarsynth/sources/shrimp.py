@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Final, Literal, Self
 
 import numpy as np
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Gt, Le, Len, Lt
 
-from sonarsynth.conventions import Decibels, Floats, Metres, NonNegativeMetres, Number, Position, Seconds
+from sonarsynth.conventions import Decibels, Floats, Metres, NonNegativeMetres, Number, Seconds
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.equations.bubble import waveforms
 from sonarsynth.equations.bubble.pulses import Pulse
@@ -73,7 +73,7 @@ class SnappingShrimp(SoundSource):
     kind: Literal["snapping_shrimp"] = "snapping_shrimp"
     name: str = "shrimp"
     """Name, for people; nothing depends on it."""
-    position: tuple[Metres, Metres] | Position
+    position: Annotated[tuple[Metres, ...], Len(2, 3)]
     """Position (x, y) on the bottom, or (x, y, z): east, north and up, 0 at the surface."""
     height: NonNegativeMetres = 0.0
     """Height above the bottom, where z is left out."""

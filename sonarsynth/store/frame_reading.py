@@ -26,7 +26,7 @@ from sonarsynth.store.files.place import Folder, absolute, read
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.marks import Damage
-from sonarsynth.store.opening import check_format
+from sonarsynth.store.opening import check_format, must_be_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -201,6 +201,7 @@ class FrameReader:
         folder = absolute(path)
         if isinstance(folder, Remote):
             raise Mismatch(f"{folder}: frames are read from a folder of this machine: copy the store to one")
+        must_be_folder(folder)
         self.root = folder
         try:
             document = json.loads(read(folder, "zarr.json"))

@@ -1,15 +1,21 @@
 """How fine a mesh must be: by the exact Kirchhoff integral over a sphere; of facets that echo from their middles."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import trimesh
 
 from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.motion import Still
 from sonarsynth.geometry.surfaces import longest_edge, split_long_edges, volume
+from sonarsynth.planning.notes.target_notes import off_origin
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.targets.mesh_resolution import MOST_CUT, expected_error
 from sonarsynth.targets.meshes import mesh_of
-from sonarsynth.targets.shapes import Box
-from sonarsynth.targets.target import base_mesh
+from sonarsynth.targets.shapes import Box, MeshFile
+from sonarsynth.targets.target import Target, base_mesh
 
 
 def triangle_integral(corners: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -83,3 +89,18 @@ def test_meshes_stay_as_described_where_their_edge_is_given_or_the_number_of_fac
 def test_a_ship_is_cut_no_further_than_a_frame_can_bear():
     ship = base_mesh(Box(size=(200.0, 30.0, 20.0)), MirrorLobe(), 0.02)
     assert 0.3 * MOST_CUT < len(ship.faces) < 1.5 * MOST_CUT
+
+
+def test_a_file_beside_its_origin_is_named_with_the_offset_that_centres_it(tmp_path):
+    """Turned, moved and scaled by the recipe: with the offset that the note gives there is no note, and no distance."""
+    corners = trimesh.creation.box((2.0, 0.5, 0.3))
+    corners.apply_translation([5.0, 1.0, -2.0])
+    corners.export(tmp_path / "hull.stl")
+    shape = MeshFile(path=str(tmp_path / "hull.stl"), heading=0.7, pitch=-0.3, offset=(0.1, 0.2, 0.3))
+    target = Target(name="hull", shape=shape, motion=Still(position=(10.0, 0.0, -5.0)), scale=2.0)
+    (note,) = off_origin(target, mesh_of(shape).scaled(2.0))
+    offset = tuple(json.loads(note.split("offset: ")[1].split("`")[0]))
+    centred = replace(target, shape=replace(shape, offset=offset))
+    mesh = mesh_of(centred.shape).scaled(2.0)
+    np.testing.assert_allclose(mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0), 0.0, atol=4e-3)
+    assert not list(off_origin(centred, mesh))

@@ -32,4 +32,4 @@ def test_what_is_below_the_bottom_needs_no_nodes(tmp_path):
     assert len(whole.depth) == 6
     np.testing.assert_array_equal(plan.profile.depth, whole.depth[:4])
     np.testing.assert_array_equal(plan.profile.speed, whole.speed[:4])
-    assert [row.what for row in plan.left_out if "nodes" in row.what] == ["2 nodes of the sound speed"]
+    assert [row.why for row in plan.left_out if "nodes" in row.what] == ["2 of 6: no sound goes there"]

@@ -138,7 +138,7 @@ def test_csv_and_gpx_of_one_way_are_one_motion(tmp_path):
     [
         ("t,x,y,z\n0,1,2,-3\n1,2,x,-3\n", "line 3, column 'y': 'x' is not a number"),
         ("t,x,y,z\n0,1,2,-3\n0,2,2,-3\n", "line 3: is not later than the point before it"),
-        ("t,x,y,z\n0,1,2,-3\n", "has 1 points; a track has 2 at least"),
+        ("t,x,y,z\n0,1,2,-3\n", "a track needs two points, and there is 1"),
         ("t,x,y\n0,1,2\n1,2,2\n", "has no column of depth or z: give the `depth`"),
         ("x,y,z\n0,1,2\n", "line 1: no column of time among 'x', 'y', 'z'"),
         ("t,x,z\n0,1,2\n", "line 1: no columns of x and y, or of latitude and longitude"),
@@ -146,7 +146,7 @@ def test_csv_and_gpx_of_one_way_are_one_motion(tmp_path):
         ("t,lat,lon,z\n0,1,0,-1\n1,5,0,-1\n", "km from its origin"),
         ("t,x (furlong),y,z\n0,1,2,-3\n", "line 1, column 'x (furlong)': unit 'furlong' is not one of m, km"),
         ("t,x,y,z\n0,1,2,-3\nsoon,2,2,-3\n", "'soon' is not a number or a date"),
-        ("t,x,y,z\n0,1,2,-3\n1,1e300,2,-3\n", "not a number of this world"),
+        ("t,x,y,z\n0,1,2,-3\n1,1e300,2,-3\n", "is not finite, or too large"),
         ("", "is empty"),
         ("\udcff", "is neither CSV nor GPX"),
         ("<gpx/>", "has no track"),

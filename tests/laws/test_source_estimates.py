@@ -344,7 +344,7 @@ def test_each_quantity_is_verified_by_its_own_errors() -> None:
     for wrong in ({"azimuth": 20.05}, {"elevation": -9.9}, {"time": 0.01 + 1e-6}, {"emission": -1}):
         check = snap_located(store(**wrong), frames)
         assert check.ok is False and check.frames == (0, 1)
-    assert "no snap" in snap_located(store(emission=-1), frames).got
+    assert "farther from every snap" in snap_located(store(emission=-1), frames).got
     assert snap_located(store(spread=0.01), frames).ok is False
 
 

@@ -47,7 +47,11 @@ WRONG = [
     ("kind: box, size: [1, 1, 1], edge: 0.25", "kind: mesh_file, path: bad.stl", f"8: {TARGET}.shape: "),
     ("stop: [10, 1, -5]", "stop: [10, 1, 0]", f"9: {TARGET}.motion: target 'box'"),
     ("pitch: 5 cm", "pitch: 5 km", "16: scene.trajectory.sonar: the array is "),
-    ("pitch: 5 cm", "pitch: 5 cm, dead: [20]", "14: scene.sonar.array: dead names an element outside 0..19"),
+    (
+        "pitch: 5 cm",
+        "pitch: 5 cm, dead: [20]",
+        "14: scene.sonar.array: dead: there is no hydrophone 20; they are 0 to 19",
+    ),
     (
         "pitch: 5 cm}",
         "pitch: 5 cm}\n    assumed_sound_speed: 1 m/s",
@@ -140,6 +144,8 @@ def test_calls_that_cannot_be(small: Recipe, tmp_path: Path) -> None:
         sonarsynth.build(small, tmp_path / "s.zarr", workers=0, products="film")
     with pytest.raises(TypeError, match=r"a recipe is planned, not a str: sonarsynth.load reads one"):
         sonarsynth.build("small.yaml", tmp_path / "s.zarr", workers=0)
+    with pytest.raises(TypeError, match=r"a recipe is planned, not a str: sonarsynth.load reads one"):
+        sonarsynth.render("small.yaml", 0)
     with pytest.raises(ValueError, match="workers must be 0 or more, not -1"):
         sonarsynth.build(small, tmp_path / "s.zarr", workers=-1)
     with pytest.raises(IndexError, match=r"frame 20 is outside 0\.\.19"):

@@ -210,7 +210,11 @@ WRONG = [
     ("values: [9 m, 1100 cm]", "first: 9 m, last: 1 km, step: 1 m", "18: grid.0: must all have the same unit"),
     ("values: [9 m, 1100 cm]", "first: 9 m, last: 8 m, step: 1 m", "18: grid.0: step 1 m does not lead from first"),
     ("motion.start.0", "motion.strat.0", "18: grid.0.values.0: scene.world.targets.0.motion.strat: 'strat' is not a"),
-    ("motion.start.0", "motion.start.7", "18: grid.0.path: scene.world.targets.0.motion.start.7: '7' is not one of"),
+    (
+        "motion.start.0",
+        "motion.start.7",
+        "18: grid.0.path: scene.world.targets.0.motion.start.7: there is no entry '7'",
+    ),
     ("motion.start.0", "motion.hedding", "18: grid.0.values.0: scene.world.targets.0.motion.hedding: 'hedding' is not"),
     ("motion.start.0", "motion.speed.0", "18: grid.0.path: scene.world.targets.0.motion.speed.0: 'scene.world.targets"),
     ("scene.world.targets.0.motion.start.0", "scene.sonar.beams.azimuths", "18: grid.0.path: 'scene.sonar.beams.az"),

@@ -159,9 +159,15 @@ def test_settings_reach_into_lists_and_make_mappings(small_file: Path) -> None:
     [
         ("scene.sonar.sampling_frequency=150 kHz", "--set: scene.sonar.sampling_frequency: 150000 Hz is under twice"),
         ("scene.sonar.beems=1", "--set: scene.sonar.beems: 'beems' is not a field here; did you mean 'beams'?"),
-        ("scene.world.targets.3.name=x", "--set: scene.world.targets.3.name: '3' is not one of the 1 entries"),
-        ("targets.nobody.name=x", "--set: scene.world.targets.nobody.name: 'nobody' is not one of the 1 entries"),
+        ("scene.world.targets.3.name=x", "--set: scene.world.targets.3.name: there is no entry '3', only 0 ("),
+        ("targets.nobody.name=x", "--set: scene.world.targets.nobody.name: there is no entry 'nobody', only 0 ("),
         ("trajectory.frames=x", "--set: scene.trajectory.frames: must be"),
+        ("sources.0.position=[10 m]", "--set: scene.world.sources.0.position: must have at least 2 entries, not 1"),
+        (
+            "sources.0.position=[1, 2, 3, 4]",
+            "--set: scene.world.sources.0.position: must have at most 3 entries, not 4",
+        ),
+        ("environment.depth=nan", "--set: scene.world.environment.depth: must be a finite number, not nan"),
         ("title.x=3", "--set: title.x: 'title' has no fields"),
         ("title", "--set: 'title' is not path=value"),
         ("seed=[", "--set: seed: is not YAML"),

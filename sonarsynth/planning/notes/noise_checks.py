@@ -26,7 +26,10 @@ def check_noises(scene: Scene) -> None:
             if isinstance(noise, NoiseRecording):
                 noise.segment(0.0, INSTANT, 1)
             elif not noise.correlated and not noise.density(np.array([centre]))[0] > 0.0:
-                raise ValueError(f"holds nothing of the middle of the band, {centre:g} Hz")
+                said = "; ".join(noise.validity(scene.sonar.band.low, scene.sonar.band.high))
+                raise ValueError(
+                    f"holds nothing of the middle of the band, {centre:g} Hz" + (f": {said}" if said else "")
+                )
         except ValueError as error:
             raise FieldError(path, str(error)) from None
 

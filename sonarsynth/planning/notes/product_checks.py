@@ -23,7 +23,8 @@ def check_located(scene: Scene, frame: Frame, products: frozenset[str]) -> None:
             raise FieldError(
                 ("scene", "world", "sources", owner, "position"),
                 f"is {away:.3g} m from the centre of the array at frame {frame.index}, among its hydrophones, which "
-                f"reach {least:.3g} m: it cannot be located, so there would be no image, but for locating: trigger",
+                f"reach {least:.3g} m: no image without its position; where the "
+                "sonar knows it, set scene.processing.locating: {kind: trigger}",
             )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, direction, evenly
 from sonarsynth.equations.arrays.apertures import defocus_spread, focus_delay, live_gain
+from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.views import box_in_view
 from sonarsynth.planning.measured.sampled_frames import SampledScene
@@ -22,6 +23,7 @@ from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.overlaps import overlap, sphere_round
 from sonarsynth.targets.shapes import Box
+from sonarsynth.targets.target import Target
 
 FRAMES = 64
 """Frames of a sequence that bodies are compared in, at most; first and last among them."""
@@ -41,8 +43,22 @@ def law_notes(look: SampledScene) -> list[str]:
     lines: list[str] = []
     targets = zip(look.scene.world.targets, look.scene.laws, bodies(look), strict=True)
     for target, law, body in targets:
-        lines += [f"{target.name}: {line}" for line in (*body.mesh.notes, *law.validity(body))]
+        notes = (*body.mesh.notes, *off_origin(target, body.mesh), *law.validity(body))
+        lines += [f"{target.name}: {line}" for line in notes]
     return lines
+
+
+def off_origin(target: Target, mesh: Mesh) -> Iterator[str]:
+    """That a body from a file lies wholly beside its origin, as exports of assemblies do: it is not where it is put."""
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    middle = (low + high) / 2
+    file = target.shape.plain
+    if file is not None and ((low > 0.0) | (high < 0.0)).any():
+        offset = [round(float(x), 3) + 0.0 for x in file.offset - middle / target.scale]
+        yield (
+            f"the mesh lies beside its origin, {np.linalg.norm(middle):.3g} m off: `motion` places and turns the "
+            f"origin; `shape.offset: {offset}` brings the middle of the mesh there"
+        )
 
 
 def where_laws_hold(look: SampledScene) -> list[str]:

@@ -187,7 +187,10 @@ def put(
     key = path[depth]
     if isinstance(data, list):
         if not isinstance(key, int) or key >= len(data):
-            raise LookupError(f"'{key}' is not one of the {len(data)} entries from 0")
+            names = [
+                f"{i} ({v['name']})" if isinstance(v, dict) and "name" in v else str(i) for i, v in enumerate(data)
+            ]
+            raise LookupError(f"there is no entry '{key}', only {', '.join(names[:9]) or 'an empty list'}")
         return [put(v, path, value, unknown, depth + 1) if i == key else v for i, v in enumerate(data)]
     if data is None or isinstance(data, dict):
         name, data = str(key), data or {}
