@@ -21,7 +21,7 @@ from sonarsynth.ranging.range_profiles import StretchedEcho, stretched_echo
 from sonarsynth.receiver import Sonar, elements
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals import pulse_support
-from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, envelope_delay, silencing_blur
+from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, envelope_delay, silencing_blur, snap_gains
 from sonarsynth.signals.isolated_paths import whole_spectrum
 from sonarsynth.sources.snap_pulses import Waveform, waveform
 from sonarsynth.state import Emission
@@ -36,6 +36,8 @@ DIRECT = 0.1
 """What ranging takes out of echoes is the direct pulse where it is over this part of its peak."""
 AT_ONCE = 10e-6
 """s: a pulse that is loudest so soon before or after its time 0 is loudest then."""
+QUIET = 1e-6
+"""Of the energy of the loudest emission of a frame in the band that one has which is ranged by."""
 FOOT = 1e-2
 """Where the direct pulse is in the way, feet of echoes under this part of their peak may be cut."""
 
@@ -79,8 +81,23 @@ def stretches(look: SampledScene) -> list[Stretch]:
     """Of each body, emission and frame."""
     if not look.scene.physics.doppler:
         return []
-    rows = [(f, b, s) for f in look.frames for b in f.moment.bodies for s in f.moment.snaps]
-    return [_stretch(*row, look.scene.sonar) for row in rows]
+    sonar = look.scene.sonar
+    rows = [(f, b, s) for f in look.frames for s in _loud(f.moment.snaps, sonar) for b in f.moment.bodies]
+    return [_stretch(*row, sonar) for row in rows]
+
+
+def _loud(snaps: tuple[Emission, ...], sonar: Sonar) -> list[Emission]:
+    """Emissions without those of which the band has next to nothing beside others: echoes are not ranged by them."""
+    energy = snap_gains(snaps) ** 2 * np.array([_energy(snap.waveform, sonar) for snap in snaps])
+    return [snap for snap, own in zip(snaps, energy, strict=True) if own >= QUIET * energy.max()]
+
+
+@lru_cache(maxsize=64)
+def _energy(shape: Waveform, sonar: Sonar) -> float:
+    """Of a pulse in the band, in any unit."""
+    f, wave = whole_spectrum(shape, sonar, 0.0)
+    band = slice(*np.searchsorted(f, [sonar.band.low, sonar.band.high]))
+    return float(np.sum(np.abs(wave[band]) ** 2) * (f[1] - f[0]))
 
 
 def _stretch(frame: Frame, body: PlacedTarget, snap: Emission, sonar: Sonar) -> Stretch:

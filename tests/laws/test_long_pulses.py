@@ -118,7 +118,8 @@ def test_a_sweep_ranges_what_moves_as_far_off_as_the_plan_says(speed: float, tmp
     assert abs(off) < 2.0 * float(cloud["range_error"][0])  # 3 and 17 of them before
 
     short = SnappingShrimp(name="short", position=(5.0, 0.2, -50.2), source_level=180.0)  # stretched by more
-    sources = (short, *world.sources)
+    low = SnappingShrimp(name="low", position=SOURCE, snap=Gabor(frequency=10e3, cycles=100.0), source_level=180.0)
+    sources = (short, low, *world.sources)  # that below the band is twice as long, and not heard
     both = plan(replace(still, scene=replace(still.scene, world=replace(world, sources=sources))))
     assert both.windows.supports.late == made.windows.supports.late > 0.0
     assert f"ranges are {said} m off" in "\n".join(both.warnings)
