@@ -22,7 +22,8 @@ def figures_of(to_surface: Floats, to_point: Floats) -> dict[str, Any]:
 
     to_surface: (point,) m, of each point to the surface; precision is the share within a tolerance. to_point: (sample,)
     m, of samples of the surface to the nearest point; recall is their share. Chamfer: the mean of one and of the other,
-    added. NaN where there is no point, or no surface. Source: Knapitsch et al. (2017), Tanks and Temples, section 4.
+    added, without those that are infinite: of frames that lack points or surface, which precision and recall count as
+    wrong. NaN where there is no point, or no surface. Source: Knapitsch et al. (2017), Tanks and Temples, section 4.
     """
     figures: dict[str, Any] = {"points": len(to_surface), "samples": len(to_point)}
     if not len(to_surface) or not len(to_point):

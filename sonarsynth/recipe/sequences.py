@@ -2,7 +2,7 @@
 
 Everything random of a sequence is keyed by its `key`: the values of its grid point and the number of the repeat, as
 written. So neither the order of entries' values, nor other points, repeats or variations, nor the number that the
-sequence happens to have, change what it is.
+sequence happens to have, change what it is; but those by Sobol sequences share the dimensions of one in their order.
 """
 
 from __future__ import annotations

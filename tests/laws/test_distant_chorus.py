@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble import pulses
 from sonarsynth.equations.noise.chorus_moments import level_moment
 from sonarsynth.equations.noise.filters import response
@@ -38,8 +37,8 @@ def made() -> Plan:
     return plan(reading.loads(SEA), ("signals",))
 
 
-def density(made: Plan, frequency: float, reach: float) -> float:
-    """One-sided density (Pa2/Hz) of the snaps beyond a reach (m): Campbell's theorem as it is written."""
+def density(made: Plan, frequency: float, reach: float, farthest: float = 3e4) -> float:
+    """One-sided density (Pa2/Hz) of the snaps from a reach (m) on: Campbell's theorem as it is written."""
     chorus = made.scene.world.chorus
     assert chorus is not None
     pulse = chorus.snap.at_depth(15.0).pulse(0.0, 2e5)
@@ -49,9 +48,22 @@ def density(made: Plan, frequency: float, reach: float) -> float:
         length = np.hypot(np.exp(log), HEIGHTS)
         return float(2.0 * np.pi * np.exp(2.0 * log) * np.sum(np.exp(-lost * length) / length**2))
 
-    integral = quad(ring, np.log(reach), np.log(3e4), limit=400)[0]
-    power = abs(complex(pulses.spectrum(np.array([frequency]), pulse)[0])) ** 2 / pulse.peak**2
-    return 2.0 * chorus.rate * level_moment(chorus.level, chorus.deviation, 2) * power * integral
+    integral = quad(ring, np.log(reach), np.log(farthest), limit=400)[0]
+    wide = (pulses.scaled(pulse, 1.0, width) for width in chorus.widths)
+    power = np.mean([np.abs(pulses.spectrum(np.array([frequency]), snap)[0]) ** 2 for snap in wide]) / pulse.peak**2
+    return float(2.0 * chorus.rate * level_moment(chorus.level, chorus.deviation, 2) * power * integral)
+
+
+@pytest.mark.parametrize("width", [0.0, 0.5])
+def test_level_within_the_reach_is_campbells(made: Plan, width: float) -> None:
+    chorus = replace(made.scene.world.chorus, width=width)
+    other = plan(replace(made.recipe, scene=with_chorus(made, chorus)), ("signals",))
+    band, within = made.scene.sonar.band, other.chorus
+    assert within is not None
+    grid = np.linspace(band.low, band.high, 101)
+    passed = response(grid, fir(made.scene.sonar.antialias)) ** 2
+    expected = np.trapezoid([density(other, f, 1e-2, 150.0) for f in grid] * passed, grid)
+    assert within.level == pytest.approx(120.0 + 10.0 * np.log10(expected), abs=0.05)
 
 
 def test_spectrum_is_campbells(made: Plan) -> None:
@@ -122,24 +134,21 @@ def with_chorus(made: Plan, chorus: object) -> object:
 
 
 def test_it_comes_from_where_the_snaps_are(made: Plan) -> None:
-    """Energy by elevation against that of snaps thrown on the bottom from 150 m to 30 km."""
+    """Coherence of hydrophones over one another, by the energy of the band, against that of snaps from 150 m on."""
     distant, chorus = made.distant_chorus, made.scene.world.chorus
     assert distant is not None and chorus is not None
     lost = made.absorption(band_frequencies(made.scene.sonar))
-    pulse = snap_power(chorus.snap.at_depth(15.0), made.scene.sonar, lost)
-    log = np.random.default_rng(2).uniform(np.log(150.0), np.log(3e4), 20_000)
+    pulse = snap_power(chorus.snap.at_depth(15.0), chorus.widths, made.scene.sonar, lost)
+    log = np.linspace(np.log(150.0), np.log(3e4), 20_001)
     length = np.hypot(np.exp(log)[:, None], HEIGHTS)
     left = np.exp(-length[..., None] * pulse.absorbed) @ pulse.power
     energy = np.exp(2.0 * log)[:, None] * left / length**2  # of equal steps of log(distance)
     sine = HEIGHTS / length * [-1.0, 1.0]
-    directions = distant.directions
-    found = np.histogram(sine, directions.edges, weights=energy)[0]
-    expected = shares(directions.powers, directions.edges)
-    assert np.abs(found / found.sum() - expected).max() < 0.02
-    assert expected[np.array(directions.edges[1:]) <= 0.0].sum() > 0.5  # straight ones come from below, and are nearer
-
-
-def shares(powers: tuple[float, ...], edges: tuple[float, ...]) -> Floats:
-    """Energy (stretch,) of each, of 1."""
-    energy = np.array(powers) * np.diff(edges)
-    return np.asarray(energy / energy.sum())
+    edges = np.array(distant.directions.edges)
+    brought = np.array(distant.directions.powers) * np.diff(edges)
+    assert brought[edges[1:] <= 0.0].sum() > 0.5 * brought.sum()  # straight ones come from below, and are nearer
+    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+    for phase in (1.0, 10.0, 30.0, 100.0):
+        expected = np.sum(energy * np.exp(1j * phase * sine)) / energy.sum()
+        found = np.sum(brought * np.exp(1j * phase * middle) * np.sinc(phase * half / np.pi)) / brought.sum()
+        assert abs(found - expected) < 0.015, phase

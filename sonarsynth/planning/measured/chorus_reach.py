@@ -24,7 +24,6 @@ from sonarsynth.receiver import Sonar
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.signals.chorus.chorus_arrivals import ChorusReach, ImageHeights, image_heights, reflected
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
-from sonarsynth.signals.pulse_sums.adding_pulses import CAVITY
 from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.pulse_model import PulseModel
 from sonarsynth.sources.snap_pulses import waveform
@@ -71,13 +70,17 @@ def band_frequencies(sonar: Sonar) -> Floats:
     return np.linspace(sonar.band.low, sonar.band.high, BINS)
 
 
-def snap_power(model: PulseModel, sonar: Sonar, absorption: Floats) -> PulsePower:
-    """A snap of 1 Pa at 1 m in the band of the sonar."""
+def snap_power(model: PulseModel, widths: Floats, sonar: Sonar, absorption: Floats) -> PulsePower:
+    """A snap of 1 Pa at 1 m in the band of the sonar: the mean power over its widths (width,), each as likely."""
     rate, samples, f = sonar.sampling_frequency, 1 << 14, band_frequencies(sonar)
-    frequency, spectrum = pulse_spectrum(waveform(model), sonar.antialias, rate, samples)
     peak = model.pulse(0.0, 0.0).peak
-    lasts = effective_duration(np.fft.irfft(spectrum, samples), 1.0 / rate)
-    power = np.interp(f, frequency, np.abs(spectrum) ** 2) / peak**2
+    lasts = effective_duration(
+        np.fft.irfft(pulse_spectrum(waveform(model), sonar.antialias, rate, samples)[1], samples), 1.0 / rate
+    )
+    power = np.zeros(BINS)
+    for width in widths.tolist():
+        frequency, spectrum = pulse_spectrum(waveform(model, width), sonar.antialias, rate, samples)
+        power += np.interp(f, frequency, np.abs(spectrum) ** 2) / (peak**2 * len(widths))
     return PulsePower(f, power, absorption * np.log(10.0) / 10.0, lasts)
 
 
@@ -97,9 +100,9 @@ def image_shares(water: ChorusWater, bounces: int) -> tuple[ImageHeights, Reflec
 
 @lru_cache(maxsize=64)
 def _reach(chorus: Chorus, water: ChorusWater, absorption: tuple[float, ...]) -> ChorusReach:
-    pulse = snap_power(chorus.snap.at_depth(water.environment.depth), water.sonar, np.array(absorption))
-    near = max(NEAREST, 0.0 if water.end < water.environment.depth else CAVITY)
-    edges = np.concatenate([[1e-2], near * 2.0 ** np.arange(np.ceil(np.log2(HORIZON / near)) + 1)])
+    model = chorus.snap.at_depth(water.environment.depth)
+    pulse = snap_power(model, chorus.widths, water.sonar, np.array(absorption))
+    edges = np.concatenate([[1e-2], NEAREST * 2.0 ** np.arange(np.ceil(np.log2(HORIZON / NEAREST)) + 1)])
 
     def moments(bounces: int, inner: Floats = edges) -> list[RingMoments]:
         heights, share = image_shares(water, bounces)

@@ -30,8 +30,8 @@ from sonarsynth.sources.chorus import Chorus
 
 KNOTS = 128
 """Frequencies that the spectrum is worked out at."""
-OCTAVES = 7
-"""Of the sine of the elevation, above and below the horizon, that directions are told apart in."""
+OCTAVES, FINER = 7, 2
+"""Of the sine of the elevation, above and below the horizon, that directions are told apart in, and parts of each."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def _distant(
     spread = np.array([np.sum(far.share * np.exp(-a * far.length)) for a in lost])
     square = level_moment(chorus.level, chorus.deviation, 2)
     density = 2.0 * chorus.rate * square * np.mean(bare, axis=0) / unit_pulse.peak**2 * spread
-    pulse = snap_power(model, sonar, np.array(absorption[1]))
+    pulse = snap_power(model, chorus.widths, sonar, np.array(absorption[1]))
     energy = far.share * _energy(pulse, far.length)
     brought = float(energy.sum())
     total = reach[2] / (chorus.rate * square) + brought
@@ -145,7 +145,7 @@ def _energy(pulse: PulsePower, length: Floats) -> Floats:
 def _directions(sine: Floats, energy: Floats) -> DistantDirections:
     """Where energy (image, node) comes from."""
     top = min(float(np.abs(sine).max()) * (1.0 + 1e-9), 1.0)
-    above = np.append(0.0, top * 2.0 ** np.arange(1.0 - OCTAVES, 1.0))
+    above = np.append(0.0, top * 2.0 ** (np.arange(1 - OCTAVES * FINER, 1) / FINER))
     edges = np.unique(np.concatenate([-above, above]))
     brought = np.histogram(sine, edges, weights=energy)[0]
     filled = np.flatnonzero(brought > 0.0)

@@ -19,7 +19,8 @@ from sonarsynth.sources.chorus import ChorusSnaps, ListeningWindow
 from sonarsynth.state import Medium, Receiver
 
 FAINT = 40.0
-"""dB: a path so far below the root mean square pressure of the whole chorus is left out."""
+"""dB: a path so far below the root mean square pressure of all within the reach, by its level at the centre of the
+band, is left out. Of 10 to 110 kHz in 900 m of water that took 1 dB at 10 kHz, 0.1 dB at 30 kHz and nothing above."""
 
 
 class ChorusReach(NamedTuple):
@@ -30,7 +31,7 @@ class ChorusReach(NamedTuple):
     edges: Floats  # (ring + 1,) m
     kurtosis: float  # excess kurtosis of the chorus
     beyond: float  # dB: power of what is beyond the reach, re all of it
-    level: float  # dB re 1 uPa: of the whole chorus in the band
+    level: float  # dB re 1 uPa: of what is within the reach, in the band
 
 
 class ImageHeights(NamedTuple):
