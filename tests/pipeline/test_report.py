@@ -128,11 +128,12 @@ def test_leaks_between_splits_are_counted(store: Path) -> None:
     assert leakage(tree, np.arange(10), torn)["sequences"] == 5
     # bodies of this recipe are where they are in each sequence: frames of one step are equal
     assert apart["equal_frames"] == 10
-    moved = tree.copy(deep=True)
-    where = moved["truth/targets/position"].copy(deep=True)
-    where[:] = where.values + np.arange(12)[:, None, None]
-    moved["truth/targets"] = xr.DataTree(moved["truth/targets"].to_dataset().assign(position=where))
-    assert leakage(moved, np.arange(10), split)["equal_frames"] == 0
+    for name in ("position", "orientation", "mesh"):
+        other = tree.copy(deep=True)
+        values = other[f"truth/targets/{name}"].copy(deep=True)
+        values[:] = values.values + np.arange(12).reshape(12, *[1] * (values.ndim - 1))
+        other["truth/targets"] = xr.DataTree(other["truth/targets"].to_dataset().assign({name: values}))
+        assert leakage(other, np.arange(10), split)["equal_frames"] == 0, name
 
 
 def test_what_a_threshold_finds_is_said_to_be_trivial(store: Path) -> None:

@@ -84,14 +84,15 @@ def _histogram(values: Floats, split: list[str]) -> dict[str, Any]:
 def leakage(tree: xr.DataTree, frames: Ints, split: list[str]) -> dict[str, int]:
     """Whether a detector may have seen in training what it is judged by.
 
-    `sequences`: those that are in more than one split. `equal_frames`: frames in which bodies, snaps and sonar are
-    where they are in a frame of another split, to a millimetre.
+    `sequences`: those that are in more than one split. `equal_frames`: frames in which the same bodies, snaps and
+    sonar are where they are, and lie as they do, in a frame of another split, to a millimetre in a metre.
     """
     sequence = np.asarray(tree["trajectory"].values)[frames].tolist()
     in_splits: dict[int, set[str]] = {}
     for number, split_name in zip(sequence, split, strict=True):
         in_splits.setdefault(number, set()).add(split_name)
-    names = ("truth/targets/position", "truth/emissions/position", "truth/sonar_position")
+    of_targets = [f"truth/targets/{name}" for name in ("position", "orientation", "mesh", "scale")]
+    names = [*of_targets, "truth/emissions/position", "truth/sonar_position", "truth/sonar_orientation"]
     places = [np.asarray(tree[name].values)[frames].reshape(len(frames), -1) for name in names]
     rounded = np.rint(1e3 * np.nan_to_num(np.concatenate(places, axis=1))).astype(np.int64)
     by_content: dict[bytes, set[str]] = {}
