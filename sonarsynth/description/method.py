@@ -20,6 +20,7 @@ class Demand:
     elements: Any = None  # of the array
     off_bottom: bool = False  # some source is not on the bottom
     reflected: bool = False  # sound is reflected by surface and bottom
+    bandwidth: float = float("inf")  # Hz: of the sonar
 
 
 @dataclass(frozen=True)

@@ -78,8 +78,9 @@ def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
         return plan
     sampled = _measured_in(looks, 1 if _facets(scene) > LARGE_MESH_FACETS else MEASURED)
     bent = max((ranging_error(look.scene, look.profile, look.frames) for look in sampled), default=0.0)
+    allowed, band = np.sqrt(SYNTHESIS) * accuracy.cheap, scene.sonar.band
     synthesis, by_synthesis = scene.physics.synthesis.resolve(
-        Demand(np.sqrt(SYNTHESIS) * accuracy.cheap, accuracy.exact, lambda method: 0.0, plan.elements)
+        Demand(allowed, accuracy.exact, lambda method: 0.0, plan.elements, bandwidth=band.high - band.low)
     )
     placing, by_rays = scene.processing.placing.resolve(
         Demand(accuracy.range_m, accuracy.exact, lambda method: bent, plan.elements)
@@ -275,4 +276,5 @@ def heard_at(elements: Elements, most: int = HEARD_AT) -> Ints:
 
 def _measuring(plan: Plan) -> Synthesis:
     """The synthesis that measures."""
-    return deposit_for(DEGREE_TOLERANCE * plan.recipe.accuracy.cheap)
+    band = plan.scene.sonar.band
+    return deposit_for(DEGREE_TOLERANCE * plan.recipe.accuracy.cheap, band.high - band.low)

@@ -10,7 +10,7 @@ from sonarsynth.description import description
 from sonarsynth.description.method import Demand, Method
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.signals.direct_sum import DirectSum
-from sonarsynth.signals.gridded_synthesis import ROUNDING, SPENT, GriddedSynthesis, kernel_error
+from sonarsynth.signals.gridded_synthesis import ROUNDING, GriddedSynthesis, kernel_error, spent
 from sonarsynth.signals.segments import Reception
 from sonarsynth.state import Emission
 
@@ -22,13 +22,13 @@ LEFT = 0.3
 LEAST_TOLERANCE, MOST_TOLERANCE = 1e-10, 1e-2
 
 
-def deposit_for(error: float) -> GriddedSynthesis:
-    """The cheapest `GriddedSynthesis` whose error is no more, or the most exact one."""
+def deposit_for(error: float, bandwidth: float = np.inf) -> GriddedSynthesis:
+    """The cheapest `GriddedSynthesis` whose error in a band (Hz) is no more, or the most exact one."""
     for width in range(6, 17, 2):
-        kernel = kernel_error(width, GriddedSynthesis().oversampling)
+        kernel = kernel_error(width, GriddedSynthesis().oversampling, bandwidth)
         for precision in PRECISIONS:
-            allowed = (error - kernel - ROUNDING[precision]) / SPENT
-            if allowed >= LEFT * error / SPENT:
+            allowed = (error - kernel - ROUNDING[precision]) / spent(bandwidth)
+            if allowed >= LEFT * error / spent(bandwidth):
                 tolerance = min(allowed, MOST_TOLERANCE)
                 digit = 10.0 ** np.floor(np.log10(tolerance))
                 down = float(f"{np.floor(tolerance / digit) * digit:.1g}")
@@ -44,7 +44,9 @@ class AutoSynthesis(Method):
 
     def resolve(self, demand: Demand) -> tuple[GriddedSynthesis | DirectSum, float]:
         """The cheapest method whose echoes err by no more than is allowed, relative to their peak."""
-        return DirectSum().resolve(demand) if demand.exact else deposit_for(demand.allowed).resolve(demand)
+        if demand.exact:
+            return DirectSum().resolve(demand)
+        return deposit_for(demand.allowed, demand.bandwidth).resolve(demand)
 
     def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
         """Pressure at each hydrophone, to `DEFAULT_ERROR`; as `SignalSynthesis.signals`."""

@@ -26,21 +26,32 @@ ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
 SPENT = 0.75
 """Error of the signals over the tolerance of each other approximation of `GriddedSynthesis`, at most: 0.7 was seen of
 one in 60 random sets of paths of one sign, heard by 15 to 35 hydrophones, 0.25 of a hull (its table)."""
+NARROW, KERNEL_MORE, OTHERS_MORE = 10e3, 6.0, 1.5
+"""Hz: in narrower bands the paths of an echo may cancel each other wherever it is heard. How many times as much the
+kernel and the other approximations then err by, of its peak, as measured."""
 
 
-def kernel_error(width: int, oversampling: float) -> float:
-    """Error of spreading a path over so many samples: 2 exp(-pi width sqrt(1 - 1/oversampling)).
+def kernel_error(width: int, oversampling: float, bandwidth: float = np.inf) -> float:
+    """Error of spreading a path over so many samples: 2 exp(-pi width sqrt(1 - 1/oversampling)), over the peak of an
+    echo in a band (Hz).
 
     Source: Barnett, Magland and af Klinteberg (2019), SIAM J. Sci. Comput. 41, C479, eq. 1.8 (their kernel; ours has
     the same decay).
     """
-    return float(2.0 * np.exp(-np.pi * width * np.sqrt(1.0 - 1.0 / oversampling)))
+    error = float(2.0 * np.exp(-np.pi * width * np.sqrt(1.0 - 1.0 / oversampling)))
+    return error * (KERNEL_MORE if bandwidth < NARROW else 1.0)
 
 
-def deposit_error(method: GriddedSynthesis) -> float:
-    """Error of echoes relative to their peak, a bound on what was measured (the tables of `GriddedSynthesis`)."""
-    kernel = kernel_error(method.width, method.oversampling)
-    return kernel + SPENT * method.tolerance + ROUNDING[method.precision]
+def spent(bandwidth: float = np.inf) -> float:
+    """`SPENT` in a band (Hz)."""
+    return SPENT * (OTHERS_MORE if bandwidth < NARROW else 1.0)
+
+
+def deposit_error(method: GriddedSynthesis, bandwidth: float = np.inf) -> float:
+    """Error of echoes in a band (Hz) relative to their peak, a bound on what was measured (the tables of
+    `GriddedSynthesis`)."""
+    kernel = kernel_error(method.width, method.oversampling, bandwidth)
+    return kernel + spent(bandwidth) * method.tolerance + ROUNDING[method.precision]
 
 
 def _apart(paths: Ints) -> Ints:
@@ -90,7 +101,8 @@ class GriddedSynthesis(UnroundedSynthesis):
     kind: Literal["kernel_deposit"] = "kernel_deposit"
     width: Annotated[int, Ge(4), Le(16), MultipleOf(2)] = 6
     """Samples that a path is spread over: that alone errs by 4e-5 (6), 1e-6 (8), 3e-8 (10), whatever the tolerance; in
-    bands of 2 kHz, where the paths of an echo cancel each other, by up to 6 times as much of its peak."""
+    bands under 10 kHz, where the paths of an echo cancel each other, by up to 6 times as much of its peak, as plans
+    say."""
     oversampling: Annotated[Number, Ge(1.2), Le(8)] = 1.5
     """Rate of the grid over twice the highest frequency."""
     precision: Literal["float32", "float64"] = "float32"
@@ -102,7 +114,7 @@ class GriddedSynthesis(UnroundedSynthesis):
 
     def resolve(self, demand: Demand) -> tuple[GriddedSynthesis, float]:
         """Itself, and the bound on what it errs by, relative to the peak of an echo."""
-        return self, deposit_error(self)
+        return self, deposit_error(self, demand.bandwidth)
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`: the wider a target, the more nodes over the array, and tiles."""
