@@ -14,7 +14,7 @@ from sonarsynth.scattering.boundaries import BoundaryScattering, RoughSediment, 
 @description
 class Reverberation:
     """Sound of the snaps that light, scattered by bottom, surface and water: by scatterers that stay where they are in
-    the world, one path each. They hide nothing, and targets do not hide them."""
+    the world, one path each. Targets cast shadows with sharp edges; scatterers hide nothing."""
 
     bottom: BoundaryScattering | None = RoughSediment()
     """How the bottom scatters; none: not at all."""

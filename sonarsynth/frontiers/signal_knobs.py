@@ -25,6 +25,7 @@ from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import DirectSum, GriddedSynthesis, Synthesis
 from sonarsynth.signals.auto_synthesis import PRECISIONS, deposit_for
 from sonarsynth.signals.gridded_synthesis import kernel_error
+from sonarsynth.tracing.reverberation.families import contrast_error
 from sonarsynth.validation.run_time import timed
 
 WIDEST = 14
@@ -169,7 +170,7 @@ def speckle_points(plan: Plan, frame: Frame, signals: Signals) -> Iterator[Point
             stage="reverberation",
             knob="speckle",
             setting=f"{speckle:g}",
-            error=arrivals.contrast_error(band.high - band.low),
+            error=contrast_error(arrivals, band.high - band.low),
             unit="of the contrast",
             allowed=chosen,
             seconds=seconds,

@@ -15,9 +15,9 @@ from sonarsynth.planning.measured.reverberation_levels import frame_scatterers
 from sonarsynth.planning.reverberation_rows import REVERBERATION
 from sonarsynth.products import Arrivals, Kind, Signals
 from sonarsynth.products.array_expansion import ArrayExpansion
+from sonarsynth.products.pulse_arrivals import ReverberationArrivals
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import reverberation_pressure
-from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
 
 
 def frame_reverberation(plan: Plan, frame: Frame) -> ReverberationArrivals | None:
@@ -34,7 +34,6 @@ def with_reverberation(plan: Plan, frame: Frame, signals: Signals, arrivals: Rev
     mark_stage("synthesise")
     pressure = reverberation_pressure(
         arrivals,
-        arrivals.emission,
         frame.moment.snaps,
         true_elements(plan, frame),
         plan.scene.sonar,

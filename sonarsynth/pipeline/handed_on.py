@@ -8,9 +8,9 @@ from sonarsynth.conventions import Floats
 from sonarsynth.labels import Band
 from sonarsynth.pipeline.stored_values import Values
 from sonarsynth.products import Arrivals, BeamSpectra, Echoes, EnergyImage, LinkBudget, Signals, SourceEstimates, Truth
+from sonarsynth.products.pulse_arrivals import ReverberationArrivals
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.chorus.chorus_arrivals import ChorusArrivals
-from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
 
 
 @dataclass(frozen=True, eq=False)

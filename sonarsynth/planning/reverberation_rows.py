@@ -63,12 +63,32 @@ def reverberation_left_out(plan: Plan) -> list[Omission]:
         Omission(
             "change of scattering strengths within the band", "as at its centre", f"{levels.edges:.1f} dB at its edges"
         ),
-        Omission(
-            "shadows of targets in the reverberation", "scatterers are heard through targets", "that of what they hide"
-        ),
+        *_sharp_shadows(plan),
         Omission("Doppler within the pulses of reverberation", "delays follow the sonar", "v/c of a pulse's length"),
         Omission(
             "speckle of single beams", "few scatterers fall into one", "contrast over 2; raise it by accuracy.speckle"
         ),
         Omission("reverberation of the chorus", "its snaps light nothing", "that of a snap of its level and place"),
+    ]
+
+
+def _sharp_shadows(plan: Plan) -> list[Omission]:
+    """How far diffraction would blur the shadows of bodies in the first frame of the sequence: by the first Fresnel
+    zone at the body, sqrt(wavelength d1 d2/(d1 + d2)), which is less than sqrt(wavelength d1) whatever is behind it.
+
+    Source: Born and Wolf (1999), Principles of Optics, 8.7.3.
+    """
+    frame = plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1]
+    seen_from = [frame.sonar_pose.position, *(snap.position for snap in frame.moment.snaps if snap.illuminates)]
+    bodies = frame.moment.bodies
+    if not bodies:
+        return []
+    far = max(float(np.linalg.norm(body.pose.position - place)) for body in bodies for place in seen_from)
+    blur = np.sqrt(plan.profile.speed.max() / plan.scene.sonar.band.centre * far)
+    return [
+        Omission(
+            "diffraction at the edges of shadows in the reverberation",
+            "bodies hide scatterers along rays",
+            f"blurred over up to {blur:.2g} m; a narrower shadow is less deep",
+        )
     ]

@@ -42,3 +42,33 @@ class PulseArrivals:
     def _whole() -> tuple[str, ...]:
         """Fields that are not of one path each."""
         return ("sound_speed",)
+
+
+@dataclass(frozen=True, eq=False)
+class ReverberationArrivals(PulseArrivals):
+    """As `PulseArrivals`, with
+
+    lit_from    (path,)       m     length of the way out
+    emission    (path,)       -     number of the emission
+    family      (path,)       -     number of the family, of `families`
+    energy      (path,)       Pa2 s received at the array centre in the band, absorbed as at its centre
+    hidden      (path, part)  -     whether a body hides it from a part of the array, of `parts`
+    """
+
+    lit_from: Floats
+    emission: Ints
+    family: Ints
+    energy: Floats
+    hidden: Bools
+    families: tuple[str, ...]
+    left_out: tuple[tuple[str, float], ...]  # families left out, and dB re all of the reverberation of the frame
+    parts: tuple[Ints, ...]  # sensors of each part of the array
+
+    @property
+    def before(self) -> Floats:
+        """As `PulseArrivals.before`."""
+        return self.lit_from
+
+    @staticmethod
+    def _whole() -> tuple[str, ...]:
+        return ("sound_speed", "families", "left_out", "parts")

@@ -27,7 +27,7 @@ ROUND: Final = np.stack([np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) *
 class Relief:
     """What of the bottom rises over its mean plane at `environment.depth`: it scatters and hides as a body does, which
     is called `bottom`, of the category `bottom`, and clutter. Mirror reflections are those of the mean plane, where the
-    relief does not hide them; so is reverberation. What lies lower is taken as that plane.
+    relief does not hide them; so is reverberation, which it hides as well. What lies lower is taken as that plane.
     """
 
     shape: MeshFile

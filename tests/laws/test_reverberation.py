@@ -22,6 +22,7 @@ from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.planning import Plan, arrivals_of, frame_start, plan
 from sonarsynth.planning.measured.reverberation_levels import frame_scatterers, sent_energy
 from sonarsynth.products import ORIGINS
+from sonarsynth.products.pulse_arrivals import ReverberationArrivals
 from sonarsynth.receiver import Band, BandPass, BeamGrid, PlanarLattice, Sonar
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import EchoWindow, Processing, Scene, Trajectory, World
@@ -34,7 +35,6 @@ from sonarsynth.state import Emission, Medium, Receiver
 from sonarsynth.tracing.reverberation.cells import cells_about, scatterers, texture
 from sonarsynth.tracing.reverberation.geometry_of_paths import back_ways, out_ways
 from sonarsynth.tracing.reverberation.geometry_of_paths import scattered_paths as scattering_paths
-from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
 from tests.echoes import BOTTOM_DEPTH, EAST, PROFILE, ROMANIS, WATER
 from tests.echoes import heard as heard_at_rest
 from tests.scenes import remus

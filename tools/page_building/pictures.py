@@ -17,7 +17,7 @@ from sonarsynth.frontiers.frontier_report import write
 from sonarsynth.pictures import _reference, _view
 from sonarsynth.pictures.compare import show_beside
 from sonarsynth.pictures.figures.frame_figure import FramePicture
-from sonarsynth.pictures.figures.range_fan import draw_fan
+from sonarsynth.pictures.figures.range_fan import draw_fan, range_fan
 from sonarsynth.pictures.store_reading import beam_grid, opened, stored
 from tools.page_building.label_pictures import labels
 from tools.page_building.sea_pictures import choruses, noises
@@ -43,6 +43,13 @@ GHOSTS = 46
 """The frame of thermocline.yaml whose ghosts are drawn."""
 IMAGES = ("focused", "sub_band", "clean", "capon", "lp", "order_statistic")
 """Beamformers whose images of a frame of boat.yaml are drawn."""
+SHADOW = (
+    "scene.sonar.array={kind: planar_lattice, columns: 160, rows: 3, pitch: 1 cm}",
+    "scene.sonar.beams={azimuth_span: 50 deg, azimuths: 161, elevation_span: 30 deg, elevations: 9}",
+    "scene.sonar.ranges={near: 12 m, far: 24 m, step: 2 cm}",
+    "accuracy.speckle=0.004",
+)
+"""Changes of ping.yaml that let a shadow be seen: a wide array, and as many scatterers as fill its beams."""
 LAWS = {
     "lobe": "{kind: mirror_lobe, width: 30 deg}",
     "smooth": "{kind: kirchhoff}",
@@ -116,6 +123,16 @@ def images(folder: Path, out: Path) -> None:
     figure.colorbar(drawn, ax=panels, label="dB re the brightest beam")
     figure.savefig(out / "images.png", metadata={"Software": None})
     plt.close(figure)
+
+
+def shadow(folder: Path, out: Path) -> None:
+    """A frame of ping.yaml by an array that is wide enough to see the shadow of the drum in the sand."""
+    recipe = ss.load(ROOT / "configs" / "ping.yaml", SHADOW)
+    image = ss.render(ss.plan(recipe, ["range_image"]), 5)["range_image"]
+    cells = (image[variable].values for variable in ("range", "azimuth", "energy", "target"))
+    picture = range_fan("sand", *cells, [target.name for target in recipe.scene.world.targets])
+    picture.savefig(out / "shadow.png", dpi=100, metadata={"Software": None})
+    plt.close(picture)
 
 
 def laws(folder: Path, out: Path) -> None:
@@ -203,6 +220,7 @@ QUICK: dict[str, Callable[[Path, Path], None]] = {
     "thumbnails": thumbnails,
     "ghosts": ghosts,
     "images": images,
+    "shadow": shadow,
     "labels": labels,
     "cloud": cloud,
     "noises": noises,

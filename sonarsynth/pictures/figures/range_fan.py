@@ -40,7 +40,7 @@ def range_fan(
     title: str, ranges: Floats, azimuth: Floats, energy: Floats, target: npt.NDArray[np.integer], names: list[str]
 ) -> Figure:
     """The figure of one frame; names of the targets."""
-    fig = figure(7.0, 6.5)
+    fig = figure(7.0, 5.2, layout="compressed")
     axes = fig.add_subplot()
     drawn = draw_fan(axes, ranges, azimuth, energy, target)
     fig.colorbar(drawn, label="power re the brightest cell (dB)")

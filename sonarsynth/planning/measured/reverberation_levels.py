@@ -12,14 +12,15 @@ from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
 from sonarsynth.description import FieldError
 from sonarsynth.equations.reverberation.bottom_strength import Angles
 from sonarsynth.planning.listening_windows import frame_start
-from sonarsynth.planning.measured.sampled_arrivals import receiver_of
+from sonarsynth.planning.measured.sampled_arrivals import context_of
+from sonarsynth.products.pulse_arrivals import ReverberationArrivals
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.filtered_pulse import snap_gains
 from sonarsynth.signals.isolated_paths import energy_in_slices
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import spare_times
 from sonarsynth.state import Emission
-from sonarsynth.tracing.reverberation.families import ReverberationWindow, site_of
-from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals, reverberation_arrivals
+from sonarsynth.tracing.reverberation.families import ReverberationWindow, contrast_error, site_of
+from sonarsynth.tracing.reverberation.reverberation_arrivals import reverberation_arrivals
 
 if TYPE_CHECKING:
     from sonarsynth.planning.plans import Plan
@@ -108,7 +109,7 @@ def _spread(plan: Plan) -> float:
     )
     band = plan.scene.sonar.band
     arrivals = _scatterers(plan, frame, frame_start(plan, frame), coarse, 1.0)
-    return arrivals.contrast_error(band.high - band.low) / coarse if len(arrivals.delay) else 1.0
+    return contrast_error(arrivals, band.high - band.low) / coarse if len(arrivals.delay) else 1.0
 
 
 def frame_scatterers(plan: Plan, frame: Frame, start: float) -> ReverberationArrivals:
@@ -121,8 +122,8 @@ def _scatterers(plan: Plan, frame: Frame, start: float, speckle: float, spread: 
     scene, snaps = plan.scene, frame.moment.snaps
     described = scene.world.reverberation
     assert described is not None
-    receiver, sonar = receiver_of(plan, frame), scene.sonar
-    before, after = spare_times(plan.elements, sonar, receiver.speed(plan.medium), snaps)
+    context, sonar = context_of(plan, frame), scene.sonar
+    before, after = spare_times(plan.elements, sonar, context.receiver.speed(plan.medium), snaps)
     listening = ReverberationWindow(
         start - before,
         start + plan.windows.samples / sonar.sampling_frequency + after,
@@ -132,4 +133,4 @@ def _scatterers(plan: Plan, frame: Frame, start: float, speckle: float, spread: 
         sent_energy(snaps, scene),
         noise_power(scene) / plan.elements.count,
     )
-    return reverberation_arrivals(described, snaps, plan.medium, receiver, listening, frame.seed, frame.key)
+    return reverberation_arrivals(described, context, listening, frame.seed, frame.key)

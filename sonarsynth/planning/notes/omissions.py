@@ -80,9 +80,9 @@ def _relief_left_out(plan: Plan) -> list[Omission]:
     if least := plan.scene.world.relief.least if plan.scene.world.relief else 0.0:
         bound = f"mirror reflections up to {2e3 * least / slowest:.2g} ms early; no slopes that scatter"
         rows.append(Omission(f"relief of less than {least:.3g} m", "it would hide the mean plane under it", bound))
-    if plan.scene.world.reverberation is not None or plan.scene.world.chorus is not None:
-        why = "their places are on the mean plane, and nothing hides them"
-        rows.append(Omission("relief in reverberation and chorus", why, f"{area:.3g} m2 are heard through it"))
+    if plan.scene.world.chorus is not None:
+        why = "snaps are on the mean plane, and nothing hides them"
+        rows.append(Omission("relief in the chorus", why, f"{area:.3g} m2 are heard through it"))
     return rows
 
 

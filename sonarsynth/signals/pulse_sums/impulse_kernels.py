@@ -27,6 +27,8 @@ def add_impulses(
     begin, table = np.empty(sensors, np.int32), np.empty(sensors, np.int32)
     v, w = np.empty(sensors, np.float32), np.empty(sensors, np.float32)
     for row in range(start.size):
+        if gain[row] == 0.0:
+            continue
         px, py, pz, r = source[row, 0], source[row, 1], source[row, 2], length[row]
         loud, whole = gain[row] * max(r, cavity), np.floor(start[row])
         part = np.float32(start[row] - whole)

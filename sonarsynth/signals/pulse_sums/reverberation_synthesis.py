@@ -8,7 +8,7 @@ length. Impulses are tabulated by the angle to each side of the faces, and by th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import irfft, next_fast_len, rfft
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.noise.filters import kaiser_bessel_beta, kaiser_bessel_transform
-from sonarsynth.products.pulse_arrivals import PulseArrivals
+from sonarsynth.products.pulse_arrivals import ReverberationArrivals
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
 from sonarsynth.signals.array_paths import NEPER
 from sonarsynth.signals.filtered_pulse import pulse_spectrum, pulse_support, snap_gains
@@ -91,8 +91,7 @@ def _taps(face: float) -> int:
 
 
 def reverberation_pressure(
-    arrivals: PulseArrivals,
-    emission: npt.NDArray[np.int64],
+    arrivals: ReverberationArrivals,
     snaps: tuple[Emission, ...],
     elements: Elements,
     sonar: Sonar,
@@ -100,7 +99,7 @@ def reverberation_pressure(
     start: float,
     samples: int,
 ) -> npt.NDArray[np.float32]:
-    """Pressure (sensor, sample) in Pa from `start` (s) on, of arrivals of these emissions (path,), numbers of `snaps`.
+    """Pressure (sensor, sample) in Pa from `start` (s) on, of arrivals of `snaps`.
 
     absorption: dB/m at frequencies (Hz). Each path errs by `path_error`, at random.
     """
@@ -112,28 +111,34 @@ def reverberation_pressure(
     heard = slice(0, int(highest / rate * count) + 1)
     impulse = kaiser_bessel_transform(np.arange(heard.stop) / (times * count), WIDTH, _beta(times * rate, highest))
     heard_paths = []
-    for number in np.unique(emission):
-        own = arrivals.select(np.flatnonzero(emission == number))
+    for number in np.unique(arrivals.emission):
+        own = arrivals.select(np.flatnonzero(arrivals.emission == number))
         _, pulse = pulse_spectrum(snaps[number].waveform, sonar.antialias, rate, count)
         response = (pulse[heard] * (times * rate * gains[number]) / impulse).astype(np.complex64)
         heard_paths.append((response, _rows(own, elements, sonar, absorption, start - early / rate)))
-    out = np.empty((elements.count, samples), np.float32)
+    out = np.zeros((elements.count, samples), np.float32)  # parts of dead sensors are not among `parts`
     grid, spectrum = (
         np.empty((TOGETHER, times * count + ODD), np.float32),
         np.empty((TOGETHER, count // 2 + 1), np.complex64),
     )
-    for first in range(0, elements.count, TOGETHER):
-        sensors = slice(first, min(first + TOGETHER, elements.count))
-        part, total = grid[: sensors.stop - first], spectrum[: sensors.stop - first]
+    for number, sensors in _blocks(arrivals.parts):
+        part, total = grid[: len(sensors)], spectrum[: len(sensors)]
         total[:] = 0.0
         for response, rows in heard_paths:
             part[:] = 0.0
-            _add(part, rows, elements.position[sensors], times * rate / arrivals.sound_speed)
+            _add(part, rows, number, elements.position[sensors], times * rate / arrivals.sound_speed)
             own = rfft(part[:, : times * count], axis=1)[:, heard]
             own *= response
             total[:, heard] += own
         out[sensors] = irfft(total, count, axis=1)[:, early : early + samples]
     return out * elements.gain[:, None].astype(np.float32)
+
+
+def _blocks(parts: tuple[Ints, ...]) -> Iterator[tuple[int, Ints]]:
+    """A few sensors of a part of the array at a time, and the number of the part."""
+    for number, sensors in enumerate(parts):
+        for first in range(0, len(sensors), TOGETHER):
+            yield number, sensors[first : first + TOGETHER]
 
 
 class _Rows(NamedTuple):
@@ -145,10 +150,11 @@ class _Rows(NamedTuple):
     length: npt.NDArray[np.float32]  # (row,) m
     gain: npt.NDArray[np.float32]  # (row,)
     start: Floats  # (row,) samples of the grid
+    heard: npt.NDArray[np.float32]  # (part, row) 1, or 0 where a body hides it from a part of the array
 
 
 def _rows(
-    arrivals: PulseArrivals,
+    arrivals: ReverberationArrivals,
     elements: Elements,
     sonar: Sonar,
     absorption: Callable[[Floats], Floats],
@@ -171,17 +177,20 @@ def _rows(
         source, length, gain = (
             x.astype(np.float32) for x in (own.direction * own.length[:, None], own.length, own.gain)
         )
-        rows.append(_Rows(table, angles, source, length, gain, (own.delay - origin) * rate))
+        heard = np.ascontiguousarray(~own.hidden.T, np.float32)
+        rows.append(_Rows(table, angles, source, length, gain, (own.delay - origin) * rate, heard))
     return rows
 
 
-def _add(grid: npt.NDArray[np.float32], rows: list[_Rows], position: Floats, scale: float) -> None:
-    """Add paths to grid (sensor, sample) of sensors at these positions (sensor, xyz) m; scale in samples/m."""
+def _add(grid: npt.NDArray[np.float32], rows: list[_Rows], part: int, position: Floats, scale: float) -> None:
+    """Add paths to grid (sensor, sample) of sensors of a part of the array at these positions (sensor, xyz) m; scale in
+    samples/m."""
     from sonarsynth.signals.pulse_sums.impulse_kernels import add_impulses
 
     place = np.ascontiguousarray(position.T, np.float32)
     for own in rows:
         add_impulses(
-            own.table.ravel(), own.angles, FRACTIONS, own.table.shape[2], own.source, own.length, own.gain, own.start,
+            own.table.ravel(), own.angles, FRACTIONS, own.table.shape[2], own.source, own.length,
+            own.gain * own.heard[part], own.start,
             place, np.float32(scale), np.float32(CAVITY), grid.shape[1] - ODD, grid.shape[1], grid.ravel(),
         )  # fmt: skip

@@ -46,8 +46,8 @@ def hidden(
     straight = np.flatnonzero(~broken)
     blocked[straight] = occluded(bodies, start[straight], end[straight])
     bent = np.flatnonzero(broken)
-    ray = start[bent], end[bent], departure[bent], times[bent], bow[bent]
-    full, first = _near(bodies, medium.depth, *ray)
+    ray = start[bent], end[bent], departure[bent, 2] > 0, times[bent], bow[bent]
+    full, first = may_meet(bodies, medium.depth, *ray)
     if turning is not None:
         full |= (times[bent] > 0) & (turning[bent] > 0)  # which boundary comes first, a turn may have changed
     for rays, followed in ((bent[full], length[bent[full]]), (bent[~full], np.minimum(first, length[bent])[~full])):
@@ -82,7 +82,7 @@ def ray_cones(
     longest, shortest = length + spread, length - spread
     bow = _curvature(medium.profile) * longest**2 / 8.0
     straight = (bounces == 0) & (_curvature(medium.profile) * shortest**2 <= 8.0 * SAGITTA_TOLERANCE)  # some of them
-    again, first = _near(bodies, medium.depth, start, end, departure, bounces, bow + spread)
+    again, first = may_meet(bodies, medium.depth, start, end, departure[:, 2] > 0, bounces, bow + spread)
     full = straight | again | ((bounces > 0) & (turning > 0))
     reach = np.where(full, longest, np.minimum(first, longest))
     with np.errstate(invalid="ignore", over="ignore"):  # where the speed jumps, rays bend by any angle
@@ -191,25 +191,27 @@ def _curvature(profile: Profile) -> float:
     return float(np.nanmax(gradient, initial=0.0)) / float(profile.speed.min())
 
 
-def _near(
+def may_meet(
     bodies: tuple[PlacedTarget, ...],
     bottom: float,
     start: Floats,
     end: Floats,
-    departure: Floats,
+    up: Bools,
     bounces: Ints,
     bow: Floats,
 ) -> tuple[Bools, Floats]:
-    """Which rays (ray,) may pass a body far from their start, and how far from it (m) others may still be in one."""
+    """Which rays (ray,) may pass a body far from their start, and how far from it (m) others may still be in one.
+
+    bodies; bottom: depth (m); start, end (ray, xyz); up, bounces (ray,): how they leave, and their reflections; bow
+    (ray,) m: how far they may be beside the straight line between their ends, unfolded.
+    """
     far, first = np.zeros(len(start), bool), np.zeros(len(start))
     for body in bodies:
         centre, radius = enclosing(body)
         inside = np.linalg.norm(start - centre, axis=1) <= radius
         leave = np.where(inside, 2.0 * (radius + bow), 0.0)
         near = np.empty(len(start), bool)
-        intersections.folded_pass_near(
-            start, end, departure[:, 2] > 0, bounces, bottom, leave, bow, centre, radius, near
-        )
+        intersections.folded_pass_near(start, end, up, bounces, bottom, leave, bow, centre, radius, near)
         far |= near
         first = np.maximum(first, leave)
     return far, first

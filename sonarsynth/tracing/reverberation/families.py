@@ -11,7 +11,8 @@ from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
 from sonarsynth.environment.boundary_numbers import coefficient, rms_height
 from sonarsynth.environment.reverberation import Reverberation
-from sonarsynth.equations.reverberation.speckle import scatterers_per_pulse
+from sonarsynth.equations.reverberation.speckle import SINC, scatterers_per_pulse
+from sonarsynth.products.pulse_arrivals import ReverberationArrivals
 from sonarsynth.scattering.boundaries import BoundarySite
 from sonarsynth.sources.sound_source import Emission
 from sonarsynth.state import Medium, Receiver
@@ -160,6 +161,14 @@ def expected_counts(families: list[Family], listening: ReverberationWindow, bins
         np.add.at(steep, b, f.energy**1.5)
     scale = many * np.divide(steep, total**2, out=np.zeros(bins), where=total > 0.0)
     return [scale[b] * np.sqrt(f.energy) for f, b in zip(families, which, strict=True)]
+
+
+def contrast_error(arrivals: ReverberationArrivals, bandwidth: float) -> float:
+    """By what part <I^2>/<I>^2 at a hydrophone of this bandwidth (Hz) is over that of very many, 2: J/(2 n), n the
+    scatterers within 1/bandwidth that their energies are as good as, in steps of time weighed by their energy."""
+    _, step = np.unique(np.floor(arrivals.delay / STEP).astype(np.int64), return_inverse=True)
+    energy, squares = (np.bincount(step, arrivals.energy**power) for power in (1, 2))
+    return float(0.5 * SINC * bandwidth * STEP * (squares / energy).sum() / energy.sum())
 
 
 def time_bins(delay: Floats, listening: ReverberationWindow, bins: int) -> Ints:

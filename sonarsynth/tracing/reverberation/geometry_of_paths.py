@@ -23,6 +23,7 @@ class ScatteredPaths:
     """Paths by scatterers (point,), of one emission, one way out and one way back.
 
     delay       (point,)       s     at the array centre, after the instant of the frame
+    leaving     (point, xyz)   -     world, where they leave the emission to
     towards     (point, xyz)   -     world, where they come from
     out, back   (point,)       m     lengths
     spreading   (point,)       1/m2  energy flux of a source of 1 at a scatterer of 1 m2: directivity, reflections,
@@ -31,12 +32,23 @@ class ScatteredPaths:
     """
 
     delay: Floats
+    leaving: Floats
     towards: Floats
     out: Floats
     back: Floats
     amplitude: Floats  # (point,) signed, without absorption and strength: 1/(out back) and what else changes it
     absorbed: Floats  # (point,) energy left by absorption
     angles: Angles
+
+    @property
+    def way_out(self) -> Floats:
+        """(point, xyz) m, unfolded at its reflections: from the emission to the image of the scatterer that it sees."""
+        return np.asarray(self.leaving * self.out[:, None])
+
+    @property
+    def way_back(self) -> Floats:
+        """(point, xyz) m: the same from the array."""
+        return np.asarray(self.towards * self.back[:, None])
 
     @property
     def flux(self) -> Floats:
@@ -59,7 +71,7 @@ def scattered_paths(
 ) -> ScatteredPaths:
     """Paths by places (point, xyz) m. The array is where its velocity, and its spin, bring it till they arrive."""
     velocity = np.zeros(3) if receiver.track is None else receiver.track.velocity
-    begin, away = emission.position, position - emission.position
+    away = position - emission.position
     over = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
     r1 = np.hypot(over, out.climb)
     delay = emission.time + r1 * out.slowness
@@ -74,8 +86,8 @@ def scattered_paths(
     forward = -(away[:, 0] * level[:, 0] + away[:, 1] * level[:, 1]) / (over * beside)
     factor: Floats = np.ones(len(position))
     mirrored = factor
+    leaving = np.column_stack([away[:, :2], np.broadcast_to(out.climb, r1.shape)]) / r1[:, None]
     if emission.directivity is not None:
-        leaving = np.column_stack([position[:, :2] - begin[:2], np.broadcast_to(out.climb, r1.shape)]) / r1[:, None]
         factor = emission.directivity(leaving)
         mirrored = emission.directivity(leaving * (1.0, 1.0, -1.0)) if out.own else factor
     if out.own:
@@ -91,6 +103,7 @@ def scattered_paths(
     mean = loss if isinstance(loss, float) else float(np.trapezoid(loss.value, loss.depth) / medium.depth)
     return ScatteredPaths(
         delay=delay + r2 * back.slowness,
+        leaving=leaving,
         towards=towards,
         out=r1,
         back=r2,

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.environment.reverberation import Reverberation
-from sonarsynth.equations.reverberation.speckle import SINC
-from sonarsynth.products.pulse_arrivals import PulseArrivals
+from sonarsynth.products.pulse_arrivals import ReverberationArrivals
 from sonarsynth.randomness import number
-from sonarsynth.sources.sound_source import Emission
-from sonarsynth.state import Medium, Receiver
+from sonarsynth.state import FrameContext
 from sonarsynth.tracing.reverberation.cells import Cells, counts, scatterers, texture
 from sonarsynth.tracing.reverberation.families import (
     FAINT,
@@ -29,59 +26,22 @@ from sonarsynth.tracing.reverberation.families import (
     time_bins,
 )
 from sonarsynth.tracing.reverberation.geometry_of_paths import ScatteredPaths, back_ways, out_ways, scattered_paths
+from sonarsynth.tracing.reverberation.reverberation_shadows import Shadows
 
 MOST = 1_000_000
 """Scatterers of a frame."""
 
 
-@dataclass(frozen=True, eq=False)
-class ReverberationArrivals(PulseArrivals):
-    """As `PulseArrivals`, with
-
-    lit_from    (path,)       m     length of the way out
-    emission    (path,)       -     number of the emission
-    family      (path,)       -     number of the family, of `families`
-    energy      (path,)       Pa2 s received at the array centre in the band, absorbed as at its centre
-    """
-
-    lit_from: Floats
-    emission: Ints
-    family: Ints
-    energy: Floats
-    families: tuple[str, ...]
-    left_out: tuple[tuple[str, float], ...]  # families left out, and dB re all of the reverberation of the frame
-
-    @property
-    def before(self) -> Floats:
-        """As `PulseArrivals.before`."""
-        return self.lit_from
-
-    def contrast_error(self, bandwidth: float) -> float:
-        """By what part <I^2>/<I>^2 at a hydrophone of this bandwidth (Hz) is over that of very many, 2: J/(2 n), n the
-        scatterers within 1/bandwidth that their energies are as good as, in steps of time weighed by their energy."""
-        _, step = np.unique(np.floor(self.delay / STEP).astype(np.int64), return_inverse=True)
-        energy, squares = (np.bincount(step, self.energy**power) for power in (1, 2))
-        return float(0.5 * SINC * bandwidth * STEP * (squares / energy).sum() / energy.sum())
-
-    @staticmethod
-    def _whole() -> tuple[str, ...]:
-        return ("sound_speed", "families", "left_out")
-
-
 def reverberation_arrivals(
-    described: Reverberation,
-    snaps: tuple[Emission, ...],
-    medium: Medium,
-    receiver: Receiver,
-    listening: ReverberationWindow,
-    seed: int,
-    key: int | str,
+    described: Reverberation, context: FrameContext, listening: ReverberationWindow, seed: int, key: int | str
 ) -> ReverberationArrivals:
     """What reaches the array of the sound of snaps that light; seed and key: of the sequence.
 
     Scatterers are as many as make the contrast of what a hydrophone hears err by `speckle`, at all times. Their
-    expected energy is that of the strengths, exactly, whatever their number.
+    expected energy is that of the strengths, exactly, whatever their number; but for those that a body hides from the
+    snap, or from the array (`reverberation_shadows`).
     """
+    snaps, medium, receiver = context.snaps, context.medium, context.receiver
     families = list(all_families(described, snaps, medium, receiver, listening))
     spare = max((spare_time(f.cells, medium) for f in families), default=0.0)
     counted = listening._replace(start=listening.start - spare, stop=listening.stop + spare)
@@ -111,9 +71,10 @@ def reverberation_arrivals(
         raise ValueError(
             f"reverberation needs {total:.2g} scatterers a frame, more than {MOST}: raise accuracy.speckle"
         )
-    drawn = [_drawn(described, f, x, snaps, medium, receiver, listening, number(seed, f.owner, key))
+    shadows = Shadows.of(context)
+    drawn = [_drawn(described, f, x, context, shadows, listening, number(seed, f.owner, key))
              for f, x in zip(audible, expected, strict=True)]  # fmt: skip
-    return _joined(drawn, audible, names, tuple(left_out), receiver, receiver.speed(medium))
+    return _joined(drawn, audible, names, tuple(left_out), shadows, context)
 
 
 class _DrawnScatterers(NamedTuple):
@@ -123,23 +84,24 @@ class _DrawnScatterers(NamedTuple):
     gain: Floats
     energy: Floats
     keep: Ints
+    hidden: Bools  # (kept, part)
 
 
 def _drawn(
     described: Reverberation,
     family: Family,
     expected: Floats,
-    snaps: tuple[Emission, ...],
-    medium: Medium,
-    receiver: Receiver,
+    context: FrameContext,
+    shadows: Shadows,
     listening: ReverberationWindow,
     seed: int,
 ) -> _DrawnScatterers:
+    medium, receiver = context.medium, context.receiver
     occupied = np.flatnonzero(expected > 0.0)
     cells = Cells(family.cells.key[occupied], family.cells.low[occupied], family.cells.size)
     count = counts(seed, cells, expected[occupied])
     position, cell, sign = scatterers(seed, cells, count)
-    snap, end = snaps[family.emission], end_depths(position, family.owner)
+    snap, end = context.snaps[family.emission], end_depths(position, family.owner)
     out = out_ways(medium, snap, end, described.bounces, family.owner)[family.out]
     back = back_ways(medium, receiver, end, described.bounces, family.owner)[family.back]
     paths = scattered_paths(position, snap, medium, receiver, out, back)
@@ -148,7 +110,10 @@ def _drawn(
     turn = np.where(np.floor(sign * 2.0 ** (4 + 5 * family.out + family.back)) % 2.0, -1.0, 1.0)
     energy = cross * paths.flux * listening.sent[family.emission]
     keep = np.flatnonzero((energy > 0.0) & (paths.delay > listening.start) & (paths.delay < listening.stop))
-    return _DrawnScatterers(paths, turn * np.sqrt(cross) * paths.amplitude, energy, keep)
+    keep = keep[shadows.lit(family.emission, snap.position, position[keep], paths.way_out[keep], out.bounces)]
+    hidden = shadows.hidden(family.emission, position[keep], paths.way_back[keep], back.bounces)
+    heard = ~hidden.all(axis=1)
+    return _DrawnScatterers(paths, turn * np.sqrt(cross) * paths.amplitude, energy, keep[heard], hidden[heard])
 
 
 def _joined(
@@ -156,8 +121,8 @@ def _joined(
     families: list[Family],
     names: tuple[str, ...],
     left_out: tuple[tuple[str, float], ...],
-    receiver: Receiver,
-    sound_speed: float,
+    shadows: Shadows,
+    context: FrameContext,
 ) -> ReverberationArrivals:
     def joined(values: list[Floats], shape: tuple[int, ...] = ()) -> Floats:
         return np.concatenate([np.zeros((0, *shape)), *(v[p.keep] for v, p in zip(values, drawn, strict=True))])
@@ -167,16 +132,18 @@ def _joined(
     none = np.zeros(len(delay))
     return ReverberationArrivals(
         delay=delay,
-        direction=receiver.turn_to_array(joined([p.towards for p in paths], (3,)), delay),
+        direction=context.receiver.turn_to_array(joined([p.towards for p in paths], (3,)), delay),
         length=joined([p.back for p in paths]),
         gain=joined([p.gain for p in drawn]),
         phase=none,
         delay_std=none,
-        sound_speed=sound_speed,
+        sound_speed=context.receiver.speed(context.medium),
         lit_from=joined([p.out for p in paths]),
         emission=np.repeat([f.emission for f in families], count).astype(np.int64),
         family=np.repeat([names.index(f.name) for f in families], count).astype(np.int64),
         energy=joined([p.energy for p in drawn]),
+        hidden=np.concatenate([np.zeros((0, len(shadows.parts)), bool), *(p.hidden for p in drawn)]),
         families=names,
         left_out=left_out,
+        parts=shadows.parts,
     )
