@@ -9,6 +9,7 @@ import sonarsynth as ss
 from sonarsynth import schedule
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
+from sonarsynth.description import FieldError
 from sonarsynth.export import write_points
 from sonarsynth.geometry import Pose
 from sonarsynth.recipe.reading import load, loads
@@ -98,6 +99,14 @@ def test_points_are_on_hulls_that_move_and_turn_before_a_sonar_that_does(tmp_pat
         )
         outward = np.einsum("pj,pj->p", cloud["normal"].values[own], place)
         assert (outward > 0.0).all(), "normals point outwards"
+
+
+def test_a_store_of_an_earlier_version_is_refused_by_a_line(crossing: Path) -> None:
+    tree = ss.open(crossing)
+    earlier = tree.copy()
+    del earlier["truth"]["sonar_spin"]
+    with pytest.raises(FieldError, match="has no truth/sonar_spin, .* build it again"):
+        ss.points(earlier)
 
 
 def test_files_hold_the_points_with_colours_normals_and_labels(crossing: Path, tmp_path: Path) -> None:
