@@ -225,6 +225,11 @@ class Track:
         turning = np.cross(self.spin, turned) if offset.any() else 0.0
         return Track(pose, self.velocity + turning, self.motion, self.time, (x, y, z))
 
+    @property
+    def in_own_frame(self) -> tuple[Floats, Floats]:
+        """Velocity (xyz) m/s and spin (xyz) rad/s along its own axes."""
+        return self.pose.turn_to_body(self.velocity), self.pose.turn_to_body(self.spin)
+
     def later(self, seconds: float) -> Track:
         """The same so many seconds (s) after, or before."""
         time = self.time + seconds

@@ -14,7 +14,7 @@ from sonarsynth.receiver import Sonar
 def envelope_delays(duration: float, sonar: Sonar) -> Floats:
     """Times (delay,) in s after the first sample of a window of `duration` (s), one over the bandwidth apart.
 
-    So many that their mean squares add up to the energy, by Parseval: as many as the window has frequencies in band.
+    There are as many as the window has frequencies in band, so that mean squares add up to the energy (Parseval).
     """
     rate = sonar.sampling_frequency
     count = int(np.floor(duration * rate + 1e-6))

@@ -1,4 +1,4 @@
-"""CLEAN: an image taken apart into point echoes, by what the array makes of one."""
+"""CLEAN: an image as a sum of point echoes, each with the point-spread pattern of the array."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from sonarsynth.products import Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
 MAIN_LOBE = 0.05
-"""Share of its peak above which a point's image is its main lobe, as far as that hangs together: side lobes of a full
-aperture are lower."""
+"""The main lobe of a point's image is the connected part around its peak above this share of the peak; side lobes of a
+full aperture are lower."""
 
 DIRECTIONS = 35
-"""In which a frame of the remus recipe, and one of the tank, has point echoes to 25 dB."""
+"""Directions of point echoes within 25 dB in a frame of `remus.yaml`, and in one of `tank.yaml`."""
 
 Place = tuple[int, int]
 """Row (elevation) and column (azimuth) of a beam."""
@@ -35,11 +35,11 @@ Place = tuple[int, int]
 class Clean(Steering):
     """Deconvolution of the delay-and-sum image with the point-spread pattern of the array at the focus.
 
-    Again and again `gain` of the brightest beam, times the image of a point echo there of the mean spectrum of the
-    sensors, is taken away; it is put back without its side lobes and grating lobes, and what is left over is added.
-    Energies add up for echoes whose delays differ by more than the inverse of the band; echoes at one delay interfere,
-    which the image of a point knows nothing of, and leave some of their side lobes. The images of points are made as
-    the image is, once a direction: an extended target takes as long as so many images.
+    Each step subtracts, at the brightest beam, the share `gain` of it times the image of a point echo there with the
+    mean spectrum of the sensors. At the end the main lobes of all these points are added to what is left. Energies add
+    up for echoes whose delays differ by more than the inverse of the band; echoes at one delay interfere, which the
+    image of one point does not hold, and some of their side lobes stay. The image of a point is computed once for each
+    direction, and each takes as long as an image.
 
     Echoes are picked from beams of delay and sum.
     Source: Hogbom (1974), Astron. Astrophys. Suppl. 15, 417; in acoustics, CLEAN-PSF in Sijtsma (2007), Int. J.
@@ -52,11 +52,11 @@ class Clean(Steering):
     shading: Shading = "uniform"
     """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
     gain: Annotated[Number, Gt(0), Le(1)] = 0.3
-    """Share of a peak that is taken away at once."""
+    """Share of a peak that a step takes away."""
     depth: Annotated[Decibels, Gt(0)] = 25.0
-    """The work stops where nothing is left that is less than this under the brightest beam."""
+    """It stops when all that is left is this far below the brightest beam of the first image."""
     steps: Annotated[int, Ge(1), Le(100_000)] = 500
-    """Times that something is taken away, at most."""
+    """Steps at most."""
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`: an image for each direction that something is taken from."""

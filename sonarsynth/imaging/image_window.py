@@ -1,4 +1,4 @@
-"""From signals to the spectra of a window, from energies to an image: what comes before and after a beamformer."""
+"""Before a beamformer: spectra of a window of the signals. After it: the image of its energies."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from sonarsynth.products import EnergyImage, Signals, Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
 QUIET = 1e-7
-"""Of the energy in a window, that may be left out at each end of it."""
+"""Share of the energy in a window that may be left out at each end."""
 
 Shading = Literal["uniform", "hann"]
-"""Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
+"""Weights over the aperture: equal, or lower towards the rim (lower side lobes, a wider beam)."""
 
 
 def snapshots_of(
     signals: Signals, sonar: Sonar, start: float, stop: float, *, lasting: float | None = None
 ) -> Snapshots:
-    """Spectra of the window from start to stop (s, clock of the signals) in the sonar's band; lasting (s): how long
-    sound is taken to last in it, where that is not asked of the signals.
+    """Spectra of the window from start to stop (s, clock of the signals) in the sonar's band; lasting (s): how long the
+    sound in it lasts, measured in the signals where it is left out.
 
     Raises ValueError when the window reaches outside the signals, or is too short to resolve the band.
     """
@@ -38,8 +38,8 @@ def snapshots_of(
 
 
 def sounding(power: Floats) -> tuple[int, int]:
-    """The first sample, and the one after the last, of what a power (sample,) has but for `QUIET` of its energy before
-    and as much after."""
+    """First sample, and the one after the last, of the part of a power (sample,) that has all of its energy but `QUIET`
+    before it and as much after it."""
     silence = QUIET * power.sum()
     before, after = np.cumsum(power), np.cumsum(power[::-1])
     first, stop = int(np.searchsorted(before, silence)), len(power) - int(np.searchsorted(after, silence))

@@ -1,4 +1,4 @@
-"""Square blocks of a lattice, alike and shifted: one window gives as many snapshots of them at each frequency.
+"""Equal square blocks of a lattice, shifted against each other: at each frequency a window gives a snapshot of each.
 
 Sensor p of every block stands at q_p from the middle of its block, so a plane wave from u has the phases
 a_p = exp(i k u.q_p) in all of them, and a^H M a = sum over lags of (the sum of M along that lag) times a phase.

@@ -1,4 +1,4 @@
-"""Beams by the mean of |y|^p: a small p makes little of single loud samples."""
+"""Beams by the mean of |y|^p over time: with a small p, single loud samples have little weight."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Beams by a quantile of |y| over time, such as the median: single loud samples count nothing."""
+"""Beams by a quantile of |y| over time, such as the median, which single loud samples hardly change."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every beamformer can do: steer beams in any direction, from which images and range profiles are made."""
+"""The base of all beamformers: beams steered in any direction, of which images and range profiles are made."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BEAMS_AT_ONCE = 512
 
 
 class Steering(Method):
-    """A beamformer, as far as it is not its own: delay and sum with its `focus` and `shading`."""
+    """Delay and sum with `focus` and `shading`: a method that is added overrides `steer` or `energies`."""
 
     separable: ClassVar[bool] = True
     """Whether beams of a lattice are made by rows and columns, focused in every direction as on the axis."""
@@ -31,7 +31,7 @@ class Steering(Method):
     """Weights over the aperture."""
 
     def beams(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> BeamSpectra:
-        """Beams of a window of the signals, made when they are asked for."""
+        """Beams of a window of the signals, computed when their energies or spectra are asked for."""
         energies = partial(self.energies, snapshots, elements, sonar)
         return BeamSpectra(snapshots, energies, self.steered(snapshots, elements, sonar))
 
@@ -51,7 +51,7 @@ class Steering(Method):
     def steered(
         self, snapshots: Snapshots, elements: Elements, sonar: Sonar
     ) -> Callable[[Floats], npt.NDArray[np.complex64]]:
-        """What gives spectra (beam, bin) in Pa of beams in directions (beam, xyz), sonar frame."""
+        """A function from directions (beam, xyz), sonar frame, to the spectra (beam, bin) in Pa of beams there."""
         spectra, frequency = snapshots.spectra, snapshots.frequency
         focus, c = self.focus, sonar.assumed_sound_speed
         gain = weights(elements, self.shading)

@@ -1,7 +1,7 @@
-"""Levels of beams by statistics over time that single loud samples do not decide: for impulsive noise.
+"""Levels of beams by robust statistics over time, on which single loud samples have little weight: for impulsive noise.
 
-The methods stand for how loud a beam is throughout the window, as light of many sources makes it: an echo that fills
-less of the window than the statistic looks at is left out as noise would be.
+They measure how loud a beam is throughout the window, as in water lit by many sources. An echo that is shorter than the
+part of the window that the statistic weighs is suppressed like an impulse of noise.
 Source: Chitre, Kuselan & Pallayil (2012), Ambient noise imaging in warm shallow waters; robust statistical algorithms
 and range estimation, J. Acoust. Soc. Am. 132, 838.
 """
@@ -30,7 +30,7 @@ class TimeStatistic(Steering):
     shading: Shading = "uniform"
     """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
     window: PositiveSeconds | None = None
-    """The statistic is of root mean squares over windows so long, one after the other; left out, of samples."""
+    """Length of windows, one after the other, of whose root mean squares the statistic is; left out, of samples."""
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`: beams steered one by one, and their transforms."""

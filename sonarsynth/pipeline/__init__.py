@@ -4,7 +4,8 @@
     beamform_frame    TracedFrame -> BeamformedFrame: Signals, SourceEstimates, EnergyImage
     range_frame       TracedFrame, BeamformedFrame -> Values: everything that is stored, the PointCloud with it
 
-The three are the tasks that the scheduler runs; what nobody asked for is not computed: without sound, `silent_frame`.
+These three are the tasks that the scheduler runs. Only what the products need is computed: where they need no sound,
+`silent_frame` takes the place of all three.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from sonarsynth.pipeline.stored_values import (
     truth_values,
     which_values,
 )
-from sonarsynth.pipeline.synthesis import NOBODY, Hearing, digitise, frame_signals, known_elements, known_signals
+from sonarsynth.pipeline.synthesis import NO_RECORDER, Recorder, digitise, frame_signals, known_elements, known_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, frame_tree, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
@@ -90,12 +91,12 @@ __all__ = [
 
 
 def silent_frame(plan: Plan, index: int) -> Values:
-    """Every stored value of a frame of which no sound is wanted: truth alone, or paths too."""
+    """Every stored value of a frame whose products need no sound: truth, and paths if asked for."""
     return silent_at(*_checked(plan, index))
 
 
 def silent_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> Values:
-    """The same of a frame that is at hand; `plan` is that of its sequence, arrivals as of `trace_at`."""
+    """As `silent_frame`, of a frame that is made already; `plan` is that of its sequence, arrivals as of `trace_at`."""
     if plan.products:
         traced = trace_at(plan, frame, arrivals)
         direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
@@ -112,7 +113,7 @@ def trace_frame(plan: Plan, index: int) -> TracedFrame:
 
 
 def _checked(plan: Plan, index: int) -> tuple[Plan, Frame]:
-    """The plan of a frame's sequence, and the frame, which was looked at now or before."""
+    """The plan of a frame's sequence, and the frame, checked as the plan's sampled frames were."""
     plan = plan.at(index)
     frame = plan.frame(index)
     check_unsampled_frame(plan, frame)
@@ -120,8 +121,8 @@ def _checked(plan: Plan, index: int) -> tuple[Plan, Frame]:
 
 
 def trace_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> TracedFrame:
-    """Every path of a frame that is at hand, and its truth; `plan` is that of its sequence; arrivals: its paths, where
-    these are traced already."""
+    """Every path of a frame, and its truth; `plan` is that of its sequence; arrivals: its paths, where these are traced
+    already."""
     context = context_of(plan, frame)
     arrivals = trace(context, plan.propagation) if arrivals is None else arrivals
     mark_stage("trace")
@@ -138,7 +139,7 @@ def trace_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> Trac
 
 
 def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
-    """What the array hears: signals, where the snap is, and the energy image of the echo window."""
+    """Signals, source estimates, and the energy image of the echo window, as far as the products need them."""
     plan = plan.at(index)
     parts = SoundParts(plan)
     recorded = synthesise(plan, traced, parts)
@@ -155,22 +156,20 @@ def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFra
 
 
 def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFrame:
-    """What the sonar makes of signals: where the snap is, and the energy image of the echo window; `plan` is that of
-    the frame's sequence.
+    """Source estimates, and the energy image of the echo window; `plan` is that of the frame's sequence.
 
-    Without a snap whose echo window is in the record there is no clock: the image is of the last so long part of the
-    record, and no echo has a place.
+    Where no located snap has its echo window in the record there is no clock: the image is of the end of the record,
+    as long as the echo window, and no echo has a place.
     """
     processing, windows, elements = plan.scene.processing, plan.windows, known_elements(plan, frame)
     receiver = replace(receiver_of(plan, frame), elements=elements)
     survey = survey_of(plan, frame)
     estimates = locator(plan.scene).locate(signals, receiver, survey, plan.sizes["estimate"])
-    window = (windows.echo_start, windows.echo_stop)
-    estimates = light_first(estimates, signals, elements, plan.scene.sonar, *window)
+    estimates = light_first(estimates, signals, elements, plan.scene.sonar, *windows.echo)
     mark_stage("locate")
     imaged, beams = signals, None
-    if in_record(estimates, signals, *window)[:1].any():
-        start, stop = (float(estimates.time[0]) + late for late in window)
+    if in_record(estimates, signals, *windows.echo)[:1].any():
+        start, stop = (float(estimates.time[0]) + late for late in windows.echo)
         if processing.cancelling is not None:
             imaged = processing.cancelling.cancel(signals, estimates, receiver, survey, (start, stop))
         imaged, beams, image = image_of(plan, elements, imaged, estimates, (start, stop))
@@ -180,16 +179,16 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
     return BeamformedFrame(signals, estimates, image, imaged, beams)
 
 
-def synthesise(plan: Plan, traced: TracedFrame, hearing: Hearing = NOBODY) -> Signals:
+def synthesise(plan: Plan, traced: TracedFrame, recorder: Recorder = NO_RECORDER) -> Signals:
     """Pressure at each hydrophone: echoes and direct snap, reverberation, chorus, ambient noise, converter."""
     plan = plan.at(traced.frame.index)
-    signals = frame_signals(plan, traced.frame, traced.arrivals, hearing)
-    hearing("paths", signals)
+    signals = frame_signals(plan, traced.frame, traced.arrivals, recorder)
+    recorder("paths", signals)
     signals = with_reverberation(plan, traced.frame, signals, traced.reverberation)
-    hearing("reverberation", signals)
+    recorder("reverberation", signals)
     signals = with_chorus(plan, traced.frame, signals, traced.chorus)
-    hearing("chorus", signals)
-    return digitise(plan, traced.frame, signals, hearing)
+    recorder("chorus", signals)
+    return digitise(plan, traced.frame, signals, recorder)
 
 
 def range_frame(plan: Plan, index: int, traced: TracedFrame, beamformed: BeamformedFrame) -> Values:
@@ -201,7 +200,7 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, beamformed: Beamfor
 
 
 def _traced_values(plan: Plan, traced: TracedFrame, direct: Direct, isolated: Floats | None = None) -> Values:
-    """What paths and truth tell; isolated: levels of single paths in signals of their own."""
+    """Stored values of paths and truth; isolated: levels of single paths, measured in signals of each alone."""
     frame = traced.frame
     values = frame_values(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
     values |= link_budget_values(traced.budget, isolated) | soundscape_values(plan, frame, traced.chorus)
@@ -212,7 +211,7 @@ def _traced_values(plan: Plan, traced: TracedFrame, direct: Direct, isolated: Fl
 
 
 def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFrame) -> Values:
-    """The same of the bodies that are there; `plan` is that of the frame's sequence."""
+    """All stored values, before targets get their slots; `plan` is that of the frame's sequence."""
     frame = traced.frame
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
     values = _traced_values(plan, traced, direct, beamformed.isolated) | beamformed.snr
@@ -243,7 +242,7 @@ def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFr
 
 
 def _received(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> ReceivedWindow | None:
-    """What echoes are ranged from; none where no image has a clock, which is where no beams are kept."""
+    """What ranging needs; None where the image has no clock, for which no beams are kept."""
     image, signals, estimates, beams = beamformed.image, beamformed.imaged, beamformed.estimates, beamformed.beams
     if image is None or signals is None or estimates is None or beams is None:
         return None

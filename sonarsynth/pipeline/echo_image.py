@@ -14,10 +14,10 @@ from sonarsynth.receiver import Elements, Sonar
 def image_of(
     plan: Plan, elements: Elements, signals: Signals, estimates: SourceEstimates, window: tuple[float, float]
 ) -> tuple[Signals, BeamSpectra | None, EnergyImage]:
-    """The image of an echo window (start, stop) in s, the signals that it was made of, and their beams.
+    """The signals that the image was made of, their beams, and the image of an echo window (start, stop) in s.
 
-    The direct pulses of later snaps that are heard in the window are taken out; of the first one, where the plan says
-    so. Where the plan takes the direct pulse out, what may be left of it is asked for in every beam.
+    Direct pulses of later snaps are removed where the window holds them. That of the first snap is removed where the
+    plan says so; then beams that may still hold too much of it are NaN.
     """
     method, sonar = plan.choices.beamforming, plan.scene.sonar
     length = plan.windows.supports.clear
@@ -48,8 +48,8 @@ def no_image(sonar: Sonar, start: float, stop: float, remainder: float = np.nan)
 
 
 def image_without_clock(plan: Plan, elements: Elements, signals: Signals) -> EnergyImage:
-    """The image of the last part of the record that is as long as the echo window, where no snap says when echoes
-    come."""
+    """The image where no snap was located to tell when echoes come: of the end of the record, as long as the echo
+    window."""
     stop = signals.start + (signals.pressure.shape[1] - 1) / signals.sampling_frequency
-    start = max(stop - (plan.windows.echo_stop - plan.windows.echo_start), signals.start)
+    start = max(stop - plan.windows.echo_duration, signals.start)
     return plan.choices.beamforming.image(signals, elements, plan.scene.sonar, start, stop)

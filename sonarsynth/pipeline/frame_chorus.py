@@ -1,4 +1,4 @@
-"""The chorus of a frame: its snaps as they reach the array, what the hydrophones hear of them, and their truth."""
+"""The chorus of a frame: the paths of its snaps to the array, their pressure at the hydrophones, and their truth."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def with_chorus(plan: Plan, frame: Frame, signals: Signals, arrivals: ChorusArri
 
 
 def soundscape_values(plan: Plan, frame: Frame, arrivals: ChorusArrivals | None) -> Values:
-    """Truth of the chorus in the record of a frame: how many snaps, and which are the loudest."""
+    """Truth of the chorus in the record of a frame: the number of snaps, and the loudest of them."""
     if arrivals is None:
         return {}
     start = frame_start(plan, frame)
@@ -96,9 +96,9 @@ def soundscape_values(plan: Plan, frame: Frame, arrivals: ChorusArrivals | None)
 def clear_values(
     plan: Plan, arrivals: ChorusArrivals | None, echoes: Echoes, direct: Direct, snaps: tuple[Emission, ...]
 ) -> Values:
-    """Whether no snap of the chorus in the echo window is louder than the loudest target's echoes; -1 without any.
+    """1 where no snap of the chorus is louder in the echo window than the echoes of the loudest target, else 0.
 
-    The window is that after the direct pulse of each snap that lights: all of them must be clear.
+    -1 where there are no echoes. Every snap that illuminates has an echo window of its own: 1 needs all to be clear.
     """
     if arrivals is None:
         return {}
@@ -107,7 +107,7 @@ def clear_values(
     echo = np.max(echoes.level, initial=-np.inf, where=np.isfinite(echoes.level))
     clear = -1
     if np.isfinite(echo) and np.isfinite(time).any():
-        opens, closes = plan.windows.echo_start, plan.windows.echo_stop
+        opens, closes = plan.windows.echo
         inside = [(arrivals.delay >= t + opens) & (arrivals.delay <= t + closes) for t in time if np.isfinite(t)]
         clear = int(not (np.any(inside, axis=0) & (arrivals.received > echo)).any())
     return table("/truth/soundscape", clear=np.int8(clear))

@@ -1,4 +1,4 @@
-"""The reverberation of a frame: scatterers as they reach the array, and what the hydrophones hear of them."""
+"""The reverberation of a frame: its paths to the array, and their pressure at the hydrophones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from sonarsynth.signals.pulse_sums.reverberation_synthesis import reverberation_
 
 
 def frame_reverberation(plan: Plan, frame: Frame) -> ReverberationArrivals | None:
-    """What bottom, surface and water scatter in a frame; `plan` is that of its sequence. None where nothing does."""
+    """Paths by what scatters in bottom, surface and water; `plan` is that of the frame's sequence. None without any."""
     if plan.scene.world.reverberation is None:
         return None
     return frame_scatterers(plan, frame, frame_start(plan, frame))
@@ -46,7 +46,7 @@ def with_reverberation(plan: Plan, frame: Frame, signals: Signals, arrivals: Rev
 
 
 def scattered_paths(plan: Plan, arrivals: Arrivals, scattered: ReverberationArrivals | None) -> Arrivals | None:
-    """Reverberation as labels of points take it: paths as the arrivals of a frame, spheres."""
+    """Reverberation in the form of arrivals with spherical wavefronts, for the labels of points."""
     if scattered is None or not len(scattered.delay):
         return None
     count, length = len(scattered.delay), scattered.length + scattered.before

@@ -34,7 +34,7 @@ class BeamformedFrame:
     signals: Signals  # as processing has them
     estimates: SourceEstimates | None
     image: EnergyImage | None
-    imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
+    imaged: Signals | None = None  # that the image was made of: without direct pulses and reflections that were removed
     beams: BeamSpectra | None = None  # of the echo window of these
     isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the link budget, in signals
     recorded: Signals | None = None  # as the converter gave them, where the sonar corrected them since

@@ -1,4 +1,4 @@
-"""Labels of the estimates of where snaps are: what they should have found, and which snap each came from."""
+"""Labels of source estimates: the true time, direction and place of each snap, and which snap each estimate is of."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ def estimate_truth(plan: Plan, frame: Frame, direct: Direct) -> Values:
 def emission_values(
     plan: Plan, direct: Direct, estimates: SourceEstimates, signals: Signals, snaps: tuple[Emission, ...]
 ) -> Values:
-    """Which snap each estimate came from, and whether the first, which is the clock, is of one that lights."""
-    band, window = plan.scene.sonar.band, (plan.windows.echo_start, plan.windows.echo_stop)
+    """Which snap each estimate came from, and whether the first estimate, the clock, is of a snap that illuminates."""
+    band = plan.scene.sonar.band
     emission = emissions(estimates, direct, band.high - band.low, beam_width(plan))
-    clock = in_record(estimates, signals, *window)[:1].any() and emission[0] >= 0
+    clock = in_record(estimates, signals, *plan.windows.echo)[:1].any() and emission[0] >= 0
     usable = np.int8(clock and snaps[int(emission[0])].illuminates)
     return table("/source_estimates", emission=emission, usable=usable)
 

@@ -1,4 +1,4 @@
-"""What labels need of a plan: which frame it is, the band that levels are taken in, and whose echo each point is."""
+"""Labels that need a plan: the number of the frame, the band of levels, and whose echo each point is."""
 
 from __future__ import annotations
 

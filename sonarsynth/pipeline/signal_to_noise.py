@@ -1,7 +1,7 @@
-"""Signal to noise: what each part of the sound of a frame brings in the beams of each target.
+"""Signal to noise: the energy of each part of the sound of a frame in the beams of each target.
 
-Beams are those of delay and sum in the window of the image, whatever the image was made by: there parts add up. Sound
-is taken as channels without errors would have it, before the converter.
+Beams are those of delay and sum in the window of the image, whatever method made the image: in them parts add up. The
+sound is that of channels without errors, before the converter.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sonarsynth.labels.estimate_labels import heard_first
 from sonarsynth.pipeline.labelled_estimates import heard_directly
 from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.pipeline.stored_values import Values, table
-from sonarsynth.pipeline.synthesis import SCATTERERS, Hearing, Pressure, known_elements
+from sonarsynth.pipeline.synthesis import SCATTERERS, Pressure, Recorder, known_elements
 from sonarsynth.planning import Plan
 from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE
 from sonarsynth.products import Arrivals, EnergyImage, Signals, Truth
@@ -34,8 +34,8 @@ SILENCE: Final = 1e-32
 Part = Pressure | None  # None: silence
 
 
-class SoundParts(Hearing):
-    """What each part of the sound of a frame adds, kept while it is made."""
+class SoundParts(Recorder):
+    """The pressure that each part of the sound adds, kept while a frame is made."""
 
     def __init__(self, plan: Plan) -> None:
         self.names = plan.scene.sound_parts
@@ -44,7 +44,7 @@ class SoundParts(Hearing):
         self.echoes: dict[int, Part] = {}  # of targets, and of scatterers
 
     def __call__(self, part: str, signals: Signals) -> None:
-        """As of `Hearing`. Where echoes are all there is, nothing is kept."""
+        """As `Recorder`. In a scene that has nothing but echoes, nothing is kept."""
         if not self.names:
             return
         if part in self.names:
@@ -54,16 +54,18 @@ class SoundParts(Hearing):
         self.signals = signals
 
     def echo(self, target: int, pressure: Pressure) -> None:
-        """As of `Hearing`."""
+        """As `Recorder.echo`."""
         self.echoes[target] = pressure
 
 
 def snr_values(
     plan: Plan, frame: Frame, arrivals: Arrivals, truth: Truth, parts: SoundParts, image: EnergyImage | None
 ) -> Values:
-    """Energies of all parts in the beams of each target, and the echo over the sum of the others; nothing where the
-    scene has nothing but echoes. `plan` is that of the frame's sequence. Missing where no beam points at a target, and
-    where the window, or the array, has nothing."""
+    """Energy (dB) of each part in the beams of each target, and the ratio of echo to the sum of all other parts.
+
+    Empty in a scene that has nothing but echoes. NaN for a target that no beam points at, and for all targets where the
+    window is not in the record or no element is live. `plan` is that of the frame's sequence.
+    """
     if not parts.names or parts.signals is None:
         return {}
     targets = range(len(frame.moment.bodies))
@@ -74,21 +76,21 @@ def snr_values(
     signals = parts.signals
     stop = signals.start + signals.pressure.shape[1] / signals.sampling_frequency
     if any(map(len, beams)) and signals.start <= window[0] < window[1] <= stop and elements.gain.any():
-        look = _Look(plan, frame, signals, window)
+        beamformed = _BeamEnergies(plan, frame, signals, window)
         seen = [n for n in targets if len(beams[n])]
         first = np.cumsum([0, *(len(beams[n]) for n in seen[:-1])])
         weight = [max(int(np.count_nonzero(truth.beam_target == n)), 1) / len(beams[n]) for n in seen]
         every = np.concatenate([beams[n] for n in seen])
 
         def heard(pressure: Part) -> Floats:
-            return np.asarray(weight * np.add.reduceat(look.energies(pressure, every), first))
+            return np.asarray(weight * np.add.reduceat(beamformed.energies(pressure, every), first))
 
         for name in parts.names:
             energy[name][seen] = heard(parts.pressure[name])
         if SCATTERERS in parts.echoes:
             energy["reverberation"][seen] += heard(parts.echoes[SCATTERERS])
         for n, share in zip(seen, weight, strict=True):
-            energy["echo"][n] = share * look.energies(parts.echoes.get(n), beams[n]).sum()
+            energy["echo"][n] = share * beamformed.energies(parts.echoes.get(n), beams[n]).sum()
     audible = {name: np.maximum(value, SILENCE) for name, value in energy.items()}
     level = {f"{name}_energy": 10.0 * np.log10(value) + 120.0 for name, value in audible.items()}
     snr = 10.0 * np.log10(audible["echo"] / np.sum([audible[name] for name in parts.names], axis=0))
@@ -97,8 +99,8 @@ def snr_values(
 
 
 def target_beams(truth: Truth, target: int) -> Ints:
-    """Beams (beam,) of the grid, flat, that point at a target, no more than `MOST`; of one that is seen between beams
-    the nearest, of one that is not seen none."""
+    """Indices (beam,) in the flat grid of at most `MOST` beams that point at a target: the nearest beam for a target
+    between beams, none for one that is not seen."""
     beams = np.flatnonzero(truth.beam_target.ravel() == target)
     if len(beams) > MOST:
         return np.asarray(beams[np.linspace(0, len(beams) - 1, MOST).round().astype(int)])
@@ -111,7 +113,8 @@ def target_beams(truth: Truth, target: int) -> Ints:
 
 
 def _window(plan: Plan, frame: Frame, arrivals: Arrivals, image: EnergyImage | None) -> tuple[float, float]:
-    """The window (s) of the image; without one, that after the direct pulse of the first snap that lights."""
+    """The window (start, stop) in s of the image; without an image, the echo window of the first snap that
+    illuminates."""
     if image is not None:
         return image.start, image.stop
     snaps = frame.moment.snaps
@@ -120,8 +123,8 @@ def _window(plan: Plan, frame: Frame, arrivals: Arrivals, image: EnergyImage | N
     return light + plan.windows.echo_start, light + plan.windows.echo_stop
 
 
-class _Look:
-    """Into a window of the record of a frame, by delay and sum."""
+class _BeamEnergies:
+    """Energies of beams of delay and sum in a window of the record of a frame."""
 
     def __init__(self, plan: Plan, frame: Frame, signals: Signals, window: tuple[float, float]) -> None:
         self.sonar, self.signals, self.window = plan.scene.sonar, signals, window
@@ -141,8 +144,8 @@ class _Look:
         return np.asarray(snapshots.unit * np.sum(np.abs(steered).astype(float) ** 2, axis=1))
 
     def _gate(self, pressure: Pressure) -> tuple[float, float]:
-        """Start and stop (s) of the part of the window in which pressure (sensor, sample) is heard, with what steering
-        shifts it by: an echo is over soon, and the transform of the whole window takes three times as long."""
+        """Start and stop (s) of the part of the window that holds the energy of pressure (sensor, sample), widened by
+        the largest steering delay. An echo is short: to transform the whole window takes three times as long."""
         (start, stop), rate, band = self.window, self.signals.sampling_frequency, self.sonar.band
         first, count = gate_samples(start, stop, self.signals.start, rate, pressure.shape[1])
         inside = pressure[:, first : first + count]

@@ -1,7 +1,4 @@
-"""What each stage of a frame costs: processor time of this thread, counted where somebody asks for it.
-
-Nothing that is computed depends on it.
-"""
+"""Processor time of this thread in each stage of a frame, measured within `stage_timer`. No result depends on it."""
 
 from __future__ import annotations
 
@@ -12,11 +9,11 @@ from contextvars import ContextVar
 from typing import Final
 
 STAGES: Final = ("trace", "label", "synthesise", "measure", "locate", "beamform", "resolve", "range", "collect")
-"""Stages that are counted, in order: names of rows of a plan, and `collect`, values made ready to be stored."""
+"""Stages in order: names of rows of a plan, and `collect`, which makes values ready to be stored."""
 
 
 class _Watch:
-    """Seconds by stage, and when the last lap ended."""
+    """Seconds by stage, and when the last stage ended."""
 
     def __init__(self) -> None:
         self.cpu: dict[str, float] = {}
@@ -28,7 +25,7 @@ _watch: ContextVar[_Watch | None] = ContextVar("watch", default=None)
 
 @contextmanager
 def stage_timer() -> Iterator[dict[str, float]]:
-    """Give seconds of processor time by stage, of those stages alone that ran; it fills while the block runs."""
+    """Give seconds of processor time by stage; the dictionary fills while the block runs."""
     watch = _Watch()
     token = _watch.set(watch)
     try:
@@ -38,7 +35,7 @@ def stage_timer() -> Iterator[dict[str, float]]:
 
 
 def mark_stage(stage: str) -> None:
-    """Count the time since the last lap to a stage that ends here."""
+    """End a stage: the time since the last stage ended is added to it."""
     watch = _watch.get()
     if watch is not None:
         now = time.thread_time()

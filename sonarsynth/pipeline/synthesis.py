@@ -1,5 +1,5 @@
-"""What the hydrophones hear of a frame, from one expansion of its paths over the array or from one for each part; and
-what the sonar makes of that: noise, errors of sensors and channels, converter."""
+"""Pressure at the hydrophones of a frame, and what the sonar records of it: with noise, errors of sensors and channels,
+and the converter. The array is one, or cut into subarrays to each of which paths are traced."""
 
 from __future__ import annotations
 
@@ -36,26 +36,27 @@ Pressure = npt.NDArray[np.float32]
 """(sensor, sample) Pa."""
 
 
-class Hearing:
-    """Is told what there is of the sound of a frame, part by part. This one keeps nothing."""
+class Recorder:
+    """Called with the sound of a frame after each part is added to it. This one keeps nothing."""
 
     def __call__(self, part: str, signals: Signals) -> None:
-        """All that is heard once a part, by name, has come to it."""
+        """signals: all parts so far, of which the one with this name was added last."""
 
     def echo(self, target: int, pressure: Pressure) -> None:
-        """What a target, `SCATTERERS` or, as `NO_TARGET`, all else brings, where the scene has more than echoes."""
+        """pressure: the echoes of one target, of `SCATTERERS`, or of all else (`NO_TARGET`). In a scene that has
+        nothing but echoes, `NO_TARGET` is all of them."""
 
 
-NOBODY: Final = Hearing()
+NO_RECORDER: Final = Recorder()
 
 
-def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals, hearing: Hearing = NOBODY) -> Signals:
-    """Pressure at each hydrophone where it is, without noise and converter; arrivals: those of the frame at the whole
-    array.
+def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals, recorder: Recorder = NO_RECORDER) -> Signals:
+    """Pressure at each hydrophone, at its true place, before noise and converter.
 
-    Where the scene has more than echoes, what each target brings is made by itself, for its signal to noise, and added
-    up. Where the array is cut into parts, paths are traced again to each of them. `outside` is that of the part that
-    loses most. Raises ValueError for anything outside the water.
+    arrivals: paths of the frame to the whole array. Where the plan cuts the array into subarrays, paths are traced
+    again to each, and `outside` is that of the subarray that loses most. In a scene that has more than echoes, the
+    echoes of each target are made apart, which its signal to noise needs, and added. Raises ValueError for anything
+    outside the water.
     """
     sensors = true_elements(plan, frame)
     if plan.choices.subarrays == 1:
@@ -69,7 +70,7 @@ def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals, hearing: Hearing
                 heard.setdefault(target, silence)[part.sensor] = pressure
             outside = max(outside, lost)
     for target, pressure in heard.items():
-        hearing.echo(target, pressure)
+        recorder.echo(target, pressure)
     first, *others = heard.values()
     total = first.copy() if others else first
     for pressure in others:
@@ -78,8 +79,8 @@ def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals, hearing: Hearing
 
 
 def _by_target(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> tuple[dict[int, Pressure], int]:
-    """What hydrophones hear of arrivals, as `Hearing.echo` is told, all in one where there is nothing but echoes; and
-    how many arrivals the window cuts."""
+    """Pressure by target, numbered as in `Recorder.echo` (one number in a scene that has nothing but echoes), and how
+    many arrivals the window cuts."""
     if not plan.scene.sound_parts:
         signals = array_signals(plan, frame, arrivals, sensors)
         return {NO_TARGET: signals.pressure}, signals.outside
@@ -92,12 +93,12 @@ def _by_target(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) 
 
 
 def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> tuple[dict[int, Pressure], int]:
-    """As `_by_target`, what a part of the array hears, of paths that are traced to it."""
+    """As `_by_target`, of one part of the array and of paths that are traced to it."""
     return _by_target(plan, frame, arrivals_of(plan, frame, part), part.elements)
 
 
 def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> Signals:
-    """What hydrophones hear of arrivals, expanded over all of them; what comes from behind, through the baffle."""
+    """Pressure at hydrophones, of arrivals that are expanded over all of them; the baffle weakens sound from behind."""
     reception = reception_of(plan, frame)._replace(elements=sensors)
     return plan.choices.synthesis.signals(behind_baffle(arrivals, plan.scene.sonar), frame.moment.snaps, reception)
 
@@ -109,7 +110,7 @@ def errors_of(plan: Plan, frame: Frame) -> DrawnErrors | None:
 
 
 def true_elements(plan: Plan, frame: Frame) -> Elements:
-    """The elements where they are across the axis: along it, a wrong position is a delay of the channel."""
+    """The elements with their position errors in y and z. An error along x counts as a delay of the channel."""
     drawn = errors_of(plan, frame)
     if drawn is None or not drawn.position.any():
         return plan.elements
@@ -121,16 +122,18 @@ def _moved(elements: Elements, drawn: DrawnErrors) -> Elements:
     return replace(elements, position=elements.position + drawn.position * [0.0, 1.0, 1.0])
 
 
-def digitise(plan: Plan, frame: Frame, signals: Signals, hearing: Hearing = NOBODY) -> Signals:
-    """Signals as the sonar has them: ambient noise, errors of the channels, electronics, converter; `plan` is that of
-    the sequence. Each part has a stream of its own."""
+def digitise(plan: Plan, frame: Frame, signals: Signals, recorder: Recorder = NO_RECORDER) -> Signals:
+    """Signals as the sonar records them: with ambient noise, errors of the channels, electronics, converter.
+
+    `plan` is that of the sequence. Each part draws from a random stream of its own.
+    """
     mark_stage("synthesise")
     sonar, pose = plan.scene.sonar, frame.sonar_pose
     sound_speed = float(plan.profile.at(depth(pose.position)))
     noises = plan.scene.world.environment.noises
     for number, (name, noise) in enumerate(zip(part_names(noises), noises, strict=True)):
         if noise.played:
-            signals = _with_played_noise(plan, frame, signals, noise, number)
+            signals = _with_played_noise(plan, frame, signals, noise, number, sound_speed)
         else:
             random = stream(frame.seed, "noise", frame.key, frame.step, *([number] if number else []))
             signals = add_noise(signals, noise, sonar, plan.elements, random, pose, sound_speed)
@@ -138,27 +141,26 @@ def digitise(plan: Plan, frame: Frame, signals: Signals, hearing: Hearing = NOBO
     for number, source in enumerate(plan.scene.world.noise_sources):
         signals = _with_noise_source(plan, frame, signals, source, number)
         mark_stage(f"noise of {source.name}")
-    hearing("noise", signals)
-    signals = _through_channels(plan, frame, signals, sound_speed, hearing)
-    return signals if sonar.converter is None else convert(signals, sonar.converter)
+    recorder("noise", signals)
+    signals = _through_channels(plan, frame, signals, sound_speed, recorder)
+    return convert(signals, sonar.converter)
 
 
-def _with_played_noise(plan: Plan, frame: Frame, signals: Signals, noise: Any, number: int) -> Signals:
-    """Signals with a recording; where each stretch of it comes from is drawn once a sequence."""
+def _with_played_noise(
+    plan: Plan, frame: Frame, signals: Signals, noise: Any, number: int, sound_speed: float
+) -> Signals:
+    """Signals with a recording. The direction of each stretch of it is drawn once a sequence."""
     from sonarsynth.signals.noise.played_noise import add_played_noise  # seldom needed
 
     def even(stretch: int) -> Floats:
         return stream(frame.seed, "played noise", frame.key, number, stretch).random(2)
 
-    pose = frame.sonar_pose
-    sound_speed = float(plan.profile.at(depth(pose.position)))
-    return add_played_noise(
-        signals, noise, plan.scene.sonar, plan.elements, pose, sound_speed, time=frame.time, even=even
-    )
+    sonar, pose = plan.scene.sonar, frame.sonar_pose
+    return add_played_noise(signals, noise, sonar, plan.elements, pose, sound_speed, time=frame.time, even=even)
 
 
 def _with_noise_source(plan: Plan, frame: Frame, signals: Signals, source: NoiseSource, number: int) -> Signals:
-    """Signals with the sound of one source, by the paths of an emission that is heard at the instant of the frame."""
+    """Signals with the sound of one source: all of it takes the paths of the sound that arrives at the frame's time."""
     own = frame.sonar_pose.position
     away = np.linalg.norm(pose(source.motion, frame.time).position - own)
     late = float(away) / float(plan.profile.at(depth(own)))
@@ -176,8 +178,8 @@ def _with_noise_source(plan: Plan, frame: Frame, signals: Signals, source: Noise
     return moving(signals, source, arrivals, instant, sensors, sonar, plan.absorption)
 
 
-def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: float, hearing: Hearing) -> Signals:
-    """Signals after what is wrong with the channels, and with the noise of the electronics."""
+def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: float, recorder: Recorder) -> Signals:
+    """Signals with the errors of the channels and the noise of the electronics."""
     sonar, drawn = plan.scene.sonar, errors_of(plan, frame)
     errors, louder = sonar.sensor_errors, np.ones(plan.elements.count)
     if errors is not None and drawn is not None:
@@ -186,12 +188,12 @@ def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: f
             signals = channel_errors.talk(signals, plan.elements, errors.cross_talk)
         louder[drawn.state == SensorState.NOISY] = 10.0 ** (errors.noisy_by / 20.0)
         mark_stage(SENSORS)
-    hearing("channels", signals)
+    recorder("channels", signals)
     if sonar.electronics is not None:
         random = stream(frame.seed, "electronics", frame.key, frame.step)
         own = replace(plan.elements, gain=np.where(plan.elements.gain == 0.0, 0.0, louder))
         signals = add_noise(signals, ElectronicNoise(sonar.electronics), sonar, own, random)
-        hearing("electronics", signals)
+        recorder("electronics", signals)
         mark_stage(ELECTRONICS)
     if errors is not None and drawn is not None:
         if errors.jitter or errors.clock_rate:
@@ -208,7 +210,7 @@ def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: f
 
 
 def known_elements(plan: Plan, frame: Frame) -> Elements:
-    """The elements as processing has them: without those that it knows to be dead or stuck."""
+    """The elements that processing uses: those that it knows to be dead or stuck have gain 0."""
     errors, drawn = plan.scene.sonar.sensor_errors, errors_of(plan, frame)
     if errors is None or drawn is None or errors.known == "none":
         return plan.elements
@@ -222,7 +224,7 @@ def _working(elements: Elements, drawn: DrawnErrors) -> Elements:
 
 
 def known_signals(plan: Plan, frame: Frame, signals: Signals) -> Signals:
-    """Signals as processing has them: corrected of what it knows of the errors of the channels."""
+    """Signals that processing uses: corrected for the channel errors that it knows."""
     errors, drawn = plan.scene.sonar.sensor_errors, errors_of(plan, frame)
     if errors is None or drawn is None:
         return signals

@@ -100,7 +100,7 @@ def _solid_angle(plan: Plan) -> float:
 def frame_size(plan: Plan) -> FrameSize:
     """The sizes that the cost of methods grows with, of a frame of the plan's sequence."""
     sizes, sonar = plan.sizes, plan.scene.sonar
-    gate = plan.windows.echo_stop - plan.windows.echo_start
+    gate = plan.windows.echo_duration
     return FrameSize(
         emissions=sizes["emission"],
         sensors=sizes["sensor"],
@@ -219,7 +219,7 @@ def _signal_rows(plan: Plan, size: FrameSize) -> list[Row]:
 
 def _signal_to_noise(plan: Plan, size: FrameSize, parts: int) -> Row:
     """The parts of the sound in the beams of targets, and the echoes of each of several targets alone."""
-    targets, gate = plan.sizes["target"], plan.windows.echo_stop - plan.windows.echo_start
+    targets, gate = plan.sizes["target"], plan.windows.echo_duration
     spectra = size.sensors * gate * plan.scene.sonar.sampling_frequency * SECONDS["transform sensor sample"]
     seconds = (parts + max(targets, 1)) * spectra + (parts + 1) * targets * 30 * size.bins * SECONDS["steer beam bin"]
     seconds += plan.choices.synthesis.cost(size) if targets > 1 else 0.0
@@ -230,7 +230,7 @@ def _sonar_rows(plan: Plan, size: FrameSize) -> list[Row]:
     """What the sonar makes of signals."""
     if not plan.products & OF_BEAMS:
         return []
-    gate = plan.windows.echo_stop - plan.windows.echo_start
+    gate = plan.windows.echo_duration
     locating, cancelling = plan.scene.processing.locating, plan.scene.processing.cancelling
     seconds = locating.cost(size)
     rows: list[Row] = [

@@ -59,6 +59,16 @@ class Windows:
     cut: bool = False  # more of some echo than its feet is outside of the echo window
     tight: tuple[int, ...] = ()  # frames of the dataset whose echoes come soonest, and latest
 
+    @property
+    def echo(self) -> tuple[float, float]:
+        """The echo window (start, stop): s after the direct arrival."""
+        return self.echo_start, self.echo_stop
+
+    @property
+    def echo_duration(self) -> float:
+        """Length (s) of the echo window."""
+        return self.echo_stop - self.echo_start
+
 
 @dataclass(frozen=True)
 class Errors:
@@ -133,7 +143,7 @@ class Plan:
     @property
     def beam_delays(self) -> Floats:
         """Delays (delay,) in s after the start of the echo window at which levels of beams are stored."""
-        return envelope_delays(self.windows.echo_stop - self.windows.echo_start, self.scene.sonar)
+        return envelope_delays(self.windows.echo_duration, self.scene.sonar)
 
     def absorption(self, frequency: np.ndarray | float) -> Floats:
         """Absorption in dB/m at frequencies (Hz): the mean over the depths of the sequence's paths.

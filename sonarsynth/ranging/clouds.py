@@ -37,7 +37,7 @@ def point_cloud(
     echoes = picking.picks(window)
     source, velocity, spin = window.estimates.position[0], np.zeros(3), np.zeros(3)
     if track is not None and not track.still:
-        velocity, spin = track.pose.turn_to_body(track.velocity), track.pose.turn_to_body(track.spin)
+        velocity, spin = track.in_own_frame
         echoes = _at_true_directions(echoes, velocity, window)
     beam = direction(echoes.azimuth, echoes.elevation)
     solution = placing.place(echoes.delay, beam, source, window.sonar, sonar_pose, profile)

@@ -1,4 +1,4 @@
-"""What a sonar has at hand when it ranges the echoes of a window."""
+"""What ranging is given: the array, its beams in the echo window, and the source estimates."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sonarsynth.receiver import Elements, Sonar
 
 @dataclass(frozen=True, eq=False)
 class ReceivedWindow:
-    """The array, its beams in the echo window, and the located snap."""
+    """The array, its image and beams in the echo window, and the source estimates."""
 
     elements: Elements
     sonar: Sonar

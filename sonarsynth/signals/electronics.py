@@ -53,7 +53,7 @@ def _frequencies(first: int, end: int, sampling_frequency: float, length: int) -
 
 def add_noise(
     signals: Signals,
-    noise: NoiseField | None,
+    noise: NoiseField,
     sonar: Sonar,
     elements: Elements,
     rng: np.random.Generator,
@@ -66,8 +66,6 @@ def add_noise(
     Drawn in the frequency domain over a period longer than the window by the filter's length, so that the ends are not
     alike.
     """
-    if noise is None:
-        return signals
     sensors, samples = signals.pressure.shape
     fs = signals.sampling_frequency
     length = fast_length(samples + int(np.ceil(duration(fir(sonar.antialias)) * fs)))

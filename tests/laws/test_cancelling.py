@@ -25,9 +25,9 @@ from sonarsynth.ranging.cancelling.multipath import (
     WEAK,
     Limits,
     cancel,
-    images,
     in_view,
 )
+from sonarsynth.ranging.location.candidates import images
 from sonarsynth.receiver import BeamGrid, Romanis, Sonar, elements
 from sonarsynth.recipe.scene import EchoWindow, Physics, Processing
 from sonarsynth.state import Receiver, Survey

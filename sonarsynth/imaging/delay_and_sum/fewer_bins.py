@@ -1,4 +1,4 @@
-"""As many bins as the energy of short sound needs: its spectrum is smooth, so that every third or fourth tells it.
+"""Fewer bins for the energy of short sound: its spectrum is smooth, so that every third or fourth bin is enough.
 
 Of sound that lasts T the power spectrum varies as cos(2 pi f tau), tau up to T, and no faster. A weighted sum over
 every k-th bin is then that over all, but for the ends of the band, if k bins are less than 1/T: the weights are those

@@ -58,7 +58,7 @@ def reverberation_levels(plan: Plan) -> ReverberationLevels | None:
     except ValueError as error:
         raise FieldError(("scene", "world", "reverberation"), str(error)) from None
     stop = start + plan.windows.samples / scene.sonar.sampling_frequency
-    opens = max(stop - (plan.windows.echo_stop - plan.windows.echo_start), start)
+    opens = max(stop - plan.windows.echo_duration, start)
     inside = (scatterers.delay >= opens) & (scatterers.delay < stop)
     power = np.bincount(scatterers.family[inside], scatterers.energy[inside], len(scatterers.families)) / (stop - opens)
     count = np.bincount(scatterers.family, minlength=len(scatterers.families))

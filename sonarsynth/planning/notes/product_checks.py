@@ -40,7 +40,7 @@ def check_methods(scene: Scene, products: frozenset[str]) -> None:
 def check_windows(scene: Scene, windows: Windows) -> None:
     """The echo window must hold a period of the band, and a frame must fit in the memory that is free here."""
     path = ("scene", "processing", "echo_window")
-    length, period = windows.echo_stop - windows.echo_start, 1.0 / scene.sonar.band.high
+    length, period = windows.echo_duration, 1.0 / scene.sonar.band.high
     if length < period:
         raise FieldError(path, f"is {length:.3g} s long, less than a period of the highest frequency, {period:.3g} s")
     sensors, facets = elements(scene.sonar.array).count, sum(len(mesh.faces) for mesh in scene.meshes)

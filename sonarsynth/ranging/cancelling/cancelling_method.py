@@ -1,4 +1,4 @@
-"""What a method that cancels reflections says of itself: one that is added needs no more than `cancel`."""
+"""The base of methods that cancel reflections: one that is added needs no more than `cancel`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from sonarsynth.state import Receiver, Survey
 
 
 class CancellingMethod(Method):
-    """Takes what reaches the array by surface and bottom without an echo out of what it hears."""
+    """Removes the sound that reaches the array from a snap by surface and bottom, without an echo, from the signals."""
 
     def cancel(
         self,

@@ -1,4 +1,4 @@
-"""Direct pulses of located snaps: taken out of the signals where they and echoes are heard at the same time."""
+"""Direct pulses of located snaps, removed from the signals where they overlap echoes in time."""
 
 from __future__ import annotations
 

@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 
 from sonarsynth.conventions import Floats, azimuth_elevation
-from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
+from sonarsynth.ranging.location.candidates import images
 from sonarsynth.ranging.location.locating import MAX_LAG
 from sonarsynth.ranging.location.plane_waves import (
     HALF,
@@ -84,22 +84,6 @@ class CancelledSignals:
 
     signals: Signals  # the same object where nothing was taken out
     outcomes: tuple[Outcome, ...]  # loudest expected first
-
-
-def images(position: Floats, pose: Pose, bottom_depth: float, bounces: int) -> list[tuple[int, int, Floats]]:
-    """Reflections at surface and at bottom, and image source (xyz, sonar frame), of every path of up to `bounces`.
-
-    Two paths of each number of reflections: the first at the surface, or at the bottom.
-    """
-    paths = []
-    for first in (0, 1):
-        image = pose.to_world(position).copy()
-        for n in range(bounces):
-            at_bottom = (first + n) % 2
-            image[2] = -2 * bottom_depth * at_bottom - image[2]
-            bottom = (n + 1 + first) // 2
-            paths.append((n + 1 - bottom, bottom, pose.to_body(image)))
-    return paths
 
 
 def cancel(

@@ -1,5 +1,4 @@
-"""Which of the snaps that were located is taken for the light: the one whose echoes stand out most from what else is
-heard."""
+"""Choice of the located snap that is taken to illuminate the targets: the one whose echoes stand out most."""
 
 from __future__ import annotations
 
@@ -13,18 +12,17 @@ from sonarsynth.ranging.location.pulse_times import transit
 from sonarsynth.receiver import Elements, Sonar
 
 NEAREST = 1.0
-"""m: a snap of unknown range is taken for one so near, which makes it a weak one."""
+"""Range (m) assumed for a snap of unknown range: so near that it counts as a weak one."""
 
 
 def light_first(
     estimates: SourceEstimates, signals: Signals, elements: Elements, sonar: Sonar, opens: float, closes: float
 ) -> SourceEstimates:
-    """The estimates, with the snap first that lights: its time is the clock of the frame.
+    """The estimates, reordered so that the snap that illuminates is first: its time is the clock of the frame.
 
-    Each that was located is asked what it was at 1 m, by its largest pressure and its range, and how loud it is in its
-    echo window, from `opens` to `closes` (s) after its direct arrival: other snaps that are heard there hide its
-    echoes. The ratio decides, among those whose whole echo window is in the record. Where it is of none, and without
-    sound, the order stays. No truth is asked.
+    The score of a snap is its source pressure (its largest pressure times its range) over the rms pressure in its echo
+    window, from `opens` to `closes` (s) after its direct arrival: other snaps in that window hide its echoes. Snaps
+    whose echo window is not wholly in the record come last, in their old order. No truth is used.
     """
     within = in_record(estimates, signals, opens, closes)
     if within.sum() < 2 and within[:1].all():

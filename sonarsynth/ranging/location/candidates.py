@@ -1,4 +1,4 @@
-"""Pulses that were looked at, and which of them may be taken for snaps: an echo must not pass for one.
+"""Pulses that were measured, and which of them count as snaps: an echo must not be taken for a snap.
 
 An echo comes after the pulse that it is of, which it cannot be louder than a mirror would make it: as if it came from
 the image of the source behind the mirror. Where it seems to come from lies between the point of the body that it met
@@ -7,7 +7,7 @@ and that image. So an echo of a pulse of delay t, place S and amplitude A, L/c l
     1/(R + L) <= curvature <= 1/r,  amplitude <= A R/(R + L),  R = |S|,  r = L (L + 2 R)/(2 (L + R (1 - cos psi))),
 
 r the range at which a body in that direction is met (psi between S and v), for S or any of its images in surface and
-bottom. What is so may be an echo, and is refused.
+bottom. A pulse that satisfies all of this may be an echo, and is refused.
 """
 
 from __future__ import annotations
@@ -167,19 +167,24 @@ def _sources(row: SourceFix, knowledge: SonarKnowledge) -> list[Source]:
     k = max(row.curvature[0], 1 / FAR)
     direct = Source(row.time, row.chord / k, row.amplitude)
     speed, sources = knowledge.sonar.assumed_sound_speed, [direct]
-    for image in images(direct.place, knowledge.pose, knowledge.bottom_depth, BOUNCES):
+    for _, _, image in images(direct.place, knowledge.pose, knowledge.bottom_depth, BOUNCES):
         distance = float(np.linalg.norm(image))
         longer = distance - 1 / k
         sources.append(Source(row.time + longer / speed, image, row.amplitude / (k * distance)))
     return [source for source in sources if source.time >= row.time]
 
 
-def images(position: Floats, pose: Pose, bottom: float, bounces: int) -> list[Floats]:
-    """Places (xyz) of the images of a source in surface and bottom (m deep), by up to so many reflections."""
-    positions = []
+def images(position: Floats, pose: Pose, bottom_depth: float, bounces: int) -> list[tuple[int, int, Floats]]:
+    """Reflections at surface and at bottom, and image source (xyz, sonar frame), of every path of up to `bounces`.
+
+    Two paths of each number of reflections: the first at the surface, or at the bottom.
+    """
+    paths = []
     for first in (0, 1):
         image = pose.to_world(position).copy()
         for n in range(bounces):
-            image[2] = -2 * bottom * ((first + n) % 2) - image[2]
-            positions.append(pose.to_body(image))
-    return positions
+            at_bottom = (first + n) % 2
+            image[2] = -2 * bottom_depth * at_bottom - image[2]
+            bottom = (n + 1 + first) // 2
+            paths.append((n + 1 - bottom, bottom, pose.to_body(image)))
+    return paths

@@ -1,4 +1,4 @@
-"""Locate snaps: from the signals to directions, distances, and what errors to expect of them."""
+"""Locate snaps: from the signals to directions and distances, with predicted errors."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ MAX_LAG = 0.15
 
 @dataclass(frozen=True, eq=False)
 class Bend:
-    """What bent rays do."""
+    """How rays bend: what they add to the delays of straight paths, or the gradient of which errors are predicted."""
 
     delays: Callable[[Floats], Floats]  # of a source (xyz), sonar frame: beyond those of straight paths (sensor,), in s
     sound_speed: float  # m/s of the water at the array
@@ -104,7 +104,7 @@ def locate(
     loud = loudness(signals, live, width)
     rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
     quiet = quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
-    velocity = np.zeros(3) if receiver.track is None else receiver.pose.turn_to_body(receiver.track.velocity)
+    velocity = np.zeros(3) if receiver.track is None else receiver.track.in_own_frame[0]
     knowledge = SonarKnowledge(
         elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, reflected, velocity
     )

@@ -1,4 +1,4 @@
-"""What a method that locates sources says of itself: one that is added needs no more than `locate`."""
+"""The base of methods that locate sources: one that is added needs no more than `locate`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class LocatingMethod(Method):
         return ()
 
     def off_bottom_note(self) -> str:
-        """What it does of sources that are not on the bottom, in a few words; empty where that is nothing special."""
+        """What it does with sources that are not on the bottom, in a few words; empty where it treats them alike."""
         return ""
 
     def locates_nothing(self, elements: Elements, band: Band) -> str:

@@ -1,4 +1,4 @@
-"""Find direct pulses in the signals and measure when each sensor hears them, to a small part of a sample."""
+"""Times at which each sensor hears a direct pulse, measured to a small part of a sample."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a wavefront, and the depth of the bottom where it agrees, to a place, with the errors to expect."""
+"""The place of a source, with predicted errors, from its wavefront and, where it agrees, the depth of the bottom."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ class PickingMethod(Protocol):
     """Finds echoes in the beams of the echo window."""
 
     def picks(self, window: ReceivedWindow) -> PickedEchoes:
-        """The echoes by the light of the first located snap, `heard.estimates[0]`, which there is."""
+        """The echoes of the first located snap, row 0 of `window.estimates`. It is called only where there is one."""
 
 
 Picking = Annotated[Peaks | BeamAxis | FirstEcho, BY_KIND]

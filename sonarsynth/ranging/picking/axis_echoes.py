@@ -1,4 +1,4 @@
-"""The echoes of beams on their axes: when each comes after the direct pulse, and whether it is that beam's own."""
+"""One echo a beam, on its axis: its delay after the direct pulse, and whether it comes from that beam's direction."""
 
 from __future__ import annotations
 

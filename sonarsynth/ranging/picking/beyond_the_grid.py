@@ -12,8 +12,8 @@ from sonarsynth.ranging.received_window import ReceivedWindow
 LINE = 2e3
 """Hz: width over which spectra are summed to find the line that a lobe makes of an echo."""
 FAINT = 0.25
-"""A line that brings less, of what lobes must bring a peak to count, is not followed: lines of the reef recipe that did
-count brought twice as much and more."""
+"""A line is followed only from this share of the power on that lobes must bring a peak to count: in `reef.yaml` lines
+that did count had twice this share and more."""
 
 
 def louder_beyond(
