@@ -1,5 +1,4 @@
-"""Wavefronts over the aperture: when, how loud and from where each path reaches a point. Stable for plane waves (radius
-inf)."""
+"""Wavefronts over the aperture: delay, gain and direction of each path at a point; plane waves have radius inf."""
 
 from __future__ import annotations
 
@@ -21,10 +20,10 @@ MAX_DOPPLER = 0.1
 """Doppler of 0.1 is a closing speed of 75 m/s: more is an error."""
 
 LONGEST_BLUR = 1.0
-"""A longer delay_std (s) leaves as little of a snap: nothing."""
+"""s: a delay_std this long or longer leaves nothing of a snap."""
 
 NEPER = np.log(10.0) / 20.0
-"""Of a dB."""
+"""Np in a dB."""
 
 LONGEST_CORNER = 0.01
 """The corners of a facet are closer to its arrival than this (s): 7 m, there and back."""
@@ -33,13 +32,12 @@ FINITE = (
     *("delay", "direction", "amplitude", "absorption", "phase", "delay_std", "doppler"),
     *("corner_delays", "coherent_fraction", "height_delay_std"),
 )
-"""What of the arrivals must be finite, beside their expansion."""
+"""Columns of arrivals that must be finite, like their expansion."""
 
 
 @dataclass(frozen=True, eq=False)
 class Wavefronts(Columns):
-    """When, how loud and from where paths reach points of the array: curvature for radius, and the level of the snap
-    inside the amplitude."""
+    """Delay, amplitude and direction of paths over the array; amplitudes include the level of the snap."""
 
     delay: Floats  # (path,) s at the array centre, of the middle of a facet's corners
     direction: Floats  # (path, xyz)
@@ -51,7 +49,7 @@ class Wavefronts(Columns):
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
     sound_speed: float  # m/s
     aperture: float  # m: no hydrophone is farther out
-    attenuation: float  # dB/m at the band centre: of what the way to a hydrophone is longer than to the array centre
+    attenuation: float  # dB/m at the band centre: for the path to a hydrophone beyond that to the array centre
 
     @property
     def count(self) -> int:
@@ -70,10 +68,10 @@ class Wavefronts(Columns):
         return self if every else super().select(keep)
 
     def without_faint_shadows(self, tolerance: float, elements: Elements) -> Self:
-        """The paths with some of those that miss a part of the hydrophones reaching all or none, as is nearer.
+        """The paths, of which the faintest that reach a part of the hydrophones now reach all or none, as is nearer.
 
-        It is the faintest, as many as change the energy of all by `tolerance` squared at most, where no path counts as
-        louder than the loudest of those. Paths to none are left out.
+        So many are changed as change the energy of all paths by at most `tolerance` squared; in that sum no path counts
+        as louder than the loudest that reaches a part. Paths to no hydrophone are left out.
         """
         rows = np.flatnonzero(self.occluded.any(axis=1))
         if not len(rows):
@@ -91,7 +89,7 @@ class Wavefronts(Columns):
 
 @dataclass(frozen=True, eq=False)
 class ArrayPaths(Wavefronts):
-    """Arrivals as synthesis takes them: wavefronts, and what becomes of the pulse on each path."""
+    """Arrivals in the form that synthesis needs: wavefronts, and the changes of the pulse on each path."""
 
     phase: Floats  # (path,) rad, -pi/2 to pi/2: whole half turns are signs of the amplitude
     variance: Floats  # (path,) s2: of the Gaussian that the pulse is blurred with
@@ -208,13 +206,13 @@ def towards(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:
 
 
 BENT = 4
-"""The first of the terms that turn the wavefront: a linear one is the motion of the array, which turns no wave. Of its
-curvature the motion has u/c, which turns one by too little for a face."""
+"""The first delay term that turns the wavefront. Linear terms are the motion of the array, which turns no wave; what
+that motion adds to the curvature (u/c of it) turns waves too little to matter for a hydrophone's face."""
 
 
 def tilt(front: Wavefronts, gradient: Floats) -> Floats:
-    """What delay terms turn the wavefront by, (point, xyz, path), beside the sphere: -c times their gradient (xyz,
-    point, term)."""
+    """Change of the wavefront's direction (point, xyz, path) by delay terms: -c times their gradient (xyz, point,
+    term)."""
     slope = gradient[:, :, BENT:] @ front.expansion.delay[:, BENT:].T
     return np.asarray(-front.sound_speed * slope.swapaxes(0, 1))
 
@@ -249,7 +247,7 @@ def delays(front: Wavefronts, n: Floats, points: Floats) -> Floats:
 
 
 def lost(level: Floats) -> Floats:
-    """Factor on the amplitude of what loses `level` (dB)."""
+    """Factor on amplitude of a loss of `level` (dB)."""
     return np.asarray(np.exp(-NEPER * level))
 
 

@@ -1,4 +1,4 @@
-"""Channels as they are: response, cross-talk, the clock that samples them, and overload; and what is corrected."""
+"""Errors of channels: response, cross-talk, sampling clock and overload; and their correction."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 BLEND = 256
-"""Samples over which the end of a window goes over into its start, so that a filter finds no step there."""
+"""Samples over which the end of a window is blended into its start, so that a filter meets no step there."""
 TOGETHER = 32
-"""Sensors at once."""
+"""Sensors filtered at once, which bounds the memory."""
 
 
 def respond(signals: Signals, drawn: DrawnErrors, sound_speed: float) -> Signals:
@@ -32,7 +32,7 @@ def respond(signals: Signals, drawn: DrawnErrors, sound_speed: float) -> Signals
 
 
 def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_speed: float) -> Signals:
-    """Signals as processing has them: without what it knows of the errors (`SensorErrors.known`)."""
+    """Signals that processing uses: corrected for the errors that it knows (`SensorErrors.known`)."""
     if errors.known == "none":
         return signals
     works = (drawn.state == SensorState.WORKING) | (drawn.state == SensorState.NOISY)

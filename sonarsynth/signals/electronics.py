@@ -1,4 +1,4 @@
-"""What the instrument adds to the sound: noise, and the converter."""
+"""Gaussian noise in the record, and the converter."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ QUIETEST = 1e-7
 
 
 AT_ONCE = 8
-"""Hydrophones whose own noise is drawn at once: numbers stay in the cache."""
+"""Hydrophones whose noise is drawn at once: so few that the numbers stay in the cache."""
 MATRIX_ELEMENTS = 1 << 22
-"""Of cross spectral densities that are made at once."""
+"""Matrix elements of cross spectral densities that are computed at once."""
 
 
 @lru_cache(maxsize=16)

@@ -1,4 +1,4 @@
-"""The snap as the sonar hears it at 1 m: through the anti-alias filter, and as paths change its shape."""
+"""The snap at 1 m after the anti-alias filter, and its shapes after changes by paths."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
 
 LONGEST_ENVELOPE = 1 << 18
-"""Samples of the pulses whose envelopes are looked at, at most."""
+"""Most samples of a pulse whose envelope is computed."""
 
 LONGEST_TAIL = 0.02
 """s, times the width: the tails of turned pulses are cut there, unless the pulse itself is longer."""
 
 MOST_SAMPLES = 1 << 23
-"""Samples of a pulse whose tails are looked at."""
+"""Most samples of a pulse whose tails are measured."""
 
 PULSE_FEET = float(np.sqrt(-2.0 * np.log(filters.SUPPORT_TOLERANCE)))
-"""A Gaussian blur makes the support of a pulse longer at both ends by so many of its standard deviations."""
+"""Standard deviations of a Gaussian blur that are added to the support of a pulse at either end."""
 
 
 def fir(chosen: Filter) -> Fir:
-    """The numbers of a described filter, as the equations take them."""
+    """The parameters of a described filter in the form of `equations.noise.filters`."""
     return Fir(*chosen.edges, chosen.transition, chosen.attenuation)
 
 
 class PulseChanges(NamedTuple):
-    """What paths do to a pulse that changes how long it lasts, beside making it longer."""
+    """Changes of a pulse by its path that change its support, other than blur."""
 
     turned: bool = False  # at any constant phase
     sloped: bool = False  # differentiated

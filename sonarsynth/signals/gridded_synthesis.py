@@ -22,7 +22,7 @@ from sonarsynth.signals.segments import Reception, layout
 from sonarsynth.state import Emission
 
 ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
-"""What the precision of the grid and its table of the kernel leave."""
+"""Relative error by the precision of the grid and of its table of the kernel."""
 SPENT = 0.75
 """Error of the signals over the tolerance of each other approximation of `GriddedSynthesis`, at most: 0.7 was seen of
 one in 60 random sets of paths of one sign, heard by 15 to 35 hydrophones, 0.25 of a hull (its table)."""

@@ -1,10 +1,10 @@
-"""Pulses that change over the aperture: reflections turn and blur them otherwise at each hydrophone.
+"""Pulses that change over the aperture: a reflection gives another phase and another blur at each hydrophone.
 
 At a point of the aperture a path has the phase and the variance of its blur
     phase + turn,  variance + spread,
 both polynomials (`ArrayExpansion`). The modes of its pulse (`shapes`) change with them: by the cosine
 and the sine of turn, times its modes and those of the pulse a quarter of a period ahead; and by powers of spread, times
-those of the pulse times powers of -(2 pi f)^2/2. What all paths of a tile share of it the field of the tile takes.
+those of the pulse times powers of -(2 pi f)^2/2. The part that all paths of a tile share is put into the tile's field.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Change = tuple[int, int]
 
 
 class PulseVariation(NamedTuple):
-    """What pulses of a stretch of time change by over the aperture, in its modes."""
+    """How the pulses of a segment change over the aperture, in terms of its modes."""
 
     kinds: tuple[Change, ...]
     onto: Floats  # (change, mode, mode) weights @ onto: those of the change

@@ -1,4 +1,4 @@
-"""Which arrivals a window holds, and how they fall into short stretches of time that are synthesised one by one."""
+"""The arrivals that a window holds, sorted into short segments of time that are synthesised one by one."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
 
 FAST = (16, 18, 20, 24, 27, 30)
-"""Lengths of stretches are these times powers of two: fast to transform, and few, so that spectra of pulses are
-kept."""
+"""Lengths of segments are these times powers of two: fast to transform, and so few that cached spectra of pulses are
+used again."""
 
 
 GUARD = 4
-"""Samples of silence at either end of a stretch: half of the widest kernel that hydrophones hear it by."""
+"""Samples of silence at either end of a segment: half of the widest kernel that interpolates it at hydrophones."""
 
 
 class Reception(NamedTuple):
-    """By which hydrophones arrivals are heard, through which water, and when."""
+    """The hydrophones, the absorption of the water, and the window in which arrivals are synthesised."""
 
     elements: Elements
     sonar: Sonar
@@ -52,7 +52,7 @@ class Segment:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """What of the arrivals is heard in the window."""
+    """The segments of a window, and which arrivals it holds."""
 
     stretches: tuple[Segment, ...]
     audible: Bools  # (path,) some of the pulse is in the window at some hydrophone
@@ -76,9 +76,9 @@ def layout(
     *,
     tolerance: float = SUPPORT_TOLERANCE,
 ) -> Layout:
-    """Sort arrivals into stretches: direct and echoes apart (they differ by tens of dB), each waveform apart, and
-    coherent echoes, whose pulses are differentiated; tolerance: what pulses may be, of their peak, at the ends of
-    a stretch.
+    """Sort arrivals into segments: direct paths and echoes apart (they differ by tens of dB), each waveform apart, and
+    coherent echoes apart, whose pulses are differentiated. tolerance: of its peak, what a pulse may still be at the
+    ends of a segment.
     """
     elements, sonar, _, start, samples = reception
     if samples < 1:
@@ -146,8 +146,8 @@ def _supports(
 def _extent(
     front: ArrayPaths, elements: Elements, before: Floats, after: Floats, start: float, stop: float
 ) -> tuple[Floats, Floats]:
-    """When the pulse of each path begins at the first hydrophone and ends at the last: bounds, exact where they leave
-    the window."""
+    """When the pulse of each path begins at the first hydrophone and ends at the last (path,) in s: bounds, which are
+    exact for paths that may leave the window."""
     spread = reach(front)
     early, late = front.delay - spread - before, front.delay + spread + after
     doubtful = np.flatnonzero((early < start) | (late > stop))

@@ -1,4 +1,4 @@
-"""The frequencies of a stretch of time that count, and the spectra of its pulses there."""
+"""The frequencies that a segment of time needs, and the spectra of its pulses at them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from sonarsynth.signals.pulse_variation import (
 from sonarsynth.signals.segments import Segment
 
 SHAPES = 0.02
-"""Share of the tolerance that the shapes of the pulses get, beside their terms."""
+"""Share of the tolerance that is given to the shapes of pulses."""
 
 
 LEAK = 0.1
@@ -35,7 +35,7 @@ MOST_DECAY = 2.0
 
 
 class Bins(NamedTuple):
-    """Frequencies of a stretch that count, next to each other."""
+    """The frequencies that a segment needs: consecutive bins."""
 
     first: int  # number of the first bin
     frequency: Floats  # (bin,) Hz
@@ -46,13 +46,13 @@ class Bins(NamedTuple):
     changes: PulseVariation  # of pulses over the aperture, in these modes
 
     def cut(self, count: int) -> Bins:
-        """The first of them."""
+        """The first `count` bins."""
         first = slice(0, count)
         frequency, spectrum, relative = self.frequency[first], self.spectrum[first], self.relative[first]
         return self._replace(frequency=frequency, spectrum=spectrum, relative=relative, modes=self.modes[:, first])
 
     def every(self, share: int) -> Bins:
-        """One in so many of them: those of a stretch as much shorter."""
+        """One bin in `share`: those of a segment that is shorter by this factor."""
         some = slice(-self.first % share, None, share)
         frequency, spectrum, relative = self.frequency[some], self.spectrum[some], self.relative[some]
         first, modes = -(-self.first // share), self.modes[:, some]
@@ -75,8 +75,8 @@ def highest_heard(bins: Bins, stop: float, tolerance: float, oversampling: float
 
 
 def _coherent_gain(front: ArrayPaths) -> float:
-    """By how much more the ends of the spectrum may add up over paths than its middle, where these come at random: with
-    long waves paths of one sign add by amplitude."""
+    """Factor by which the low end of the spectrum may add up to more than its middle: waves longer than the delays
+    between paths add by amplitude where paths have one sign, shorter waves by power."""
     return max(1.0, abs(float(np.sign(front.amplitude).sum())) / float(np.sqrt(front.count)))
 
 

@@ -1,4 +1,4 @@
-"""Noise of given directions at hydrophones anywhere: in each bin a sum of plane waves from directions drawn afresh."""
+"""Noise of given directions in any array: each bin is a sum of plane waves whose directions are drawn for that bin."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from sonarsynth.geometry import Pose
 from sonarsynth.receiver import Elements
 
 FEWEST, MOST = 256, 1024
-"""Plane waves of a bin: eight a hydrophone, so that several are heard in each beam, within these."""
+"""Fewest and most plane waves in a bin: eight for each hydrophone, so that each beam holds several."""
 TOGETHER = 1 << 18
-"""Phases of waves at hydrophones that are made at once."""
+"""Phases of waves at hydrophones that are computed at once."""
 SECONDS = 15e-9
 """Of one core for the phase of one wave at one hydrophone."""
 
