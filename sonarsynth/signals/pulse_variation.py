@@ -130,13 +130,13 @@ class ResidualVariation(NamedTuple):
 def rest(front: Wavefronts, paths: Ints, variation: PulseVariation, tolerance: float) -> ResidualVariation:
     """Of the tile of these paths; changes that add less than `tolerance` are left out, to all together or to the
     loudest."""
-    none = np.zeros(0)
-    sampled = paths[:: max(1, paths.size // LOUDEST)]
+    none, some = np.zeros(0), slice(None, None, max(1, paths.size // LOUDEST))
+    sampled = paths[some]
     loud, weight = np.abs(front.amplitude[sampled]), front.modes[sampled]
     if not variation.kinds:
         return ResidualVariation(none, none, np.zeros(0, int), np.zeros((0, sampled.size)), sampled)
-    turn, turned = _middle(front.expansion.phase, sampled)
-    spread, softer = _middle(front.expansion.delay_variance, sampled)
+    turn, turned = _shared(front.expansion.phase[paths], some)
+    spread, softer = _shared(front.expansion.delay_variance[paths], some)
     share = np.array([np.minimum(turned, 1.0) ** a * (softer * variation.rate) ** p for p, a in variation.kinds])
     size = np.sqrt((np.tensordot(weight, variation.onto, (1, 1)) ** 2).sum(axis=2)).T * share * loud
     mean = np.sqrt((size**2).sum(axis=1) / (loud**2).sum())
@@ -153,13 +153,12 @@ def pulses(front: Wavefronts, paths: Ints, over: ResidualVariation, variation: P
     return np.concatenate(weight), np.concatenate(loud)
 
 
-def _middle(terms: Floats, rows: Ints) -> tuple[Floats, Floats]:
-    """Mean (term,) of the terms of some paths, and bounds (path,) on what each has beside it."""
-    if not terms.shape[1]:
-        return np.zeros(0), np.zeros(rows.size)
-    value = terms[rows]
-    mean = value.mean(axis=0)
-    return mean, np.asarray(np.abs(value - mean).sum(axis=1))
+def _shared(terms: Floats, some: slice) -> tuple[Floats, Floats]:
+    """What all paths share of their terms (path, term), and bounds (path,) on what some have beside it: their mean,
+    unless a path would then change by more than it does, which no modes are made for (`with_changes`)."""
+    mean, own = terms[some].mean(axis=0), np.abs(terms).sum(axis=1)
+    beside = np.asarray(np.abs(terms - mean).sum(axis=1))
+    return (np.zeros_like(mean), own[some]) if (beside > own).any() else (mean, beside[some])
 
 
 def shares(

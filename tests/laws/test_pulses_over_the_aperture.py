@@ -188,3 +188,13 @@ def test_the_fast_synthesis_changes_pulses_as_the_exact_one_does(amplify: float)
         ):
             got = method.signals(part, (SNAP,), Reception(array, SONAR, None, START, 4000)).pressure
             assert np.abs(got - want).max() < most * np.abs(want).max()
+
+
+def test_sharp_paths_are_none_the_worse_for_paths_by_a_rough_sea_beside_them() -> None:
+    """What those change by over the aperture, though little is left of them, is not taken to be that of all."""
+    found = traced(SeaSurface(rms_height=0.05), HARD, MirrorLobe(width=0.5), PLACE)
+    found = found.select(np.flatnonzero(~found.direct)[::40])
+    hears = Reception(some_of(ROMANIS, 25), SONAR, None, START, 4000)
+    exact = DirectSum().signals(found, (SNAP,), hears).pressure
+    got = GriddedSynthesis(tolerance=1e-4).signals(found, (SNAP,), hears).pressure
+    assert np.linalg.norm(got - exact) < 1e-3 * np.linalg.norm(exact)
