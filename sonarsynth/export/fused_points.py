@@ -42,7 +42,8 @@ def points(
 
     Raises
     ------
-    FieldError where the store has no cloud, no target of that name, or is of an earlier version; IndexError for a frame that it has not.
+    FieldError where the store has no cloud, no target of that name, or is of an earlier version; IndexError for a
+    frame that it has not.
     """
     import xarray as xr
 

@@ -105,7 +105,7 @@ def test_a_store_of_an_earlier_version_is_refused_by_a_line(crossing: Path) -> N
     tree = ss.open(crossing)
     earlier = tree.copy()
     del earlier["truth"]["sonar_spin"]
-    with pytest.raises(FieldError, match="has no truth/sonar_spin, .* build it again"):
+    with pytest.raises(FieldError, match="has no truth/sonar_spin, which it takes to place points: build it again"):
         ss.points(earlier)
 
 
