@@ -18,7 +18,7 @@ from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import Elements
 from sonarsynth.signals.array_paths import ArrayPaths, array_paths, arrival_directions, delay_and_gain, lost, reach
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
-from sonarsynth.signals.pulse_variation import changed
+from sonarsynth.signals.pulse_variation import changed, from_the_sharpest
 from sonarsynth.signals.segments import Reception, fast_length, layout
 from sonarsynth.state import Emission
 
@@ -103,6 +103,7 @@ class DirectSum(UnroundedSynthesis):
         elements, sonar, absorption, start, samples = reception
         fs = sonar.sampling_frequency
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
+        front = from_the_sharpest(front, 0.5 * fs)  # elsewhere factors could be larger than numbers may be
         plan = layout(arrivals, front, snaps, reception)
         pressure = np.zeros((elements.count, samples))
         waveforms = [s.waveform for s in snaps]

@@ -18,6 +18,7 @@ from sonarsynth.signals.array_paths import array_paths
 from sonarsynth.signals.direct_sum import UnroundedSynthesis, attenuation
 from sonarsynth.signals.gridded.bins import bins_of
 from sonarsynth.signals.gridded.deposit import add_segment
+from sonarsynth.signals.pulse_variation import from_the_sharpest
 from sonarsynth.signals.segments import Reception, layout
 from sonarsynth.state import Emission
 
@@ -132,6 +133,7 @@ class GriddedSynthesis(UnroundedSynthesis):
         elements, sonar, absorption, start, samples = reception
         fs = sonar.sampling_frequency
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
+        front = from_the_sharpest(front, stop_frequency(sonar.antialias))
         plan = layout(arrivals, front, snaps, reception, tolerance=0.01 * self.tolerance)
         out = np.zeros((elements.count, samples), self.precision)
         method = (self.width, self.oversampling, self.precision, self.tolerance)

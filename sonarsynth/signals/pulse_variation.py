@@ -15,12 +15,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Complexes, Floats, Ints
+from sonarsynth.conventions import Bools, Complexes, Floats, Ints
 from sonarsynth.products.array_expansion import QUANTITIES
 from sonarsynth.signals.array_paths import ArrayPaths, Wavefronts
 
 MOST_POWERS = 8
 """Powers of spread that pulses may be expanded in."""
+
+STEEP = 3.0
+"""Np: powers of changes of blur beyond this converge slowly; such paths are each steered to itself, and changed
+exactly."""
 
 LOUDEST = 256
 """Paths that modes are made for as they change over the aperture, and that tiles look at."""
@@ -89,9 +93,24 @@ def with_changes(front: ArrayPaths) -> ArrayPaths:
     return replace(
         every,
         amplitude=every.amplitude * np.where(ahead > 0.0, np.minimum(turn[rows], 1.0), 1.0),
-        variance=every.variance + blur * spread[rows],
+        variance=np.maximum(every.variance + blur * spread[rows], 0.0),
         phase=every.phase + 0.5 * np.pi * ahead,
     )
+
+
+def steep(front: Wavefronts, highest: float) -> Bools:
+    """Paths (path,) whose blur changes by more than `STEEP` over the aperture, at a frequency (Hz)."""
+    return np.asarray(front.expansion.largest("delay_variance") * 0.5 * (2.0 * np.pi * highest) ** 2 > STEEP)
+
+
+def from_the_sharpest(front: ArrayPaths, highest: float) -> ArrayPaths:
+    """Paths whose steep blur is counted from where on the aperture they are sharpest: from there it only takes away."""
+    expansion = front.expansion
+    if not (which := steep(front, highest)).any():
+        return front
+    less = np.where(which, np.minimum(front.variance, expansion.largest("delay_variance")), 0.0)
+    terms = expansion.delay_variance + less[:, None] * np.eye(1, expansion.delay_variance.shape[1])
+    return replace(front, variance=front.variance - less, expansion=expansion.but(delay_variance=terms))
 
 
 def _loudest(loud: Floats) -> Ints:

@@ -15,7 +15,7 @@ from sonarsynth.signals.gridded.interpolation import Axes, box_nodes, columns
 from sonarsynth.signals.gridded.low_rank import PLAIN, Term, terms_for
 from sonarsynth.signals.gridded.nodes import MOST_NODES, SpectralQuantiles, nodes_for
 from sonarsynth.signals.pulse_shapes import main_modes
-from sonarsynth.signals.pulse_variation import PulseVariation, aperture_gradient, pulses, rest, slopes
+from sonarsynth.signals.pulse_variation import PulseVariation, aperture_gradient, pulses, rest, slopes, steep
 
 MOST_TERMS = 24
 """A tile that needs more terms, of one mode of its pulses, is split."""
@@ -237,9 +237,11 @@ def _halves(paths: Ints, views: _Views, aim: TileSettings) -> tuple[Ints, Ints] 
 
 def tiles(front: Wavefronts, aim: TileSettings) -> list[Tile]:
     """The tiles of predicted least cost: each is halved while that pays; the first halving may pay only with the
-    second.
-
-    Paths that miss some hydrophones are apart: each of these is a node of their tiles."""
+    second. Paths that miss some hydrophones are apart: each of these is a node of their tiles."""
+    if (apart := steep(front, aim.highest)).any():
+        left = np.flatnonzero(~apart)
+        others = [replace(t, paths=left[t.paths]) for t in tiles(front.select(left), aim)] if left.size else []
+        return [_alone(np.flatnonzero(apart), front, aim), *others]
     missed = front.occluded.any(axis=1)
     if not missed.any() or missed.all():
         return _tiles(front, aim, bool(missed.any()))
@@ -257,9 +259,8 @@ def _tiles(front: Wavefronts, aim: TileSettings, missed: bool) -> list[Tile]:
     if not missed:
         return _best(trial, views, aim, patient=True)
     best = [trial.tile] if _alone_pays(trial.tile, front, aim) else _best(trial, views, aim, patient=True)
-    return [  # halving seldom leads to single paths
-        _alone(tile.paths, front, aim) if _alone_pays(tile, front, aim) else tile for tile in best
-    ]
+    # halving seldom leads to single paths
+    return [_alone(tile.paths, front, aim) if _alone_pays(tile, front, aim) else tile for tile in best]
 
 
 def _alone_pays(tile: Tile, front: Wavefronts, aim: TileSettings) -> bool:
