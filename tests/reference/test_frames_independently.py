@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth.environment.sea import Environment, Isovelocity
+from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.equations.rays import ray_solutions
 from sonarsynth.geometry.hovering import Hover
 from sonarsynth.geometry.motion import Circle, ConstantVelocity, Motion, Still
@@ -86,6 +86,19 @@ def crossing(
     return plan(Recipe(title="crossing", scene=made, accuracy=Accuracy(signal=1e-3)), ("signals",), Choices())
 
 
+STATION = Still(position=(0.0, 0.0, -30.0), heading=0.5 * np.pi)
+
+
+def test_it_says_where_there_are_rays_that_it_does_not_know() -> None:
+    """In a channel with its axis at the crate: rays turn again and again on the way to one far off, not to one near."""
+    channel = Profile(depth=np.array([0.0, 30.0, 60.0]), speed=np.array([1500.0, 1480.0, 1500.0]))
+    for far, refused in ((22.0, False), (3000.0, True)):
+        made = crossing(Still(position=(far, 3.0, -29.0)), STATION)
+        frame = made.recipe.frame(0)[1]
+        assert bool(FramePressure(made.scene, frame, channel).unknown) == refused
+        assert not FramePressure(made.scene, frame, made.profile).unknown  # the water of one speed
+
+
 @pytest.mark.parametrize("sonar", [0.0, 5.0])
 @pytest.mark.parametrize("speed", [0.0, 1.4, 30.0])
 def test_what_moves_is_heard_where_the_sound_met_it(speed: float, sonar: float) -> None:
@@ -96,9 +109,6 @@ def test_what_moves_is_heard_where_the_sound_met_it(speed: float, sonar: float) 
     ours = ConstantVelocity(start=(0.0, 0.0, -30.0), heading=drift, speed=sonar)
     made = crossing(body, ours)
     assert max(away(made, [0, 47])) < ALLOWED
-
-
-STATION = Still(position=(0.0, 0.0, -30.0), heading=0.5 * np.pi)
 
 
 @pytest.mark.parametrize(("bounces", "times"), [(0, (-0.1, 0.0, 0.1)), (3, (0.0,))])

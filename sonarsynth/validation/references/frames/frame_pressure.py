@@ -36,12 +36,12 @@ from sonarsynth.validation.references.frames.sound_paths import Solid, arrival_t
 from sonarsynth.validation.references.rays.boundaries_met import reflected
 from sonarsynth.validation.references.rays.layered_rays import Family, Rays, families
 from sonarsynth.validation.references.rays.layers_crossed import Water
+from sonarsynth.validation.references.rays.rays_missed import complete
 
 OFF = 1e-6
 """Of a body's size: how far off a facet a line of sight begins."""
 SLANT = 0.3
 """Bent rays leave a facet by less than this (rad) beside straight ones: others are not looked for."""
-
 
 STOPPED = 2e-5
 """What the filter leaves of the snap may be so little of the largest, and be left out."""
@@ -74,7 +74,11 @@ class FramePressure:
         if any(snap.velocity.any() or snap.directivity for snap in self.frame.moment.snaps):
             return "sources that move, or are not alike in all directions, are not in the independent computation"
         wrong = [type(law).__name__ for law in self.scene.laws if not known(law)]
-        return f"{wrong[0]} is not among the laws of the independent computation" if wrong else ""
+        if wrong:
+            return f"{wrong[0]} is not among the laws of the independent computation"
+        if not complete(self.water, *self._ends(), self.bounces):
+            return "rays of one family past caustics, or that turn twice, are not in the independent computation"
+        return ""
 
     def pressure(self, sensors: Sequence[int], start: float, samples: int) -> tuple[Floats, Floats]:
         """Echoes, and what comes without a target, (sensor, sample) in Pa; start: s of the first sample, on the clock
@@ -125,6 +129,18 @@ class FramePressure:
         """Most reflections of a path."""
         return self.scene.physics.tracing.bounces
 
+    def _ends(self) -> tuple[Floats, Floats]:
+        """Points (ray, xyz) that rays join: snaps, the outermost facets of bodies and their middles, and the array."""
+        points = [self.sonar.points(np.zeros((1, 3)), np.zeros(1))]
+        for body in self.bodies:
+            outermost = np.unique([body.centre.argmin(axis=0), body.centre.argmax(axis=0)])
+            chosen = np.vstack([body.centre.mean(axis=0), body.centre[outermost]])
+            points.append(body.solid.mover.points(chosen, np.zeros(len(chosen))))
+        ends = np.vstack(points)
+        starts = np.array([snap.position for snap in self.frame.moment.snaps] + [ends[0]])
+        rows = [(n, m) for n in range(len(starts)) for m in range(n == len(starts) - 1, len(ends))]
+        return starts[[n for n, _ in rows]], ends[[m for _, m in rows]]
+
     def _lit(self, snap: Emission, body: Body) -> list[_LitFacets]:
         """The facets of a body that a snap lights, by each family."""
         groups = []
@@ -132,6 +148,8 @@ class FramePressure:
             rows = self._towards(
                 body, np.arange(len(body.centre)), np.full(len(body.centre), snap.time), snap.position, family
             )
+            if not len(rows):
+                continue
             time, back = met(self.water, snap.position, snap.time, body.solid.mover, body.centre[rows], family)
             normal = body.solid.mover.turned(body.normal[rows], time)
             lit = np.flatnonzero(np.einsum("nx,nx->n", normal, back.departure) > 0.0)
@@ -166,6 +184,8 @@ class FramePressure:
         body, mover = lit.body, lit.body.solid.mover
         centre = self.sonar.points(position[None], np.zeros(1))[0]
         facing = np.isin(lit.row, self._towards(body, lit.row, lit.time, centre, family))
+        if not facing.any():
+            return []
         facets = lit.select(np.flatnonzero(facing))
         point = mover.points(body.centre[facets.row], facets.time)
         late, ray = arrival_times(self.water, point, facets.time, self.sonar, position, family)

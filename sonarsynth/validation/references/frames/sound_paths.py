@@ -47,7 +47,7 @@ def met(water: Water, snap: Floats, sent: float, mover: Mover, body: Floats, fam
     time = np.full(len(body), sent)
     for _ in range(ROUNDS):
         ray = rays(water, mover.points(body, time), source, family)
-        before, time = time, sent + ray.time
+        before, time = time, sent + np.nan_to_num(ray.time)
         if not mover.velocity(body[:1], time[:1]).any() or not (np.abs(time - before) > SETTLED).any():
             break
     return time, ray
@@ -61,7 +61,7 @@ def arrival_times(
     body, late = np.broadcast_to(hydrophone, point.shape), time.copy()
     for _ in range(ROUNDS):
         ray = rays(water, point, sonar.points(body, late), family)
-        before, late = late, time + ray.time
+        before, late = late, time + np.nan_to_num(ray.time)
         if not sonar.velocity(body[:1], late[:1]).any() or not (np.abs(late - before) > SETTLED).any():
             break
     return late, ray
