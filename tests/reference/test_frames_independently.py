@@ -179,6 +179,23 @@ def test_rays_by_images_are_those_of_many_digits_where_the_speed_is_linear(slope
     assert seen > 20
 
 
+def test_rays_that_are_nearly_vertical_arrive() -> None:
+    """Up through layers, as long as the water is deep, and to the second order as much longer as they are slanted: the
+    root has few digits there, and was taken for none."""
+    water = Water(np.array([0.0, 30.0, 60.0, 100.0]), np.array([1496.0, 1494.0, 1502.0, 1507.0]), 100.0)
+    aside = np.geomspace(1e-6, 0.3, 25)
+    start, end = np.zeros((2, len(aside), 3))
+    start[:, 2], end[:, 2], end[:, 0] = -99.0, -17.0, aside
+    levels = np.linspace(17.0, 99.0, 200_001)
+    slowness = 1.0 / water.at(levels)
+    up = np.trapezoid(slowness, levels)
+    for family in families(0):
+        found = rays(water, start, end, family)
+        slanted = up + 0.5 * aside**2 / np.trapezoid(1.0 / slowness, levels)
+        np.testing.assert_allclose(found.time, slanted, rtol=1e-9)
+        np.testing.assert_allclose(found.spreading, 1.0 / 82.0, rtol=0.01)
+
+
 def test_a_ray_that_does_not_arrive_is_hidden() -> None:
     """In water that bends sound up no ray goes far but by the surface."""
     water = Water(np.array([0.0, 5.0]), np.array([1521.0, 1551.0]), 5.0)

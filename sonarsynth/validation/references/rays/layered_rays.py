@@ -61,6 +61,10 @@ def families(bounces: int) -> list[Family]:
     return [Family(n, down) for n in range(bounces + 1) for down in ((True, False) if n else (True,))]
 
 
+STEEPEST = 1e-6
+"""Cosine that rays have at least: the sine of steeper ones, which are followed as these, is 1 to all digits."""
+
+
 @dataclass(frozen=True, eq=False)
 class Rays:
     """A ray for each pair of points; NaN where there is none."""
@@ -85,9 +89,9 @@ def rays(water: Water, start: Floats, end: Floats, family: Family) -> Rays:
     NaN too where all rays cross a level faster than both ends and turn beyond one of them: those are not looked for.
     """
     away = end[:, :2] - start[:, :2]
-    r = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-12)
     first = -start[:, 2]
     last = family.image(-end[:, 2], water.bottom)
+    r = np.maximum(np.hypot(away[:, 0], away[:, 1]), np.maximum(STEEPEST * np.abs(last - first), 1e-12))
     if np.ptp(water.speed) == 0.0:
         p, slope, sums = _straight(water, r, first, last)
     else:
@@ -136,4 +140,5 @@ def _root(pieces: Crossed, r: Floats) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore"):
             step = sigma - (1.0 / x - 1.0 / r) / (-slope / x**2)
         sigma = np.where((step > low) & (step < high), step, 0.5 * (low + high))
-    return np.where(np.abs(x - r) <= 1e-9 * r, sigma, np.nan)
+    # the sine of a ray that is nearly vertical has few digits of its cosine: it misses by a part of its length
+    return np.where(np.abs(x - r) <= 1e-9 * np.hypot(pieces.rise, r), sigma, np.nan)
