@@ -93,7 +93,7 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
     azimuth, elevation = (np.deg2rad(every(tree, f"truth/beams/{axis}")) for axis in ("azimuth", "elevation"))
     reach = max(1, round(min(beam_width(tree) / _grid_step(tree), max(len(azimuth), len(elevation)))))
-    hits, ghosts, judged, clockless, missed = 0, 0, 0, 0, []
+    hits, ghosts, judged, unlocated, missed = 0, 0, 0, 0, []
     for block, i in ((b, i) for b in blocks(tree, frames) for i in b.frames):
         energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/beams/target", i)
         if not ((truth >= 0).any() and echoes_heard(block, i)) or louder_outside(block, i):
@@ -102,7 +102,7 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
         if lost or not np.isfinite(energy).any():  # no clock: a miss, unless no snap could be heard or made out
             hit = ghost = False
             counts = bool(snaps_heard(block, i).any()) and not refused(block, i)
-            clockless += counts
+            unlocated += counts
         else:
             row, column = map(int, np.unravel_index(np.nanargmax(energy), energy.shape))
             hit = near_target(truth, row, column, reach) or in_box(block, i, azimuth[column], elevation[row])
@@ -116,7 +116,7 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     if not judged:
         return Check(name, expected, "no target is in view and audible", None, {})
     also, besides = f", on a ghost in {ghosts}" if ghosts else "", " and ".join(other_sounds(tree))
-    also += f", {clockless} missed for want of a located snap" if clockless else ""
+    also += f", {unlocated} missed for want of a located snap" if unlocated else ""
     warning = f"in {ghosts} of {judged} frames the brightest beam is on a ghost by surface or bottom" if ghosts else ""
     if missed and besides:
         also += f", elsewhere in {len(missed)}"

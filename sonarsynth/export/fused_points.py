@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 KEPT = ("energy", "snr", "range", "range_error", "target", "emission", "family", "facet", "distance", "origin")
 """What is kept of each point beside its place."""
-AT_ECHO = (("truth", "sonar_velocity"), ("truth", "sonar_spin"), ("truth/targets", "orientation_at_echo"))
-"""What stores of earlier versions lack."""
+NEEDED = (("truth", "sonar_velocity"), ("truth", "sonar_spin"), ("truth/targets", "orientation_at_echo"))
+"""Variables that points are placed by, and that stores of earlier versions lack."""
 
 
 def points(
@@ -50,7 +50,7 @@ def points(
     tree = store if isinstance(store, xr.DataTree) else open_store(store)
     if "cloud" not in tree.children:
         raise FieldError(("relative_to",), "the store has no cloud: it was built without that product")
-    for group, variable in AT_ECHO:
+    for group, variable in NEEDED:
         if variable not in tree[group].data_vars:
             raise FieldError(("store",), f"has no {group}/{variable}, which it takes to place points: build it again")
     names = [str(name) for name in tree["truth/targets"].coords["target"].values]

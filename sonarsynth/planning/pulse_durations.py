@@ -21,8 +21,8 @@ from sonarsynth.ranging.range_profiles import StretchedEcho, stretched_echo
 from sonarsynth.receiver import Sonar, elements
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals import pulse_support
-from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, envelope_delay, silencing_blur, snap_gains
-from sonarsynth.signals.isolated_paths import whole_spectrum
+from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, envelope_delay, silencing_blur
+from sonarsynth.signals.isolated_paths import sent_energy, whole_spectrum
 from sonarsynth.sources.snap_pulses import Waveform, waveform
 from sonarsynth.state import Emission
 
@@ -88,16 +88,8 @@ def stretches(look: SampledScene) -> list[Stretch]:
 
 def _loud(snaps: tuple[Emission, ...], sonar: Sonar) -> list[Emission]:
     """Emissions without those of which the band has next to nothing beside others: echoes are not ranged by them."""
-    energy = snap_gains(snaps) ** 2 * np.array([_energy(snap.waveform, sonar) for snap in snaps])
+    energy = sent_energy(snaps, sonar)
     return [snap for snap, own in zip(snaps, energy, strict=True) if own >= QUIET * energy.max()]
-
-
-@lru_cache(maxsize=64)
-def _energy(shape: Waveform, sonar: Sonar) -> float:
-    """Of a pulse in the band, in any unit."""
-    f, wave = whole_spectrum(shape, sonar, 0.0)
-    band = slice(*np.searchsorted(f, [sonar.band.low, sonar.band.high]))
-    return float(np.sum(np.abs(wave[band]) ** 2) * (f[1] - f[0]))
 
 
 def _stretch(frame: Frame, body: PlacedTarget, snap: Emission, sonar: Sonar) -> Stretch:

@@ -63,7 +63,7 @@ def reverberation_left_out(plan: Plan) -> list[Omission]:
         Omission(
             "change of scattering strengths within the band", "as at its centre", f"{levels.edges:.1f} dB at its edges"
         ),
-        *_sharp_shadows(plan),
+        *_diffraction(plan),
         Omission("Doppler within the pulses of reverberation", "delays follow the sonar", "v/c of a pulse's length"),
         Omission(
             "speckle of single beams", "few scatterers fall into one", "contrast over 2; raise it by accuracy.speckle"
@@ -72,7 +72,7 @@ def reverberation_left_out(plan: Plan) -> list[Omission]:
     ]
 
 
-def _sharp_shadows(plan: Plan) -> list[Omission]:
+def _diffraction(plan: Plan) -> list[Omission]:
     """How far diffraction would blur the shadows of bodies in the first frame of the sequence: by the first Fresnel
     zone at the body, sqrt(wavelength d1 d2/(d1 + d2)), which is less than sqrt(wavelength d1) whatever is behind it.
 

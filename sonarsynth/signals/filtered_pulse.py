@@ -255,7 +255,7 @@ def stretch_sizes(waveform: Waveform, chosen: Filter, widest: float, sloped: boo
 
 @lru_cache(maxsize=64)
 def heard_part(waveform: Waveform, chosen: Filter) -> float:
-    """Largest modulus of the filtered spectrum over the snap's, at 513 frequencies: of a 12 ms tone 0.02 of it."""
+    """Largest modulus of the filtered spectrum over the snap's, at 513 frequencies: peaks between them are missed."""
     f = np.linspace(0.0, stop_frequency(chosen), 513)
     pulse = _pulse(waveform, 1.2 * float(f[-1]))
     bound = np.abs(pulse.strength).sum()  # bounds its spectrum

@@ -42,6 +42,12 @@ def energy_in_slices(waveform: Waveform, sonar: Sonar, count: int) -> Floats:
     return _in_slices(f, 0.5 * (power[1:] + power[:-1]), sonar, count)
 
 
+def sent_energy(snaps: tuple[Emission, ...], sonar: Sonar) -> Floats:
+    """Energy (snap,) in Pa2 s of each pulse in the band at 1 m."""
+    slices = [float(energy_in_slices(snap.waveform, sonar, 1).sum()) for snap in snaps]
+    return np.asarray(2.0 * snap_gains(snaps) ** 2 * np.array(slices).reshape(len(snaps)))
+
+
 @lru_cache(maxsize=64)
 def lateness_in_slices(waveform: Waveform, sonar: Sonar, count: int) -> Floats:
     """Group delay (slice,) in s, after its time 0, of the filtered snap in equal slices of the band, by its energy."""

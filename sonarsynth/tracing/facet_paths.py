@@ -188,7 +188,12 @@ def facet_paths(
 
 def bending(medium: Medium, propagation: Propagation, receiver: Receiver) -> Medium:
     """What bends the rays of a model: the water, or for straight rays the speed at the array everywhere."""
-    if propagation.bends or medium.profile.uniform:
+    return medium if propagation.bends else of_one_speed(medium, receiver)
+
+
+def of_one_speed(medium: Medium, receiver: Receiver) -> Medium:
+    """The water with the sound speed that it has at the array everywhere."""
+    if medium.profile.uniform:
         return medium
     nodes = medium.profile.depth
     return replace(medium, profile=Profile(nodes, np.full(len(nodes), receiver.speed(medium))))

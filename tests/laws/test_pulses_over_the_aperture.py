@@ -19,6 +19,8 @@ from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import POINT, Elements, Sonar
 from sonarsynth.scattering import FacetLaw, Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.signals import DirectSum, GriddedSynthesis
+from sonarsynth.signals.array_paths import array_paths
+from sonarsynth.signals.pulse_variation import from_the_sharpest
 from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
@@ -188,6 +190,19 @@ def test_the_fast_synthesis_changes_pulses_as_the_exact_one_does(amplify: float)
         ):
             got = method.signals(part, (SNAP,), Reception(array, SONAR, None, START, 4000)).pressure
             assert np.abs(got - want).max() < most * np.abs(want).max()
+
+
+def test_blur_counted_from_the_sharpest_place_is_the_same_at_every_hydrophone() -> None:
+    """Which both syntheses take it from: never sharper than a plain pulse, and more blurred from there on."""
+    found = traced(SeaSurface(rms_height=0.1), HARD, MirrorLobe(width=0.5), PLACE)
+    front = array_paths(found.select(np.flatnonzero(~found.direct)[::10]), (SNAP,), ROMANIS)
+    again, points = from_the_sharpest(front, 85e3), ROMANIS.position
+    spread = [of.expansion.over("delay_variance", points) for of in (front, again)]
+    total = [of.variance[:, None] + own for of, own in zip((front, again), spread, strict=True)]
+    np.testing.assert_allclose(total[1], total[0], rtol=0, atol=1e-12 * total[0].max())
+    moved = again.variance != front.variance
+    assert moved.any() and (again.variance >= 0.0).all() and (spread[0][moved] < 0.0).any()
+    assert spread[1][moved].min() > -1e-12 * total[0].max()
 
 
 @pytest.mark.parametrize("height", [0.03, 0.05, 0.1, 0.3])

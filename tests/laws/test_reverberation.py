@@ -20,7 +20,7 @@ from sonarsynth.geometry.motion import Still, Waypoint, Waypoints, pose
 from sonarsynth.pipeline import render, synthesise, trace_at
 from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.planning import Plan, arrivals_of, frame_start, plan
-from sonarsynth.planning.measured.reverberation_levels import frame_scatterers, sent_energy
+from sonarsynth.planning.measured.reverberation_levels import frame_scatterers
 from sonarsynth.products import ORIGINS
 from sonarsynth.products.pulse_arrivals import ReverberationArrivals
 from sonarsynth.receiver import Band, BandPass, BeamGrid, PlanarLattice, Sonar
@@ -29,6 +29,7 @@ from sonarsynth.recipe.scene import EchoWindow, Processing, Scene, Trajectory, W
 from sonarsynth.recipe.tolerance import Accuracy
 from sonarsynth.scattering.boundaries import Lambert, WindySurface
 from sonarsynth.signals.filtered_pulse import pulse_spectrum, snap_gains
+from sonarsynth.signals.isolated_paths import sent_energy
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import path_error
 from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
 from sonarsynth.state import Emission, Medium, Receiver
@@ -81,7 +82,7 @@ def heard(made: Plan, index: int = 0) -> ReverberationArrivals:
 
 def sent(made: Plan) -> float:
     """Energy of the snap (Pa2 s) in the band at 1 m."""
-    return float(sent_energy(made.recipe.frame(0)[1].moment.snaps, made.scene)[0])
+    return float(sent_energy(made.recipe.frame(0)[1].moment.snaps, made.scene.sonar)[0])
 
 
 def test_energy_is_that_of_the_sonar_equation_and_not_of_the_number_of_scatterers() -> None:

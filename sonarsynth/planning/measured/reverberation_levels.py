@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
+from sonarsynth.conventions import REFERENCE_PRESSURE
 from sonarsynth.description import FieldError
 from sonarsynth.equations.reverberation.bottom_strength import Angles
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import context_of
 from sonarsynth.products.pulse_arrivals import ReverberationArrivals
 from sonarsynth.recipe.scene import Frame, Scene
-from sonarsynth.signals.filtered_pulse import snap_gains
-from sonarsynth.signals.isolated_paths import energy_in_slices
+from sonarsynth.signals.isolated_paths import sent_energy
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import spare_times
-from sonarsynth.state import Emission
 from sonarsynth.tracing.reverberation.families import ReverberationWindow, contrast_error, site_of
 from sonarsynth.tracing.reverberation.reverberation_arrivals import reverberation_arrivals
 
@@ -84,12 +82,6 @@ def _changes_within_band(plan: Plan) -> float:
     return worst
 
 
-def sent_energy(snaps: tuple[Emission, ...], scene: Scene) -> Floats:
-    """Energy (snap,) in Pa2 s of each pulse in the band at 1 m."""
-    slices = [float(energy_in_slices(snap.waveform, scene.sonar, 1).sum()) for snap in snaps]
-    return np.asarray(2.0 * snap_gains(snaps) ** 2 * np.array(slices).reshape(len(snaps)))
-
-
 def noise_power(scene: Scene) -> float:
     """Power (Pa2) of ambient noise and electronics at a hydrophone in the band, by their density at its centre."""
     band, centre = scene.sonar.band, np.array([scene.sonar.band.centre])
@@ -130,7 +122,7 @@ def _scatterers(plan: Plan, frame: Frame, start: float, speckle: float, spread: 
         sonar.band.high - sonar.band.low,
         speckle,
         spread,
-        sent_energy(snaps, scene),
+        sent_energy(snaps, sonar),
         noise_power(scene) / plan.elements.count,
     )
     return reverberation_arrivals(described, context, listening, frame.seed, frame.key)

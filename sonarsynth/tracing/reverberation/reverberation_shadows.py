@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver.subarrays import subarrays
-from sonarsynth.state import FrameContext, Medium, Receiver, meeting_times
+from sonarsynth.state import FrameContext, Medium, Receiver
+from sonarsynth.tracing.facet_paths import of_one_speed
+from sonarsynth.tracing.meetings import family_times
 from sonarsynth.tracing.occlusion.ray_cones import hidden, may_meet
 
 PART = 32
@@ -34,17 +35,13 @@ class Shadows:
     @staticmethod
     def of(context: FrameContext) -> Shadows:
         """In a frame."""
-        receiver, nodes, bodies = context.receiver, context.medium.profile.depth, context.bodies
-        speed = receiver.speed(context.medium)
-        straight = replace(context.medium, profile=Profile(nodes, np.full(len(nodes), speed)))
+        receiver, medium, bodies = context.receiver, context.medium, context.bodies
         tracks = [body.track for body in bodies]
-        times = meeting_times(
-            tracks, context.snaps, lambda start, end: np.linalg.norm(end - start, axis=1) / speed
-        ).tolist()
+        times = family_times(tracks, context.snaps, medium.depth, 0, receiver.speed(medium))[0].tolist()
         met = tuple(tuple(body.later(t) for body, t in zip(bodies, row, strict=True)) for row in times)
         parts = subarrays(receiver.elements, -(-receiver.elements.count // PART) if bodies else 1)
         middle = receiver.pose.turn_to_world(np.array([part.centre for part in parts]))
-        return Shadows(met, straight, receiver, tuple(part.sensor for part in parts), middle)
+        return Shadows(met, of_one_speed(medium, receiver), receiver, tuple(part.sensor for part in parts), middle)
 
     def lit(self, number: int, source: Floats, position: Floats, way: Floats, bounces: int) -> Bools:
         """Which scatterers, at position (point, xyz) m, no body hides from emission `number` at source (xyz) m; way
