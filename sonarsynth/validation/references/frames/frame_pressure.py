@@ -36,7 +36,7 @@ from sonarsynth.validation.references.frames.sound_paths import Solid, arrival_t
 from sonarsynth.validation.references.rays.boundaries_met import reflected
 from sonarsynth.validation.references.rays.layered_rays import Family, Rays, families
 from sonarsynth.validation.references.rays.layers_crossed import Water
-from sonarsynth.validation.references.rays.rays_missed import complete
+from sonarsynth.validation.references.rays.rays_missed import knows_every_ray
 
 OFF = 1e-6
 """Of a body's size: how far off a facet a line of sight begins."""
@@ -76,7 +76,7 @@ class FramePressure:
         wrong = [type(law).__name__ for law in self.scene.laws if not known(law)]
         if wrong:
             return f"{wrong[0]} is not among the laws of the independent computation"
-        if not complete(self.water, *self._ends(), self.bounces):
+        if not knows_every_ray(self.water, *self._ends(), self.bounces):
             return "rays of one family past caustics, or that turn twice, are not in the independent computation"
         return ""
 

@@ -16,7 +16,7 @@ TURNING = 12
 """Turning points of the rays that are looked for."""
 
 
-def complete(water: Water, start: Floats, end: Floats, bounces: int) -> bool:
+def knows_every_ray(water: Water, start: Floats, end: Floats, bounces: int) -> bool:
     """Whether the rays of all families between points (ray, xyz) are as many as rays followed leg by leg.
 
     Parameters
