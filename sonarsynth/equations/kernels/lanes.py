@@ -1,4 +1,4 @@
-"""Sixteen float32 numbers at once, for compiled kernels: one register of AVX-512, split by the compiler elsewhere.
+"""Lanes, for compiled kernels: as many float32 numbers at once as a register holds.
 
 The compiler's own vectoriser cannot keep a sum over array elements in registers while it runs over frequencies; with
 lanes as a type, a kernel is written as its equation is, and a sum is one fused multiply-add a term. Operators: + - *.
@@ -11,11 +11,15 @@ import operator
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
+import llvmlite.binding as llvm
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic, models, overload, register_model
 
-LANES: Final = 16
+WIDE: Final = bool(llvm.get_host_cpu_features().get("avx512f"))
+"""Whether there are 32 registers of sixteen numbers (AVX-512). Elsewhere: sixteen of eight (AVX2), or the like."""
+
+LANES: Final = 16 if WIDE else 8
 """Numbers in one group of lanes."""
 
 _VECTOR = ir.VectorType(ir.FloatType(), LANES)
@@ -28,7 +32,7 @@ def instruction(build: Callable[..., Any]) -> Any:
 
 
 class LanesType(types.Type):
-    """Numba's name for sixteen float32 numbers."""
+    """Numba's name for a group of lanes."""
 
     def __init__(self) -> None:
         super().__init__(name=f"float32x{LANES}")
@@ -55,7 +59,7 @@ def _order(lanes: Iterable[int]) -> Any:
 
 @instruction
 def load(typing: Any, array: Any, index: Any) -> Any:
-    """Lanes array[index : index + 16] of a flat contiguous float32 array."""
+    """Lanes array[index : index + LANES] of a flat contiguous float32 array."""
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         value = builder.load(_address(context, builder, signature.args[0], *arguments))
@@ -67,7 +71,7 @@ def load(typing: Any, array: Any, index: Any) -> Any:
 
 @instruction
 def store(typing: Any, array: Any, index: Any, value: Any) -> Any:
-    """Write lanes to array[index : index + 16]."""
+    """Write lanes to array[index : index + LANES]."""
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address = _address(context, builder, signature.args[0], arguments[0], arguments[1])
@@ -79,7 +83,7 @@ def store(typing: Any, array: Any, index: Any, value: Any) -> Any:
 
 @instruction
 def load_complex(typing: Any, array: Any, index: Any) -> Any:
-    """Real and imaginary parts (lanes) of sixteen complex numbers, pairs of float32 from array[index] on."""
+    """Real and imaginary parts (lanes) of complex numbers, pairs of float32 from array[index] on."""
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         halves = []
@@ -95,7 +99,7 @@ def load_complex(typing: Any, array: Any, index: Any) -> Any:
 
 @instruction
 def store_complex(typing: Any, array: Any, index: Any, real: Any, imaginary: Any) -> Any:
-    """Write sixteen complex numbers as pairs of float32 from array[index] on."""
+    """Write complex numbers (lanes) as pairs of float32 from array[index] on."""
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array, index, real, imaginary = arguments
@@ -123,7 +127,7 @@ def splat(typing: Any, scalar: Any) -> Any:
 
 @instruction
 def ramp(typing: Any) -> Any:
-    """0, 1, 2, ... 15."""
+    """0, 1, 2, ... LANES - 1."""
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return ir.Constant(_VECTOR, [float(i) for i in range(LANES)])

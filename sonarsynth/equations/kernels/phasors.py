@@ -1,4 +1,4 @@
-"""Cosines and sines of sixteen phases at once, and beams from them: compiled kernels.
+"""Cosines and sines of phases, a group of lanes at once, and beams from them: compiled kernels.
 
 Phases are in turns, reduced in float64 before anything is rounded to float32. "Half" phasors are right up to a sign,
 that of the cosine and the sine alike: enough where energies are wanted, and the series need span half a turn only.
@@ -56,7 +56,7 @@ def half_phasor(turns: Any, more: Any) -> Any:
 
 @compiled(forceinline=True)
 def half_phasors(delay: float, frequency: float, spacing: float) -> Any:
-    """Cosine and sine (lanes) of 2 pi delay (frequency + spacing * 0..15), up to one sign a lane. s, Hz, Hz."""
+    """Cosine and sine (lanes) of 2 pi delay (frequency + spacing * 0, 1, ...), up to one sign a lane. s, Hz, Hz."""
     turns = delay * frequency
     turns -= 0.5 * np.rint(2.0 * turns)
     high = np.float32(turns)
@@ -71,23 +71,23 @@ def turned(c: Any, s: Any, by_c: Any, by_s: Any) -> Any:
 
 @compiled(forceinline=True)
 def phasors(delay: float, frequency: float, spacing: float) -> Any:
-    """Cosine and sine (lanes) of 2 pi delay (frequency + spacing * 0..15): the half angle, doubled; error 3e-7."""
+    """Cosine and sine (lanes) of 2 pi delay (frequency + spacing * 0, 1, ...): the half angle, doubled; error 3e-7."""
     c, s = half_phasors(0.5 * delay, frequency, spacing)
     return turned(c, s, c, s)
 
 
 @compiled(forceinline=True)
 def weighted(pairs: Any, at: int, weight: float) -> Any:
-    """Real and imaginary parts (lanes) of weight times sixteen complex numbers, pairs of float32 from pairs[at] on."""
+    """Real and imaginary parts (lanes) of weight times complex numbers, pairs of float32 from pairs[at] on."""
     x, y = load_complex(pairs, at)
     return splat(weight) * x, splat(weight) * y
 
 
 @compiled(forceinline=True)
 def group_steps(delays: Any, spacing: float, cosines: Any, sines: Any) -> None:
-    """Fill cosines, sines (float32) with half phasors of 2 pi delay * 16 spacing: one group of frequencies on.
+    """Fill cosines, sines (float32) with half phasors of 2 pi delay LANES spacing: one group of frequencies on.
 
-    All three arrays are of one length, a multiple of 16.
+    All three arrays are of one length, a multiple of LANES.
     """
     for i in range(len(delays)):
         turns = delays[i] * (LANES * spacing)

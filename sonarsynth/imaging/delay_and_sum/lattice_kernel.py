@@ -117,8 +117,8 @@ def lattice_energies(
     """Sum over bins of |B|^2 in a quadrant, or a part of it, and its mirror images: (mirror, elevation, azimuth).
 
     mirror: 0 the quadrant above and to port, 1 at -az, 2 at -el, 3 both. pairs: spectra (sensor + 1, bins) as float32
-    pairs, bins a multiple of 16, the last sensor silent; places (mirror, subarray, column, row, 4), from the middle of
-    a subarray outwards: sensors at (+z, +y), (+z, -y), (-z, +y), (-z, -y), the silent one for none;
+    pairs, bins a multiple of LANES, the last sensor silent; places (mirror, subarray, column, row, 4), from the middle
+    of a subarray outwards: sensors at (+z, +y), (+z, -y), (-z, +y), (-z, -y), the silent one for none;
     weight (sensor + 1,) float32; delay (subarray, column, row, 4) s, of focusing; heights (subarray, column) rows in
     use; rise (elevation, subarray, side of y, column) and across (subarray, elevation, azimuth): half of what a wave is
     sooner (s) at the next row up and at the next column to port; middle (subarray, elevation, azimuth): what it is
@@ -171,8 +171,8 @@ def lattice_energies(
 def focused_halves(
     pairs: Any, bins: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float
 ) -> Any:
-    """What `lattice_beams` steers, float32: an array, focused and folded for each sixteen frequencies, whose halves, to
-    port and to starboard, are the two sets. As for `lattice_energies`; places and delay (half, column, row, 4)."""
+    """What `lattice_beams` steers, float32: an array, focused and folded for each group of frequencies, whose halves,
+    to port and to starboard, are the two sets. As for `lattice_energies`; places and delay (half, column, row, 4)."""
     _, columns, rows, _ = places.shape
     size = 2 * columns * rows * TERM
     folded = np.empty(bins // LANES * size, np.float32)

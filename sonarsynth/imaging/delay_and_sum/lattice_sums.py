@@ -12,8 +12,8 @@ t_y and t the phases of what a wave is sooner at the next row of column y, and a
 runs over two sets of sensors at once, for two directions: the beam at (-el, az) hears the array as that at (+el, az)
 hears its mirror image.
 
-Cosines and sines come from Chebyshev's c_(j+1) = 2 cos(2t) c_j - c_(j-1). Sixteen frequencies are summed at once,
-energies in chunks of 64, whatever asks for them: always the same bits.
+Cosines and sines come from Chebyshev's c_(j+1) = 2 cos(2t) c_j - c_(j-1). A group of frequencies, one a lane, is
+summed at once, energies in chunks of some groups, whatever asks for them: always the same bits.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.compiling import compiled
-from sonarsynth.equations.kernels.lanes import LANES, least, load, splat, store, with_sign
+from sonarsynth.equations.kernels.lanes import LANES, WIDE, least, load, splat, store, with_sign
 from sonarsynth.equations.kernels.phasors import C0, GROUPS, TWO, ZERO, group_steps, phasors, turned, weighted
 
 TERM = 8 * LANES
-"""float32 numbers of one term of a sum: sums and differences of two sets, complex numbers of sixteen frequencies."""
+"""float32 numbers of one term of a sum: sums and differences of two sets, complex numbers of a group of frequencies."""
 
 FOUR = np.float32(4.0)
 
@@ -45,11 +45,8 @@ def _seeds(c: Any, s: Any, odd: bool) -> Any:
 
 
 @compiled(forceinline=True)
-def term_sums(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, t: Any) -> Any:
-    """Sums of cosine times four numbers, of sine times four more, for two directions with half steps (c, s), (d, t).
-
-    The terms lie at terms[start : stop : TERM]. Twenty multiply-adds a term and nothing else, in 26 registers.
-    """
+def _sums_of_two(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, t: Any) -> Any:
+    """As `term_sums`: twenty multiply-adds a term and nothing else, in 26 registers."""
     c, c_, s, s_, p = _seeds(c, s, odd)
     d, d_, t, t_, q = _seeds(d, t, odd)
     a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = splat(ZERO)
@@ -74,6 +71,35 @@ def term_sums(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: A
         c, c_, s, s_ = p * c - c_, c, p * s - s_, s
         d, d_, t, t_ = q * d - d_, d, q * t - t_, t
     return (a0, a1, a2, a3, a4, a5, a6, a7), (b0, b1, b2, b3, b4, b5, b6, b7)
+
+
+@compiled(forceinline=True)
+def _sums_of_one(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any) -> Any:
+    """The sums of one direction, in 14 registers: where there are sixteen, half of 26 would be kept in memory."""
+    c, c_, s, s_, p = _seeds(c, s, odd)
+    a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = splat(ZERO)
+    for i in range(start, stop, TERM):
+        a0 = a0 + c * load(terms, i)
+        a1 = a1 + c * load(terms, i + LANES)
+        a2 = a2 + c * load(terms, i + 2 * LANES)
+        a3 = a3 + c * load(terms, i + 3 * LANES)
+        a4 = a4 + s * load(terms, i + 4 * LANES)
+        a5 = a5 + s * load(terms, i + 5 * LANES)
+        a6 = a6 + s * load(terms, i + 6 * LANES)
+        a7 = a7 + s * load(terms, i + 7 * LANES)
+        c, c_, s, s_ = p * c - c_, c, p * s - s_, s
+    return a0, a1, a2, a3, a4, a5, a6, a7
+
+
+@compiled(forceinline=True)
+def term_sums(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, t: Any) -> Any:
+    """Sums of cosine times four numbers, of sine times four more, for two directions with half steps (c, s), (d, t).
+
+    The terms lie at terms[start : stop : TERM].
+    """
+    if WIDE:
+        return _sums_of_two(terms, start, stop, odd, c, s, d, t)
+    return _sums_of_one(terms, start, stop, odd, c, s), _sums_of_one(terms, start, stop, odd, d, t)
 
 
 @compiled(forceinline=True)
@@ -108,7 +134,7 @@ def _focused(pairs: Any, at: int, weight: float, delay: float, frequency: float,
 def focus(
     pairs: Any, bins: int, low: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float, folded: Any
 ) -> None:  # fmt: skip
-    """Fill `folded` [side of y][column][row][S D] for the sixteen frequencies from bin `low` on; places, delay
+    """Fill `folded` [side of y][column][row][S D] for the group of frequencies from bin `low` on; places, delay
     (set, column, row, 4)."""
     _, columns, rows, _ = places.shape
     for n in range(columns):
@@ -129,7 +155,7 @@ def focus(
 
 @compiled(forceinline=True)
 def group_turns(delays: Any, spacing: float) -> Any:
-    """Cosines and sines (float32, flat) of 2 pi delay * 16 spacing: one group of frequencies on."""
+    """Cosines and sines (float32, flat) of 2 pi delay LANES spacing: one group of frequencies on."""
     count = delays.size
     padded = count + -count % LANES
     half = np.zeros(padded)
