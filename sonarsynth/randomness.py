@@ -7,9 +7,6 @@ import hashlib
 import numpy as np
 import numpy.typing as npt
 
-HALF, UNIT, TURN = np.float32(0.5), np.float32(2.0**-32), np.float32(2.0 * np.pi)
-"""Of whole numbers of 32 bits: what makes them numbers from 0 to 1, neither, and angles (rad)."""
-
 
 def stream(seed: int, *path: int | str) -> np.random.Generator:
     """An independent generator (Philox) for (seed, path).
@@ -47,18 +44,3 @@ def uniforms(seed: int, *counters: npt.ArrayLike) -> npt.NDArray[np.float64]:
             z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
             state = z ^ (z >> np.uint64(31))
     return np.asarray(((state >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52)
-
-
-def complex_normals(power: npt.NDArray[np.float32], random: np.random.Generator) -> npt.NDArray[np.complex64]:
-    """Complex normal numbers (...) of mean 0; power (...): variance of the real part, and of the imaginary part.
-
-    On whole arrays: in a third of the generator's time. Source: Box and Muller (1958), Ann. Math. Statist. 29, 610.
-    """
-    even = random.integers(0, 1 << 64, power.shape, np.uint64)
-    radius, turn = (half.astype(np.uint32).astype(np.float32) for half in (even >> np.uint64(32), even))
-    size = np.sqrt(np.float32(-2.0) * power * np.log((radius + HALF) * UNIT))
-    turn *= TURN * UNIT
-    wave = np.empty(power.shape, np.complex64)
-    np.multiply(size, np.cos(turn), out=wave.real)
-    np.multiply(size, np.sin(turn), out=wave.imag)
-    return wave

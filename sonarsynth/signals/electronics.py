@@ -15,7 +15,6 @@ from sonarsynth.equations.noise.ambient_noise import power_density
 from sonarsynth.equations.noise.filters import duration
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
-from sonarsynth.randomness import complex_normals
 from sonarsynth.receiver import Converter, Electronics, Elements, Filter, Sonar
 from sonarsynth.signals.filtered_pulse import filter_response, fir
 from sonarsynth.signals.segments import fast_length
@@ -83,6 +82,8 @@ def add_noise(
         position = elements.position if pose is None else pose.to_world(elements.position)
         _draw_correlated(spectrum[:, low:high], noise, frequency, gain, position, fast)
     else:
+        from sonarsynth.equations.noise.complex_normals import complex_normals  # compiled: read where it is needed
+
         for first in range(0, sensors, AT_ONCE):
             some = spectrum[first : first + AT_ONCE, low:high]
             some[...] = complex_normals(np.broadcast_to(size**2, some.shape), fast)

@@ -9,6 +9,7 @@ from scipy import signal
 from sonarsynth.environment.noise import TabulatedNoise, ThermalNoise, WenzNoise, WindNoise
 from sonarsynth.equations.bubble import snap_pressure
 from sonarsynth.equations.noise import ambient_noise, filters
+from sonarsynth.equations.noise.complex_normals import box_muller
 from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from tests.filtered import filtered_pulse
@@ -139,3 +140,17 @@ def test_parts_of_wenz_are_the_parts_that_can_be_asked_for() -> None:
 def test_quantisation() -> None:
     density = ambient_noise.quantisation_density(2.0 / 2**16, 196e3)
     assert 10 * np.log10(density) == pytest.approx(-151.01, abs=6e-3)
+
+
+def test_normal_numbers_are_those_of_box_and_muller_in_double_precision() -> None:
+    bits = np.random.default_rng(3).integers(0, 1 << 32, 1 << 18, np.uint32)
+    bits[:6] = 0, 0, (1 << 32) - 1, (1 << 32) - 1, 1 << 31, 1 << 31  # the largest radius, the smallest
+    power = np.linspace(0.5, 2.0, bits.size // 2).astype(np.float32)
+    pairs = np.empty(bits.size, np.float32)
+    box_muller(power, bits, pairs)
+    angle, even = 2.0 * np.pi * bits[::2] / 2.0**32, (bits[1::2] + 0.5) / 2.0**32
+    exact = np.sqrt(-2.0 * power * np.log(even)) * np.exp(1j * angle)
+    # a number near one is known to half of the last of 24 bits, its logarithm to as much: sqrt(2 power 2^-24)
+    assert np.abs(pairs[::2] + 1j * pairs[1::2] - exact)[even < 0.999].max() < 1e-5
+    assert np.abs(pairs[::2] + 1j * pairs[1::2] - exact).max() < np.sqrt(2.0 * 2.0 * 2.0**-24)
+    assert abs(pairs[:2] - [np.sqrt(2.0 * 0.5 * 33.0 * np.log(2.0)), 0.0]).max() < 1e-5

@@ -11,9 +11,9 @@ from scipy.fft import fft2, ifft2, next_fast_len
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.environment.noise.directions import NoiseDirections
+from sonarsynth.equations.noise.complex_normals import complex_normals
 from sonarsynth.equations.noise.lattice_coherence import lag_covariance, periodic_powers
 from sonarsynth.equations.noise.wave_directions import quadrature
-from sonarsynth.randomness import complex_normals
 from sonarsynth.receiver import Elements
 
 TORUS = (1.0, 1.15, 1.4)
