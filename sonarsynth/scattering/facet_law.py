@@ -25,21 +25,15 @@ class FacetLaw:
 
     def cross_section(
         self, corners: Floats, normal: Floats, area: Floats, curved: Bools, incident: Floats, scattered: Floats,
-        wavenumber: Floats, shape: Floats | None = None,
+        wavenumber: Floats,
     ) -> Floats:  # fmt: skip
         """Power |f|^2 (frequency,) in m2 of unhidden facets, for unit vectors (xyz) of propagation, in and away.
 
         corners (facet, 3, xyz) m, counter-clockwise from outside, with normal (facet, xyz), area (facet,) m2 and
-        whether the surface is curved there (facet,); wavenumber (frequency,) rad/m. shape: as of a law that `creeps`.
+        whether the surface is curved there (facet,); wavenumber (frequency,) rad/m.
         """
         amplitude = self.amplitude(incident, scattered, normal, area)
         return np.full(wavenumber.shape, np.sum(amplitude**2))
-
-    @property
-    def creeps(self) -> bool:
-        """Whether `cross_section` has what creeps round smooth convex bodies: of all of their facets, with `shape`
-        (facet, xyz, xyz), as `convex_bodies.shape_operators`."""
-        return False
 
     @property
     def parts(self) -> tuple[Component, ...]:

@@ -28,7 +28,6 @@ class Kirchhoff(FacetLaw):
     body, and what cancels the direct wave in the shadow behind it is left out, unless `forward` says otherwise. Rigid
     spheres of 0.25 m, 25 to 110 kHz, against the exact series: within 0.3 dB at backscatter, 0.7 dB at 90 and 105
     degrees off it, 2.5 dB at 120.
-    `target_strength` of closed convex bodies that are curved everywhere has all of these, as `edges` auto.
     """
 
     kind: Literal["kirchhoff"] = "kirchhoff"
@@ -37,9 +36,7 @@ class Kirchhoff(FacetLaw):
     edges: Literal["auto", "smooth", "sharp"] = "auto"
     """Where the lit and seen part ends. Smooth: the body goes on in a curve, and the echo is tapered to 0 (it differs
     from sharp off backscatter only). Sharp: it ends in an edge, as a plate does. Auto: sharp for facets that lie in a
-    plane with their neighbours, smooth for others; but `target_strength` of a closed convex body that is curved
-    everywhere takes the field of Fock on all of its surface (`equations.scattering.convex_bodies`), from light to
-    shadow."""
+    plane with their neighbours, smooth for others."""
     roughness: NonNegativeMetres = 0.0
     """Rms height of the surface about the facets."""
     slope: Annotated[Number, Gt(0), Le(0.5)] = 0.1
@@ -128,27 +125,18 @@ class Kirchhoff(FacetLaw):
         taper = shadow_taper(incident, scattered, normal)
         return taper if self.edges == "smooth" else np.where(curved, taper, sharp)
 
-    @property
-    def creeps(self) -> bool:
-        """As `FacetLaw.creeps`: unless `edges` say how bodies end."""
-        return self.edges == "auto"
-
     def cross_section(
         self, corners: Floats, normal: Floats, area: Floats, curved: Bools, incident: Floats, scattered: Floats,
-        wavenumber: Floats, shape: Floats | None = None,
+        wavenumber: Floats,
     ) -> Floats:  # fmt: skip
         """As `FacetLaw.cross_section`."""
-        from sonarsynth.equations.scattering.convex_kernels import convex_amplitude
         from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 
         coefficient = self.reflection(incident, scattered)
         factor = self.lit(incident, scattered, normal, curved)
         smooth = coefficient * np.sqrt(1.0 - self.diffuse)
-        wave = incident, scattered, wavenumber
-        if shape is None:
-            power = np.abs(mesh_amplitude(corners, *wave, smooth * factor, self.roughness)) ** 2
-        else:
-            power = np.abs(convex_amplitude(corners, normal, shape, *wave, smooth, self.roughness)) ** 2
+        amplitude = mesh_amplitude(corners, incident, scattered, wavenumber, smooth * factor, self.roughness)
+        power = np.abs(amplitude) ** 2
         if self.roughness > 0 or self.diffuse > 0:
             on = np.flatnonzero(factor > 0)
             g = roughness_parameter(wavenumber[:, None], self.roughness, incident, scattered, normal[on])

@@ -44,20 +44,11 @@ def test_without_the_taper_a_sphere_has_an_edge_that_it_does_not_have() -> None:
     assert error[0].max() < 0.7 * error[1].max()
 
 
-def test_only_closed_convex_bodies_without_creases_have_their_shadow() -> None:
-    """Straight ahead: of a sphere as the exact series says; nothing of half of it, of a lens, or where tapered."""
-    ball = mesh_of(ss.Sphere(radius=0.25, edge=0.02))
+def test_behind_a_body_there_is_no_echo() -> None:
+    """The wave that makes the shadow is left out, of round bodies as of those with edges."""
     ahead = ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
-    whole = ss.target_strength(ball, 30e3, *ahead)
-    assert whole == pytest.approx(20 * np.log10(abs(sphere_amplitude(30e3, 0.0, radius=0.25))), abs=0.1)
-    top = Mesh(ball.vertices, ball.faces[ball.centroid[:, 2] > 0])
-    lens = joined(
-        Mesh(ball.vertices - [0, 0, 0.2], ball.faces[ball.centroid[:, 2] > 0.2]),
-        Mesh(ball.vertices + [0, 0, 0.2], ball.faces[ball.centroid[:, 2] < -0.2]),
-    )
-    for other in (top, lens, ss.Box(size=(0.5, 0.5, 0.5)), ss.Cylinder(radius=0.2, length=0.5)):
-        assert ss.target_strength(other, 30e3, *ahead) == -np.inf
-    assert ss.target_strength(ball, 30e3, *ahead, 1500.0, ss.Kirchhoff(edges="smooth")) == -np.inf
+    for body in (ss.Sphere(radius=0.25), ss.Box(size=(0.5, 0.5, 0.5)), ss.Cylinder(radius=0.2, length=0.5)):
+        assert ss.target_strength(body, 30e3, *ahead) == -np.inf
 
 
 def test_the_example_of_the_documentation() -> None:
@@ -133,12 +124,11 @@ def test_source_and_receiver_may_be_exchanged(shape: ss.Remus100 | ss.LShape, la
 
 def test_a_half_space_of_known_contrast_reflects_its_share() -> None:
     sphere, sand = ss.Sphere(radius=0.25), ss.PartlyReflecting(density_ratio=2.0, speed_ratio=1.5)
-    for edges, allowed in (("smooth", 1e-9), ("auto", 0.15)):
-        rigid, partly = (
-            ss.target_strength(sphere, BAND, (1, 0, 0), (-1, 0, 0), 1500.0, ss.Kirchhoff(surface=surface, edges=edges))
-            for surface in ("rigid", sand)
-        )
-        np.testing.assert_allclose(partly - rigid, 20 * np.log10((2.0 * 1.5 - 1) / (2.0 * 1.5 + 1)), atol=allowed)
+    rigid, partly = (
+        ss.target_strength(sphere, BAND, (1, 0, 0), (-1, 0, 0), 1500.0, ss.Kirchhoff(surface=surface))
+        for surface in ("rigid", sand)
+    )
+    np.testing.assert_allclose(partly - rigid, 20 * np.log10((2.0 * 1.5 - 1) / (2.0 * 1.5 + 1)), atol=1e-9)
 
 
 def test_a_rough_plate_loses_its_coherent_echo_and_keeps_a_lobe() -> None:

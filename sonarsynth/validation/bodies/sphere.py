@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from typing import Final, Literal
@@ -72,13 +71,11 @@ FRONT = "modal series, front echo"
 RADII: Final = (0.25, 0.5)
 WAYS = 12
 FAIR = 0.3  # dB, at backscatter
-AIM = 0.8  # dB, up to 120 degrees off it
-BEHIND = 0.9  # dB, beyond: what `target_strength` claims
-SECTORS: Final = (0.0, 60.0, 105.0, 120.0, 180.0)  # deg off backscatter
+AIM = 0.8  # dB, up to 105 degrees off it
+SECTORS: Final = (0.0, 60.0, 105.0, 120.0)  # deg off backscatter
 CLAIMED: Final = 2.6
-"""dB: what `Kirchhoff` claims of the taper, for a rigid sphere of 0.25 m from 105 to 120 degrees."""
-STEPS: Final = {("rigid", 0.25): 5.0, ("rigid", 0.5): 15.0, ("soft", 0.25): 7.5, ("soft", 0.5): 30.0}
-"""deg: angles that are checked, of surface and radius (m)."""
+"""dB: what `Kirchhoff` claims of spheres from 105 to 120 degrees."""
+STEP: Final = 3.0  # deg: between angles that are checked
 
 Surface = Literal["rigid", "soft"]
 
@@ -99,7 +96,6 @@ def sphere_accuracy(quick: bool = False) -> list[Row]:
     for radius in radii:
         for surface in surfaces:
             rows += [*_backscatter(radius, surface, quick), *_bistatic(radius, surface, quick)]
-        rows += _tapered(radius, quick)
     rows += _partly_reflecting(RADII[0], quick)
     return rows
 
@@ -172,39 +168,19 @@ def _backscatter(radius: float, surface: Surface, quick: bool) -> Iterator[Row]:
 
 
 def _bistatic(radius: float, surface: Surface, quick: bool) -> Iterator[Row]:
-    """Levels all round as users get them, sector by sector."""
-    step, last = (30.0 if quick else STEPS[surface, radius]), SECTORS[-1]
-    for row in _sectors(f"{surface} sphere, {radius:g} m", radius, surface, Kirchhoff(surface=surface), step, last):
-        behind = row.quantity.endswith(f"{last:g} deg")
-        note = f"{AIM:g} dB is aimed at up to {SECTORS[-2]:g} deg" if behind else ""
-        yield replace(row, bound=BEHIND if behind else AIM, note=note)
-
-
-def _tapered(radius: float, quick: bool) -> Iterator[Row]:
-    """The same with the echo tapered towards the shadow, as in frames, and on bodies that have creases."""
-    step, last = (30.0 if quick else 3.0), SECTORS[-2]
-    case, law = f"rigid sphere, {radius:g} m, tapered", Kirchhoff(edges="smooth")
-    for row in _sectors(case, radius, "rigid", law, step, last):
-        claimed = radius < 0.3 and row.quantity.endswith(f"{last:g} deg")
-        note = f"what Kirchhoff claims; {AIM:g} dB is aimed at" if claimed else ""
-        yield replace(row, bound=CLAIMED if claimed else AIM, note=note)
-
-
-def _sectors(case: str, radius: float, surface: Surface, law: Kirchhoff, step: float, last: float) -> Iterator[Row]:
-    """The largest error over each sector, at angles (deg) every `step` and at the ends of sectors."""
-    frequency = BAND[::8] if step >= 30.0 else BAND
-    off = np.unique([*np.arange(0.0, last, step), *(end for end in SECTORS if end <= last)])
+    """Levels as users get them, sector by sector: the largest error over each, every few degrees and at its ends."""
+    frequency, law = BAND[::8] if quick else BAND, Kirchhoff(surface=surface)
+    off = np.unique([*np.arange(0.0, SECTORS[-1], 30.0 if quick else STEP), *SECTORS])
     levels, cost = timed(lambda: facet_level(frequency, off, radius, law), calls=1)
     error = np.abs(levels - sphere_level(frequency, off, radius, surface)).max(axis=0)
-    for first, end in pairwise(SECTORS[: SECTORS.index(last) + 1]):
+    for first, end in pairwise(SECTORS):
         inside = (off >= first) & (off <= end)
-        columns = (
-            1e3 * cost / len(off),
-            PER_ASPECT,
-            {"facets": _facets(radius), "values": int(inside.sum()) * len(frequency)},
-        )
-        worst = float(error[inside].max())
-        yield Row(case, SERIES, f"bistatic, {first:g} to {end:g} deg", "dB", AIM, worst, *columns)
+        counts = {"facets": _facets(radius), "values": int(inside.sum()) * len(frequency)}
+        columns = 1e3 * cost / len(off), PER_ASPECT, counts
+        last = end == SECTORS[-1]
+        bound, note = (CLAIMED, f"what Kirchhoff claims; {AIM:g} dB is aimed at") if last else (AIM, "")
+        case, quantity = f"{surface} sphere, {radius:g} m", f"bistatic, {first:g} to {end:g} deg"
+        yield Row(case, SERIES, quantity, "dB", bound, float(error[inside].max()), *columns, note=note)
 
 
 def _partly_reflecting(radius: float, quick: bool) -> Iterator[Row]:
