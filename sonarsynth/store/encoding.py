@@ -75,6 +75,7 @@ def encoded_whole(values: np.ndarray) -> bytes:
 
 def _compressed(numbers: np.ndarray, how: dict[str, Any]) -> bytes:
     """Numbers as blosc packs them, in one of the ways above."""
+    blosc.use_threads = False  # as zarr has it: several threads put blocks into a file in the order in which they end
     packed: Any = blosc.compress(numbers, how["cname"].encode(), how["clevel"], _SHUFFLES[how["shuffle"]], 0)
     return _checked(bytes(packed))
 

@@ -11,12 +11,13 @@ import pytest
 import zarr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numcodecs import blosc
 from zarr.core.buffer import default_buffer_prototype
 from zarr.errors import ZarrUserWarning
 
 from sonarsynth import store
 from sonarsynth.planning import Plan
-from sonarsynth.store.encoding import encoded
+from sonarsynth.store.encoding import encoded, encoded_whole
 from sonarsynth.store.layout import ArrayLayout, layout_of
 
 
@@ -94,6 +95,13 @@ def test_numbers_of_another_byte_order_make_the_same_file(small_plan: Plan) -> N
         block = numbers(array, 8, 2, 1.0)
         other = block.astype(array.dtype.newbyteorder(">"))
         assert encoded(array, in_chunks(array, other)) == encoded(array, in_chunks(array, block))
+
+
+def test_a_large_array_makes_the_same_file_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Threads of blosc put its blocks into the file in the order in which they end, unless zarr was imported."""
+    monkeypatch.setattr(blosc, "use_threads", None)
+    signals = np.random.default_rng(1).normal(size=(8, 64, 4000)).astype("f4")
+    assert len({encoded_whole(signals) for _ in range(6)}) == 1
 
 
 def test_one_frame_a_shard_is_one_chunk(small_plan: Plan, tmp_path: Path) -> None:
