@@ -28,8 +28,9 @@ three sigma (99.73 %)."""
 SHARE = 0.95
 QUANTITIES = ("position", "azimuth", "elevation", "time")
 USELESS_RANGE = 0.5
-"""A place whose predicted error is more of its range than this is of no use; a bearing, of more than a beam width; a
-time, of more than the inverse of the bandwidth."""
+"""A place whose predicted error is more of its range than this is of no use; a bearing, of more than a beam width, but
+of a source so near that this moves it by less than a range is told apart; a time, of more than the inverse of the
+bandwidth."""
 STRANGERS = frozenset({"chorus", "noise_sources"})
 """Other sounds that may be located as snaps."""
 ACCEPTED, PLACELESS = REASONS.index("accepted"), REASONS.index("range_unknown")
@@ -170,8 +171,10 @@ def _useless(tree: Stored, row: dict[str, np.ndarray]) -> bool:
     bandwidth = float(tree.attrs["band_high"] - tree.attrs["band_low"])
     spread = float(np.sqrt(max(np.trace(row["position_covariance"]), 0.0)))
     turned = np.deg2rad(np.hypot(row["azimuth_error"] * np.cos(np.deg2rad(row["elevation"])), row["elevation_error"]))
-    placed = spread <= USELESS_RANGE * float(np.linalg.norm(row["position"]))  # not where there is none
-    return not (placed and turned <= beam_width(tree) and row["time_error"] <= 1.0 / bandwidth)
+    away = float(np.linalg.norm(row["position"]))
+    placed = spread <= USELESS_RANGE * away  # not where there is none
+    aimed = turned <= beam_width(tree) or turned * away <= tree.attrs["assumed_sound_speed"] / bandwidth
+    return not (placed and aimed and row["time_error"] <= 1.0 / bandwidth)
 
 
 def _warning(tally: _Tally) -> str:

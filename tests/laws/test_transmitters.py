@@ -16,6 +16,7 @@ from sonarsynth.equations.bubble import pulses
 from sonarsynth.geometry.motion import Circle, ConstantVelocity, Motion, Still, pose
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.planning import plan
+from sonarsynth.planning.notes.source_notes import out_of_band
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.triggered import Triggered
 from sonarsynth.receiver import Band, BandPass, BeamGrid, PlanarLattice, elements
@@ -253,6 +254,16 @@ def test_the_card_of_a_dataset_says_what_lights_it(tmp_path: Path) -> None:
         store = folder_of(tmp_path / f"{len(light)}.zarr")
         build(plan(recipe, []), str(store), workers=0)
         assert light in facts_of(store).summary
+
+
+@pytest.mark.parametrize(("start", "under"), [(38e3, None), (38.0, 20), (300e3, 60)])
+def test_a_pulse_out_of_the_band_is_noted(start: float, under: int | None) -> None:
+    """Hz for kHz, or a sonar whose band was forgotten: nothing is heard, which nothing said."""
+    pulse = Sweep(start=start, stop=1.5 * start, duration=2e-3)
+    notes = out_of_band(scene(Transmitter(position=AT, pulse=pulse, source_level=180.0)).scene)
+    levels = [float(note.split(" dB under")[0].split()[-1]) for note in notes]
+    assert all(level > under for level in levels) if under else not levels
+    assert len(levels) == (under is not None)
 
 
 def test_bad_transmitters_are_refused_in_one_line() -> None:

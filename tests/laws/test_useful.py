@@ -150,3 +150,13 @@ def test_an_estimate_of_no_snap_is_a_miss_however_near_it_is() -> None:
     store["source_estimates/emission"].values[:] = -1
     found = row(bounds(store, ALL), "snap located")
     assert found.ok is False and "4 farther from every snap" in found.got and "nan" not in found.got
+
+
+@pytest.mark.parametrize(("away", "useful"), [(0.3, True), (15.0, False)])
+def test_the_direction_of_a_transmitter_beside_the_array_may_err_by_more_than_a_beam(away: float, useful: bool) -> None:
+    """Told to a centimetre it is 4 degrees off, which moves ranges by 2 cm, less than the band tells apart."""
+    store = tree(snap_error=0.0, snap_predicted=0.01)
+    for place in ("source_estimates/position", "truth/emissions/position"):
+        store[place].values[:] *= away / 15.0
+    store["source_estimates/azimuth_error"].values[:] = 4.0
+    assert ("useless" in row(bounds(store, ALL), "snap located").warning) != useful

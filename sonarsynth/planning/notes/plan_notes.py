@@ -20,6 +20,7 @@ from sonarsynth.planning.notes.source_notes import (
     direction_notes,
     lobe_notes,
     off_the_bottom,
+    out_of_band,
     steering_notes,
     unlocated,
 )
@@ -73,7 +74,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         lines += view_notes(noted(looks)) + steering_notes(noted(looks))
         lines += stretch_notes(noted(looks), recipe.accuracy.range_m)
     lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene) + clipping_notes(plan, looks)
-    lines += coarse_counts(scene)
+    lines += coarse_counts(scene) + out_of_band(scene)
     if plan.sizes["emission"] and plan.products & OF_BEAMS:
         some = noted(looks)
         lines += unlocated(scene) or lobe_notes(some) + direction_notes(some) + assumed_speed_notes(some)

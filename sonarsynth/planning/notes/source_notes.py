@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.fft import irfft
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats, depth, evenly
 from sonarsynth.description.method import Demand
@@ -24,8 +25,12 @@ from sonarsynth.signals import channel_errors
 from sonarsynth.signals.auto_synthesis import DEFAULT_ERROR, deposit_for
 from sonarsynth.signals.electronics import ElectronicNoise
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.signals.isolated_paths import whole_spectrum
+from sonarsynth.sources import snap_pulses
 from sonarsynth.tracing.arrivals import trace
 
+FAINT = -20.0
+"""Peak (dB) of a pulse in the band over that of all of it, under which a source is out of it; snaps have -7."""
 HEARD = 8
 """Frames that are heard, at most, to see whether snaps clip."""
 DITHER = 0.5
@@ -74,6 +79,24 @@ def unlocated(scene: Scene) -> list[str]:
     """Why nothing is located, where that is known beforehand."""
     why = locator(scene).locates_nothing(elements(scene.sonar.array), scene.sonar.band)
     return [f"no snap is located, so there are no images and no points: {why}"] if why else []
+
+
+def out_of_band(scene: Scene) -> list[str]:
+    """Which sources send next to nothing in the band of the sonar: echoes of theirs are not heard."""
+    lines, sonar = [], scene.sonar
+    for source in (source for source in scene.sources if source.times):
+        shape = snap_pulses.waveform(source.model(scene.world.environment.depth))
+        f, spectrum = whole_spectrum(shape, sonar)
+        pressure = irfft(np.where((f >= sonar.band.low) & (f <= sonar.band.high), spectrum, 0.0)) * 2.0 * f[-1]
+        peak = shape.model.pulse(0.0, float(f[-1])).peak
+        over = 20.0 * np.log10(max(float(np.abs(pressure).max()) / peak, 1e-10)) if np.isfinite(peak) else 0.0
+        if over < FAINT:
+            lines.append(
+                f"{source.name}: what its pulse has in the band of the sonar, {sonar.band.low / 1e3:g} to "
+                f"{sonar.band.high / 1e3:g} kHz, is {-over:.0f} dB under its source level: its echoes are faint or not "
+                "there (scene.sonar.band)"
+            )
+    return lines
 
 
 def assumed_speed_notes(looks: Sequence[SampledScene]) -> list[str]:
