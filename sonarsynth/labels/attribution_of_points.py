@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from sonarsynth.conventions import NO_TARGET, Bools, Complexes, Floats, Ints
 from sonarsynth.equations.arrays.apertures import live_gain
@@ -55,8 +56,25 @@ class SonarTiming:
     late: Floats  # (snap,) s: when its pulse is loudest, after the time that delays of paths count from
 
 
-@lru_cache(maxsize=16)
-def _table(elements: Elements, level: int) -> np.ndarray:
+class _PatternTables:
+    """Patterns of a lattice in and out of focus, kept from frame to frame: as many as were asked for."""
+
+    def __init__(self, elements: Elements) -> None:
+        self._elements = elements
+        self._kept = 0, _table(elements, 0)[None]
+
+    def holding(self, low: int, high: int) -> tuple[int, npt.NDArray[np.complex64]]:
+        """Which defocus the first is of, at most `low`; and tables (defocus, row step, column step) up to `high`."""
+        first, tables = self._kept
+        last = first + len(tables) - 1
+        if low < first or high > last:
+            before = [_table(self._elements, level) for level in range(low, first)]
+            after = [_table(self._elements, level) for level in range(last + 1, high + 1)]
+            self._kept = first, tables = min(low, first), np.stack([*before, *tables, *after])
+        return first, tables
+
+
+def _table(elements: Elements, level: int) -> npt.NDArray[np.complex64]:
     """Pattern (row step, column step) of a lattice over two periods of its grating lobes, so far out of focus."""
     size = OVERSAMPLING * 2 * max(elements.rows, elements.columns)
     weights = np.zeros((size, size), complex)
@@ -68,9 +86,7 @@ def _table(elements: Elements, level: int) -> np.ndarray:
     return np.pad((np.fft.ifft2(weights) * size**2).astype(np.complex64), (0, 2), mode="wrap")
 
 
-@lru_cache(maxsize=16)
-def _tables(elements: Elements, low: int, high: int) -> np.ndarray:
-    return np.stack([_table(elements, level) for level in range(low, high + 1)])
+_tables = lru_cache(maxsize=2)(_PatternTables)
 
 
 def pattern_of(elements: Elements, speed: float, curvature: Floats, focus: float, top: float) -> kernels.Pattern:
@@ -83,7 +99,8 @@ def pattern_of(elements: Elements, speed: float, curvature: Floats, focus: float
     step = kernels.RIM_STEP * speed / (np.pi * elements.aperture**2)
     ends = np.clip(np.rint(top * (curvature - focus) / step), -WIDEST_DEFOCUS, WIDEST_DEFOCUS)
     low, high = int(min(ends.min(initial=0.0), 0.0)), int(max(ends.max(initial=0.0), 0.0))
-    return kernels.Pattern(_tables(elements, low, high), low, step, elements.pitch / speed, *sensors)
+    first, tables = _tables(elements).holding(low, high)
+    return kernels.Pattern(tables, first, step, elements.pitch / speed, *sensors)
 
 
 @dataclass(frozen=True, eq=False)
