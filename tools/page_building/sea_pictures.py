@@ -83,9 +83,9 @@ def choruses(folder: Path, out: Path) -> None:
         rates.errorbar(loud, np.where(often > 0, often, np.nan), got.spread.rates, fmt="o", color=colour, capsize=2)
         assert said.rates is not None
         rates.plot(loud, said.rates, "--", color=colour)
-        alpha = "/".join(f"{a:.2f}" for a in got.figures.alpha[:2])
+        alpha = "no stable law" if np.isnan(got.figures.stable[0]) else f"alpha {got.figures.stable[0]:.2f}"
         share = np.where(got.figures.exceedance > 0, got.figures.exceedance, np.nan)
-        tails.plot(got.tail + PASCAL, share, color=colour, label=f"{name}: alpha {alpha}")
+        tails.plot(got.tail + PASCAL, share, color=colour, label=f"{name}: {alpha}")
     _default(elevation, across, up, *heard["1.5e-4 (default)"])
     levels, unfiltered = np.arange(120.0, 156.0), _direct_paths("1.5e-4")
     rates.plot(levels, [unfiltered(level) for level in levels], ":", color=INK, label="default, direct, no filter")

@@ -1,12 +1,11 @@
-"""Symmetric alpha-stable laws, of characteristic function exp(-|c t|^alpha): samples, tails, and estimates.
+"""Symmetric alpha-stable laws, of characteristic function exp(-|c t|^alpha): tails, and an estimate.
 
 alpha 2 is the Gaussian law of variance 2 c^2, alpha 1 that of Cauchy. Exponents of 0.5 and less are refused: such noise
-has not been heard, and the estimates are of no use there.
+has not been heard, and the estimate is of no use there.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
 from itertools import accumulate, repeat
 from typing import NamedTuple
 
@@ -82,43 +81,19 @@ def _near(x: Floats, alpha: float) -> Floats:
     return np.asarray(np.where(x > 0.0, np.clip(tail, 0.0, 1.0), 1.0))
 
 
-@lru_cache(maxsize=1)
-def _quantiles() -> tuple[Floats, Floats, Floats]:
-    """Exponents (row,), their ratio of 95 % to 75 % quantiles, and the latter, of scale 1."""
-    from scipy.optimize import brentq
-
-    alphas = np.append(np.linspace(0.52, 1.98, 74), 2.0)
-
-    def quantile(alpha: float, tail: float) -> float:
-        return float(np.exp(brentq(lambda y: float(exceedance(np.exp(y), alpha)) - tail, -5.0, 25.0)))
-
-    middle, far = (np.array([quantile(a, tail) for a in alphas.tolist()]) for tail in (0.5, 0.1))
-    return alphas, far / middle, middle
-
-
-def fit_quantiles(values: Floats) -> StableFit:
-    """From the 5, 25, 75 and 95 % quantiles of samples (sample,). Raises ValueError where no law fits.
-
-    Source: McCulloch (1986), Comm. Statist. Simul. Comp. 15, 1109, with quantiles computed here in place of his table.
-    """
-    low, lower, upper, high = np.quantile(values, [0.05, 0.25, 0.75, 0.95])
-    if not upper > lower:
-        raise ValueError("no stable law fits: half of the samples are alike")
-    alphas, ratio, middle = _quantiles()
-    spread = (high - low) / (upper - lower)
-    if spread > ratio[0]:
-        raise ValueError(f"no stable law fits: alpha is at most {alphas[0]:g}")
-    alpha = float(np.interp(-spread, -ratio, alphas))
-    return _fit(alpha, 0.5 * (upper - lower) / float(np.interp(alpha, alphas, middle)))
-
-
-def fit_characteristic_function(values: Floats) -> StableFit:
+def fit_stable_law(values: Floats) -> StableFit:
     """From log(-log |phi(t)|^2) = log(2 c^alpha) + alpha log t, phi the characteristic function of samples (sample,).
 
     Raises ValueError where no law fits. Source: Koutrouvelis (1980), J. Am. Stat. Assoc. 75, 918, by ordinary least
-    squares, from the fit by quantiles as first guess.
+    squares, from mean and variance of ln |x|, pi^2/6 (1/alpha^2 + 1/2) and gamma (1/alpha - 1) + ln c, as first guess
+    (Ma and Nikias 1995, IEEE Trans. Signal Processing 43, 2669).
     """
-    alpha, scale = fit_quantiles(values)
+    log = np.log(np.abs(values[values != 0.0]))
+    if log.size < 2:
+        raise ValueError("no stable law fits: all samples are 0")
+    inverse = 6.0 / np.pi**2 * float(np.var(log)) - 0.5
+    alpha = min(2.0, 1.0 / np.sqrt(max(inverse, 1e-12)))
+    alpha, scale = _fit(alpha, float(np.exp(np.mean(log) - np.euler_gamma * (1.0 / alpha - 1.0))))
     alphas, points = np.transpose(CHARACTERISTIC_POINTS)
     for _ in range(ROUNDS):
         t = np.pi / 25.0 * np.arange(1, 1 + round(float(np.interp(alpha, alphas, points))))
@@ -130,25 +105,3 @@ def fit_characteristic_function(values: Floats) -> StableFit:
         slope, start = np.polyfit(np.log(t[usable]), np.log(-np.log(power[usable])), 1)
         alpha, scale = _fit(slope, scale * float(np.exp((start - np.log(2.0)) / slope)))
     return StableFit(alpha, scale)
-
-
-def fit_log_moments(values: Floats) -> StableFit:
-    """From mean and variance of ln |x| of samples (sample,) that are not 0: pi^2/6 (1/alpha^2 + 1/2), and
-    gamma (1/alpha - 1) + ln c. Raises ValueError where no law fits.
-
-    Source: Ma and Nikias (1995), IEEE Trans. Signal Processing 43, 2669.
-    """
-    log = np.log(np.abs(values[values != 0.0]))
-    if log.size < 2:
-        raise ValueError("no stable law fits: all samples are 0")
-    inverse = 6.0 / np.pi**2 * float(np.var(log)) - 0.5
-    alpha = min(2.0, 1.0 / np.sqrt(max(inverse, 1e-12)))
-    return _fit(alpha, float(np.exp(np.mean(log) - np.euler_gamma * (1.0 / alpha - 1.0))))
-
-
-ESTIMATORS = {
-    "quantiles": fit_quantiles,
-    "characteristic function": fit_characteristic_function,
-    "log moments": fit_log_moments,
-}
-"""Of alpha and scale, by name."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -10,7 +9,7 @@ from scipy.signal import csd, welch
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.noise.arrival_counts import APART, fano_factor, loud_arrivals
-from sonarsynth.equations.noise.stable_laws import ESTIMATORS, StableFit
+from sonarsynth.equations.noise.stable_laws import fit_stable_law
 from sonarsynth.evaluation.soundscape.octaves import band_means, octave_bands
 from sonarsynth.evaluation.soundscape.sound import NothingHeard, Sound
 
@@ -39,8 +38,7 @@ class Figures:
     octaves: Floats  # (band,) dB re 1 Pa2/Hz: of the mean density of 1/3 octaves
     rates: Floats  # (level,) 1/s, the mean over hydrophones
     exceedance: Floats  # (tail,) probability
-    alpha: Floats  # (estimator,)
-    scale: Floats  # (estimator,) dB re 1 Pa
+    stable: Floats  # exponent alpha of a stable law, and its scale in dB re 1 Pa
     moments: Floats  # (2,) root mean square in dB re 1 Pa, excess kurtosis
     percentiles: Floats  # (percent,) dB re 1 Pa: levels of 1 ms
     coherence: Floats  # (frequency, pair)
@@ -171,15 +169,14 @@ def _figures(grids: MeasuredFigures, blocks: list[_Block]) -> Figures:
     square, fourth = np.mean([b.sums for b in blocks], axis=0)
     sensors, seconds = len(grids.sound.position), grids.sound.seconds
     cross, auto = (np.sum([getattr(b, name) for b in blocks], axis=0) for name in ("cross", "auto"))
-    fits = [_fit(fit, np.concatenate([b.samples for b in blocks])) for fit in ESTIMATORS.values()]
+    alpha, scale = _fit(np.concatenate([b.samples for b in blocks]))
     with np.errstate(divide="ignore", invalid="ignore"):
         return Figures(
             density=density,
             octaves=10.0 * np.log10(band_means(grids.frequency, density, grids.edges)),
             rates=np.sum([b.counts for b in blocks], axis=0) / (sensors * seconds),
             exceedance=np.mean([b.above for b in blocks], axis=0),
-            alpha=np.array([alpha for alpha, _ in fits]),
-            scale=np.array([20.0 * np.log10(scale) for _, scale in fits]),
+            stable=np.array([alpha, 20.0 * np.log10(scale)]),
             moments=np.array([10.0 * np.log10(square), fourth / square**2 - 3.0]),
             percentiles=10.0 * np.log10(np.percentile(np.concatenate([b.windows for b in blocks]), PERCENT)),
             coherence=cross.real / np.sqrt(auto[:, :1] * auto[:, grids.pairs]),
@@ -187,10 +184,9 @@ def _figures(grids: MeasuredFigures, blocks: list[_Block]) -> Figures:
         )
 
 
-def _fit(fit: Callable[[Floats], StableFit], samples: Floats) -> tuple[float, float]:
+def _fit(samples: Floats) -> tuple[float, float]:
     """alpha and scale; NaN where no law fits."""
     try:
-        alpha, scale = fit(samples)
+        return fit_stable_law(samples)
     except ValueError:
         return float("nan"), float("nan")
-    return alpha, scale

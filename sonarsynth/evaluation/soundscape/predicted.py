@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Floats, finite_json
-from sonarsynth.equations.noise.stable_laws import ESTIMATORS
 from sonarsynth.evaluation.soundscape.measured import PERCENT, MeasuredFigures
 from sonarsynth.evaluation.soundscape.model import SoundModel
 from sonarsynth.evaluation.soundscape.octaves import band_means, decibels
@@ -118,14 +117,11 @@ def as_json(measured: MeasuredFigures, predicted: PredictedFigures | None = None
             "excess_kurtosis": figures.moments[1],
             "excess_kurtosis_spread": spread.moments[1],
             "excess_kurtosis_model_at_most": model.kurtosis,
-            "stable_fits": {
-                name: {
-                    "alpha": figures.alpha[n],
-                    "alpha_spread": spread.alpha[n],
-                    "scale_db": figures.scale[n] + zero,
-                    "scale_spread_db": spread.scale[n],
-                }
-                for n, name in enumerate(ESTIMATORS)
+            "stable_fit": {
+                "alpha": figures.stable[0],
+                "alpha_spread": spread.stable[0],
+                "scale_db": figures.stable[1] + zero,
+                "scale_spread_db": spread.stable[1],
             },
         },
         "millisecond_levels": {

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import erfc
 
-from sonarsynth.equations.noise.stable_laws import ESTIMATORS, exceedance
+from sonarsynth.equations.noise.stable_laws import exceedance
 from sonarsynth.evaluation.soundscape.measured import PERCENT, MeasuredFigures
 from sonarsynth.evaluation.soundscape.octaves import decibels
 from sonarsynth.evaluation.soundscape.predicted import PASCAL, PredictedFigures, elevation_edges
@@ -151,12 +151,13 @@ def _amplitudes(axes: Axes, both: list[_Curve]) -> None:
         )
         gauss = erfc(x / 10.0 ** (figures.moments[0] / 20.0) / np.sqrt(2.0))
         axes.plot(data.tail + zero, gauss, ":", color=colour, label="Gaussian of its power")
-        alpha, scale = figures.alpha[1], figures.scale[1]
+        alpha, scale = figures.stable
+        exponent = "none"
         if np.isfinite(alpha):
+            exponent = f"{alpha:.2f}"
             law = exceedance(x / 10.0 ** (scale / 20.0), float(alpha))
-            axes.plot(data.tail + zero, law, "--", color=colour, linewidth=0.9, label=f"stable, alpha {alpha:.2f}")
-        exponents = ", ".join(f"{a:.2f}" if np.isfinite(a) else "none" for a in figures.alpha)
-        titles.append(f"{name}: alpha {exponents}; kurtosis {figures.moments[1]:.3g} over 3")
+            axes.plot(data.tail + zero, law, "--", color=colour, linewidth=0.9, label=f"stable, alpha {exponent}")
+        titles.append(f"{name}: alpha {exponent}; kurtosis {figures.moments[1]:.3g} over 3")
     axes.set_yscale("log")
     least = min(
         float(data.figures.exceedance[data.figures.exceedance > 0.0].min())
@@ -167,7 +168,7 @@ def _amplitudes(axes: Axes, both: list[_Curve]) -> None:
         axes,
         f"magnitude ({both[0].figures.sound.unit})",
         "share above",
-        f"amplitudes; alpha of a stable law by\n{', '.join(ESTIMATORS)}\n" + "\n".join(titles),
+        "amplitudes; alpha of a stable law\n" + "\n".join(titles),
     )
 
 
