@@ -178,8 +178,8 @@ def enclosing(body: PlacedTarget) -> tuple[Floats, float]:
     return np.asarray(body.pose.to_world(ready.centre)), (1.0 + 1e-5) * ready.size
 
 
-def first_hit(mesh: Mesh, origin: Floats, direction: Floats, far: float = np.inf) -> tuple[Ints, Floats]:
-    """Facet (ray,) that each ray meets first, and its distance (m); -1 and NaN where it meets none within `far` (m).
+def first_hit(mesh: Mesh, origin: Floats, direction: Floats) -> tuple[Ints, Floats]:
+    """Facet (ray,) that each ray meets first, and its distance (m); -1 and NaN where it meets none.
 
     origin, direction: (ray, xyz) in the frame of the mesh; directions of any length. The point hit is origin +
     distance * unit direction, its normal mesh.normal[facet]. Raises ValueError for rays that are not finite or have no
@@ -192,8 +192,7 @@ def first_hit(mesh: Mesh, origin: Floats, direction: Floats, far: float = np.inf
     if not len(mesh.faces) or not len(o):
         return np.full(len(o), NO_TARGET), np.full(len(o), np.nan)
     ready = casting_mesh(mesh)
-    limit = np.full(len(o), far / ready.size)
-    facet, distance = ready.cast((o - ready.centre) / ready.size, d / length[:, None], limit)
+    facet, distance = ready.cast((o - ready.centre) / ready.size, d / length[:, None], np.full(len(o), np.inf))
     return facet, distance * ready.size
 
 

@@ -33,7 +33,7 @@ BESIDE = 0.02
 """rad of direction, and m of path: points of two clouds that are further apart are not one."""
 
 
-def image_points(plan: Plan, beamformed: BeamformedFrame, peers: bool = True) -> Iterator[Point]:
+def image_points(plan: Plan, beamformed: BeamformedFrame, peers: bool) -> Iterator[Point]:
     """Walk the beamformers on the signals of a frame, other images too (`peers`); nothing where it has no image."""
     chosen: Any = plan.choices.beamforming
     slow = exact_plan(plan).choices.beamforming
@@ -138,7 +138,7 @@ def placed(plan: Plan, frame: Frame, beamformed: BeamformedFrame, method: Placin
 
 
 def range_point(
-    plan: Plan, cloud: PointCloud, exact: PointCloud, method: Any, seconds: float, *, chosen: bool = False
+    plan: Plan, cloud: PointCloud, exact: PointCloud, method: Any, seconds: float, *, chosen: bool
 ) -> Point:
     """A row of the range stage."""
     metres, angle, alone = apart(cloud, exact)

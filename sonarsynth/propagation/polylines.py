@@ -36,12 +36,10 @@ class Polylines:
     miss: Floats  # (ray,) m: distance of the last point from the end; rounding
 
 
-def polylines(
-    layers: Water, start: Floats, end: Floats, rays: Eigenrays, *, spacing: float = np.inf, sagitta: float = 1e-3
-) -> Polylines:
+def polylines(layers: Water, start: Floats, end: Floats, rays: Eigenrays, *, sagitta: float = 1e-3) -> Polylines:
     """The polylines of eigenrays from start (pair, xyz) to end (pair, xyz), in the world, in m.
 
-    spacing: largest distance (m) along the ray between points; sagitta: largest distance (m) of an arc from its chord.
+    sagitta: largest distance (m) of an arc from its chord.
     The points are on the arcs to rounding; vertices, ends and crossings of nodes are always among them.
     """
     p1, p2 = np.asarray(start, float)[rays.pair], np.asarray(end, float)[rays.pair]
@@ -50,7 +48,7 @@ def polylines(
     distance = np.hypot(span[:, 0], span[:, 1])
     ahead = np.divide(span, distance[:, None], out=np.zeros_like(span), where=distance[:, None] > 0)
     none = np.empty(0)
-    points = [_points(layers, rays, i, z1[i], z2[i], distance[i], spacing, sagitta) for i in range(len(p1))]
+    points = [_points(layers, rays, i, z1[i], z2[i], distance[i], sagitta) for i in range(len(p1))]
     ray = np.repeat(np.arange(len(p1)), [len(m.x) for m in points])
     points.append(_Points(none, none, none, none, none, np.empty(0, int)))
     x, z, phi, time, length, event = (np.concatenate([getattr(m, f.name) for m in points]) for f in fields(_Points))
@@ -86,19 +84,17 @@ class _Arcs:
     event: Ints  # (arc,) what happens at its end
 
 
-def _points(
-    layers: Water, rays: Eigenrays, i: int, z1: float, z2: float, distance: float, spacing: float, sagitta: float
-) -> _Points:
+def _points(layers: Water, rays: Eigenrays, i: int, z1: float, z2: float, distance: float, sagitta: float) -> _Points:
     """The points of eigenray i, whose ends are at depths z1 and z2."""
     stops, events, sense = _stops(rays, i, z1, z2, float(layers.depth[-1]))
     if min(stops) == max(stops):  # level, also along a boundary, or coincident ends
-        x = np.linspace(0.0, distance, max(len(stops), 1 + int(np.ceil(distance / spacing))))
+        x = np.linspace(0.0, distance, len(stops))
         level = np.full(len(x), rays.start_sine[i])
-        event = np.array([LAUNCH, *events[:-1], *[ON] * (len(x) - len(stops)), ARRIVAL])
+        event = np.array([LAUNCH, *events[:-1], ARRIVAL])
         return _Points(x, np.full(len(x), z1), level, x / rays.start_speed[i], x, event)
     arcs = _arcs(layers, stops, events, sense, float(rays.start_speed[i]), float(rays.end_speed[i]))
     p, sine, dx = _closed(arcs, rays, i, distance)
-    points = _along(arcs, p, sine, dx, spacing, sagitta)
+    points = _along(arcs, p, sine, dx, sagitta)
     for end, sine_there, c in ((0, rays.start_sine[i], rays.start_speed[i]), (-1, rays.end_sine[i], rays.end_speed[i])):
         points.phi[end] = -np.arctan2(sine_there, p * c)  # on a jump: on the side of the jump that the eigenray says
     return points
@@ -203,13 +199,12 @@ def _extents(arcs: _Arcs, offset: Floats, v: float) -> tuple[Floats, Floats, flo
     return h, dx, float(v * np.sum(dx / square))
 
 
-def _along(arcs: _Arcs, p: float, sine: Floats, dx: Floats, spacing: float, sagitta: float) -> _Points:
+def _along(arcs: _Arcs, p: float, sine: Floats, dx: Floats, sagitta: float) -> _Points:
     """Points on the arcs of a ray: one of length L that turns by a is a chord L sin(a/2)/(a/2) at its mean angle."""
     angle = np.where(arcs.turns, 0.0, np.arctan2(sine, p * arcs.c))
     turn = angle[:, 0] - angle[:, 1]
     length = _lengths(arcs, p, sine)
-    pieces = np.ceil(np.maximum(np.sqrt(length * np.abs(turn) / (8.0 * sagitta)), length / spacing))
-    pieces = np.maximum(pieces, 1.0).astype(int)
+    pieces = np.maximum(np.ceil(np.sqrt(length * np.abs(turn) / (8.0 * sagitta))), 1.0).astype(int)
     arc = np.repeat(np.arange(len(pieces)), pieces)
     nth = np.arange(1, len(arc) + 1) - (np.cumsum(pieces) - pieces)[arc]
     fraction, last = nth / pieces[arc], nth == pieces[arc]

@@ -14,7 +14,7 @@ from sonarsynth.ranging.range_profiles import echo_filter
 from sonarsynth.ranging.received_window import ReceivedWindow
 
 
-def range_image(received: ReceivedWindow, ranges: Floats, track: Track | None = None) -> npt.NDArray[np.float32]:
+def range_image(received: ReceivedWindow, ranges: Floats, track: Track | None) -> npt.NDArray[np.float32]:
     """The largest power (range, azimuth) of the beams of an azimuth, all its elevations, in the cells about ranges
     (range,) in m, evenly spaced.
 

@@ -136,7 +136,7 @@ def loudest_beams(image: EnergyImage, chosen: npt.NDArray[np.bool_]) -> tuple[tu
 
 
 def direct_spectrum(
-    signals: Signals, estimates: SourceEstimates, elements: Elements, sonar: Sonar, length: int, pulse: float = 0.0
+    signals: Signals, estimates: SourceEstimates, elements: Elements, sonar: Sonar, length: int, pulse: float
 ) -> Complexes:
     """Spectrum (bin,) in Pa s of the direct pulse at the array centre, without the face, about `estimates.time`.
 

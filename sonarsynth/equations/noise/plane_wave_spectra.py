@@ -12,7 +12,7 @@ TOGETHER = 1 << 20
 """Products of a wave and a pair that are made at once."""
 
 
-def heard_share(toward: Floats, frequency: float, face: float, sound_speed: float, behind: float = 1.0) -> Floats:
+def heard_share(toward: Floats, frequency: float, face: float, sound_speed: float, behind: float) -> Floats:
     """Share (wave,) of the power of plane waves that a square face of side `face` (m) hears at a frequency (Hz).
 
     toward (wave, xyz): unit vectors to where they come from, x the axis of the face; behind: what is left of the

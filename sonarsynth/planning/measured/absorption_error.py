@@ -65,7 +65,7 @@ def _mean(absorption: Absorption, depths: bytes, lengths: bytes, frequencies: by
 
 
 def shape_error(
-    absorption: Absorption, passed: StraightPaths, band: tuple[float, float], bottom: float, bounces: int = 0
+    absorption: Absorption, passed: StraightPaths, band: tuple[float, float], bottom: float, bounces: int
 ) -> float:
     """Largest error (dB) in a band (Hz) of any path: its loss at the centre is its own, its spectrum that of the mean.
 

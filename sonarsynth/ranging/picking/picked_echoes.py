@@ -28,7 +28,7 @@ class PickedEchoes(Columns):
     overflow: int = 0  # beams that were not looked at, the faintest
 
 
-def no_echoes(image: EnergyImage, overflow: int = 0) -> PickedEchoes:
+def no_echoes(image: EnergyImage, overflow: int) -> PickedEchoes:
     """None."""
     none = np.zeros(0)
     return PickedEchoes(none, none, none, none, none, none, image.energy.ravel()[:0], none, none, overflow)

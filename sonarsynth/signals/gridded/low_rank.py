@@ -52,7 +52,7 @@ def terms_for(
     loss: float,
     weights: SpectralQuantiles,
     tolerance: float,
-    modes: tuple[float, ...] = PLAIN,
+    modes: tuple[float, ...],
 ) -> tuple[Term, ...]:
     """Terms to keep: deviations of face argument in y and z, of absorption (Np), and sizes of modes are given. Closed:
     the factors of each are there.

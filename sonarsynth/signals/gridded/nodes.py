@@ -152,9 +152,7 @@ def _by_polynomials(phase: float, weights: SpectralQuantiles, tolerance: float, 
     return int(np.argmax(np.append(bound, 0.0) <= tolerance)) + 1
 
 
-def polynomials_for(
-    phase: float, weights: SpectralQuantiles, tolerance: float, degrees: tuple[float, ...] = (1.0,)
-) -> Axis:
+def polynomials_for(phase: float, weights: SpectralQuantiles, tolerance: float, degrees: tuple[float, ...]) -> Axis:
     """As `nodes_for`, by polynomials, which more nodes may then be given for what is no wave."""
     return Axis(_by_polynomials(rounded_up(phase, 1.04), weights, tolerance, tuple(map(rounded_up, degrees))))
 

@@ -46,7 +46,7 @@ THICKNESS: Final = 0.12  # of the chord
 ROLLS: Final = (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi)  # up, starboard, down, port
 
 
-def remus100(shape: Remus100, edge: float = np.inf, sagitta: float = np.inf) -> tuple[Surface, tuple[Surface, ...]]:
+def remus100(shape: Remus100, edge: float, sagitta: float) -> tuple[Surface, tuple[Surface, ...]]:
     """The hull from nose to tail, and the fins up, starboard, down, port (none where the shape has none).
 
     edge, sagitta (m) as in `generation.generate`; a coarse shape is always the same.

@@ -43,7 +43,7 @@ def enclosed_volume(meridian: Sequence[Arc]) -> float:
     return total
 
 
-def revolve(meridian: Sequence[Arc], edge: float, sagitta: float = np.inf) -> Surface:
+def revolve(meridian: Sequence[Arc], edge: float, sagitta: float) -> Surface:
     """A closed mesh of the body, with vertices on the true surface and no edge longer than `edge` (m).
 
     sagitta (m): the mean distance of facets from the true surface is about that at most, across each principal
