@@ -31,15 +31,17 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     and `view` says why (`views.View`).
     """
     bodies, sonar_pose, beams = context.bodies, context.receiver.pose, context.receiver.sonar.beams
-    medium, listening = context.medium, context.receiver.track
+    medium, sonar_track = context.medium, context.receiver.track
     connect = partial(propagation.direct.connect, medium.profile, medium.depth)
     bent = connect if propagation.bends else None
     appearances = [appearance(body, bodies, sonar_pose, bent) for body in bodies]
     seen = [(a.corners, b.mesh.faces, a.boxes, a.full_box) for b, a in zip(bodies, appearances, strict=True)]
-    met_first = beam_views(seen, beams)
-    tracks = [body.track if listening else body.frozen.track for body in bodies]
-    by_lines = medium.profile.uniform and propagation.straight(medium.profile)
-    travel = partial(_straight_times, 1.0 / medium.profile.speed[0]) if by_lines else partial(_direct_times, connect)
+    nearest = beam_views(seen, beams)
+    tracks = [body.track if sonar_track else body.frozen.track for body in bodies]
+    straight_lines = medium.profile.uniform and propagation.straight(medium.profile)
+    travel = (
+        partial(_straight_times, 1.0 / medium.profile.speed[0]) if straight_lines else partial(_direct_times, connect)
+    )
     met = meeting_times(tracks, context.snaps, travel)
     lit = [
         [lit_fraction(b, a.visible, bodies, snap, medium, bent) for b, a in zip(bodies, appearances, strict=True)]
@@ -48,8 +50,8 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     return Truth(
         sonar_position=sonar_pose.position,
         sonar_orientation=sonar_pose.orientation,
-        sonar_velocity=np.zeros(3) if listening is None else listening.velocity,
-        sonar_spin=np.zeros(3) if listening is None else listening.spin,
+        sonar_velocity=np.zeros(3) if sonar_track is None else sonar_track.velocity,
+        sonar_spin=np.zeros(3) if sonar_track is None else sonar_track.spin,
         target_position=_rows([b.pose.position for b in bodies], 3),
         target_orientation=_rows([b.pose.orientation for b in bodies], 4),
         target_velocity=_rows([b.velocity for b in bodies], 3),
@@ -63,10 +65,10 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
         snap_position=_rows([s.position for s in context.snaps], 3),
         snap_time=np.array([s.time for s in context.snaps]),
         snap_level=np.asarray(snap_level, float),
-        beam_target=met_first.target,
-        beam_facet=met_first.facet,
-        beam_range=met_first.range,
-        beam_coverage=met_first.coverage,
+        beam_target=nearest.target,
+        beam_facet=nearest.facet,
+        beam_range=nearest.range,
+        beam_coverage=nearest.coverage,
     )
 
 

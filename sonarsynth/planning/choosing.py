@@ -37,18 +37,18 @@ SEEN_AT = 64
 """Hydrophones, at most, whose views of the targets are compared with that of the middle of the array."""
 MEASURED = 3
 """Frames of a dataset that expansions are measured in."""
-PER_SENSOR_TOLERANCE = 1e-3
-"""Share of the paths left out that are left out where errors are measured: 3 % of what that errs by."""
+FAINTER_MEASURED = 1e-3
+"""Where errors are measured, so much less power is left out of echoes: that errs by 3 % as much."""
 LARGE_MESH_FACETS = 1_000_000
 """Facets over which errors are measured in one frame only, at half as many hydrophones."""
 WORTHWHILE_GAIN = 0.7
-"""Of an error, that must be left for each hydrophone's own view to be taken for it."""
-LESS_FAINT = 0.1
-"""Share of the faint echoes left out that is left out, where those are what errs: before the array is cut."""
+"""Each hydrophone's own view of the targets is taken where it errs by less than this part of the error without."""
+FAINTER = 0.1
+"""Where faint echoes make the error, so much less of their power is left out, before the array is cut."""
 FAINT_REACH = 2.0
-"""Times its bound on the mean that what faint echoes add to an error comes to, at most."""
+"""Faint echoes add at most this many times their bound to an error: the bound is on the mean."""
 DEGREE_TOLERANCE = 0.03
-"""Error of the synthesis that measures, over what is allowed."""
+"""Error of the synthesis that errors are measured with, over what is allowed."""
 
 
 _CHOSEN: OrderedDict[str, tuple[Choices, Errors]] = OrderedDict()
@@ -79,10 +79,10 @@ def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     sampled = _measured_in(looks, 1 if _facets(scene) > LARGE_MESH_FACETS else MEASURED)
     bent = max((ranging_error(look.scene, look.profile, look.frames) for look in sampled), default=0.0)
     allowed, band = np.sqrt(SYNTHESIS) * accuracy.cheap, scene.sonar.band
-    synthesis, by_synthesis = scene.physics.synthesis.resolve(
+    synthesis, synthesis_error = scene.physics.synthesis.resolve(
         Demand(allowed, accuracy.exact, lambda method: 0.0, plan.elements, bandwidth=band.high - band.low)
     )
-    placing, by_rays = scene.processing.placing.resolve(
+    placing, placing_error = scene.processing.placing.resolve(
         Demand(accuracy.range_m, accuracy.exact, lambda method: bent, plan.elements)
     )
     picking, _ = scene.processing.picking.resolve(Demand(np.inf, accuracy.exact, lambda method: 0.0, plan.elements))
@@ -97,17 +97,17 @@ def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     indices = [look.frames[0].index for look in sampled]
     cut = _subarrays(chosen, indices)
     imaged = bool(plan.products & OF_BEAMS)
-    steering, blurred = beamformer(chosen, indices) if imaged else (choices.beamforming, 0.0)
+    beamforming, image_error = beamformer(chosen, indices) if imaged else (choices.beamforming, 0.0)
     return replace(
         chosen,
         choices=replace(
             choices,
             subarrays=cut.parts,
             occlusion=cut.occlusion,
-            beamforming=steering,
+            beamforming=beamforming,
             negligible=cut.faint * choices.negligible,
         ),
-        errors=Errors(cut.error, cut.uncut, by_synthesis, by_rays, blurred),
+        errors=Errors(cut.error, cut.uncut, synthesis_error, placing_error, image_error),
     )
 
 
@@ -139,40 +139,40 @@ class _ArrayModel:
     occlusion: OcclusionPoint
     error: float  # of signals
     uncut: float = np.nan  # the same, where the array is not cut and its middle sees for all
-    faint: float = 1.0  # share of the echoes left out that is left out
+    faint: float = 1.0  # factor on the power that is left out of echoes
 
 
 def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
-    """The fewest parts of the array that will do; where one will not, or sequences are more than are measured in, each
-    hydrophone's own view of the targets is tried first, then fainter echoes."""
+    """The fewest parts of the array that will do. Where one part will not, or there are sequences that nothing is
+    measured in, each hydrophone's own view of the targets is tried first, then fainter echoes."""
     physics, count = plan.scene.physics, plan.elements.count
-    seeing: OcclusionPoint = "centre" if physics.occlusion == "auto" else physics.occlusion
+    occlusion: OcclusionPoint = "centre" if physics.occlusion == "auto" else physics.occlusion
     if physics.occlusion == "auto" and plan.recipe.accuracy.signal < OWN_VIEW:
-        seeing = "sensors"
+        occlusion = "sensors"
     if physics.subarrays == "sensors" or (physics.subarrays == "auto" and plan.recipe.accuracy.exact):
         return _ArrayModel(count, "centre", 0.0)
     measures = [PerSensorReference.of(plan, index) for index in indices]
     allowed = np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
     fixed = physics.subarrays != "auto"
     first = min(physics.subarrays, count) if physics.subarrays != "auto" else 1
-    enough = np.inf if fixed else allowed
-    undivided = error = _worst(measures, first, seeing, enough)
-    if seeing == "centre" and physics.occlusion == "auto" and first == 1 and error <= allowed:
-        undivided = error = max(error, *(measure.own_views() for measure in measures))
+    stop_at = np.inf if fixed else allowed
+    uncut = error = _worst(measures, first, occlusion, stop_at)
+    if occlusion == "centre" and physics.occlusion == "auto" and first == 1 and error <= allowed:
+        uncut = error = max(error, *(measure.own_views() for measure in measures))
     unseen = plan.recipe.sequences > len(measures)  # in which another body may stand in the way
-    if seeing == "centre" and physics.occlusion == "auto" and (error > allowed or unseen):
-        better = _worst(measures, first, "sensors", enough)
+    if occlusion == "centre" and physics.occlusion == "auto" and (error > allowed or unseen):
+        better = _worst(measures, first, "sensors", stop_at)
         if better < WORTHWHILE_GAIN * error:
-            seeing, error = "sensors", better
+            occlusion, error = "sensors", better
     if fixed:
-        return _ArrayModel(first, seeing, error)
+        return _ArrayModel(first, occlusion, error)
     if error <= allowed:
-        return _ArrayModel(1, seeing, error, undivided)
-    return replace(_finer(plan, measures, seeing, error, allowed), uncut=undivided)
+        return _ArrayModel(1, occlusion, error, uncut)
+    return replace(_finer(plan, measures, occlusion, error, allowed), uncut=uncut)
 
 
 def _finer(
-    plan: Plan, measures: Sequence[PerSensorReference], seeing: OcclusionPoint, error: float, allowed: float
+    plan: Plan, measures: Sequence[PerSensorReference], occlusion: OcclusionPoint, error: float, allowed: float
 ) -> _ArrayModel:
     """The fewest parts, a power of two, that err by no more than is allowed, of an array that errs by more as a
     whole."""
@@ -181,13 +181,13 @@ def _finer(
     # Cubics err by the fourth power of the width of parts, the square of their number: no fewer will do.
     n, fewest = 0, max(int(np.log2(error / allowed) / 2.0), 1)
     while 2**n < count:
-        error = _worst(measures, 2**n, seeing, allowed) if n else error
+        error = _worst(measures, 2**n, occlusion, allowed) if n else error
         if error <= allowed:
-            return _ArrayModel(2**n, seeing, error)
+            return _ArrayModel(2**n, occlusion, error)
         if error <= allowed + faintest and auto:
-            less = _worst(measures, 2**n, seeing, allowed, LESS_FAINT)
+            less = _worst(measures, 2**n, occlusion, allowed, FAINTER)
             if less <= allowed:
-                return _ArrayModel(2**n, seeing, less, faint=LESS_FAINT)
+                return _ArrayModel(2**n, occlusion, less, faint=FAINTER)
         n = max(n + 1, fewest)
     return _ArrayModel(count, "centre", 0.0)
 
@@ -223,7 +223,7 @@ class PerSensorReference:
         plan = plan.at(index)
         frame = plan.recipe.frame(index)[1]
         sensor = heard_at(plan.elements)[:: 2 if _facets(plan.scene) > LARGE_MESH_FACETS else 1]
-        every = replace(plan, choices=replace(plan.choices, negligible=PER_SENSOR_TOLERANCE * plan.choices.negligible))
+        every = replace(plan, choices=replace(plan.choices, negligible=FAINTER_MEASURED * plan.choices.negligible))
         rows = []
         for channel in sensor:
             single = subarray(plan.elements, np.array([channel]))
@@ -234,8 +234,8 @@ class PerSensorReference:
         )
 
     def error(self, count: int, occlusion: OcclusionPoint = "centre", faint: float = 1.0) -> float:
-        """Error of signals, relative, where the array is cut into so many parts, and `faint` of the echoes left out is
-        left out: of echoes or direct arrivals."""
+        """Relative error of echoes or direct arrivals, the larger, where the array is cut into so many parts; faint:
+        factor on the power that is left out of echoes."""
         chosen = self.plan.choices
         negligible = faint * chosen.negligible
         choices = replace(chosen, subarrays=count, occlusion=occlusion, negligible=negligible)

@@ -150,7 +150,7 @@ class Plan:
 
         That gives the spectrum its shape; at the centre of the band each path has its own (`absorption_at_depths`).
         """
-        return mean_absorption(self.scene.world.environment.absorption, self._passed, frequency)
+        return mean_absorption(self.scene.world.environment.absorption, self._path_depths, frequency)
 
     @property
     def medium(self) -> Medium:
@@ -179,7 +179,7 @@ class Plan:
         return distant_chorus(self.scene, self.profile, position, self.absorption, self.chorus)
 
     @cached_property
-    def _passed(self) -> StraightPaths:
+    def _path_depths(self) -> StraightPaths:
         """The depths of the paths of the sequence, in its first, middle and last frame."""
         first, count = self.recipe.first_frame(self.sequence), self.recipe.steps(self.sequence)
         steps = sorted({0, count // 2, count - 1})
@@ -190,7 +190,7 @@ class Plan:
         """Largest error (dB) of any path, anywhere in the band, from the one shape of spectrum for all."""
         environment, band = self.scene.world.environment, self.scene.sonar.band
         ends, bounces = (band.low, band.high), self.propagation.bounces
-        return shape_error(environment.absorption, self._passed, ends, environment.depth, bounces)
+        return shape_error(environment.absorption, self._path_depths, ends, environment.depth, bounces)
 
     @property
     def predicted_seconds(self) -> float:

@@ -44,7 +44,7 @@ def point_cloud(
     if velocity.any() or spin.any():
         solution = solution.as_array_moves(source, -echoes.delay[:, None] * (velocity + np.cross(spin, source)))
     echoes = replace(echoes, delay_error=np.hypot(echoes.delay_error, window.late))
-    echoes = _as_focused(echoes, solution.range, window)
+    echoes = _with_defocus(echoes, solution.range, window)
     error = range_error(solution, echoes, window.estimates, window.sonar)
     cloud = PointCloud(
         position=solution.position.astype(np.float32),
@@ -62,7 +62,7 @@ def point_cloud(
     return cloud.select(np.flatnonzero(np.isfinite(solution.range) & (solution.range > 0) & np.isfinite(error)))
 
 
-def _as_focused(echoes: PickedEchoes, distance: Floats, window: ReceivedWindow) -> PickedEchoes:
+def _with_defocus(echoes: PickedEchoes, distance: Floats, window: ReceivedWindow) -> PickedEchoes:
     """Echoes with what beams that are not focused at their distance (echo,) m add to the errors of directions."""
     azimuth, elevation = echoes.azimuth, echoes.elevation
     level = np.cos(elevation)
@@ -118,7 +118,9 @@ def range_error(solution: Solution, echoes: PickedEchoes, estimates: SourceEstim
     well (`PickedEchoes.slope`).
     """
     c = sonar.assumed_sound_speed
-    beside = np.hypot(solution.by_angle * _towards(echoes, estimates.position[0]), _across(echoes, solution.range))
+    beside = np.hypot(
+        solution.by_angle * _angle_error(echoes, estimates.position[0]), _slope_error(echoes, solution.range)
+    )
     clock = solution.by_path * c * echoes.delay_error
     g = solution.by_source
     snap = np.einsum("bi,ij,bj->b", g, estimates.position_covariance[0], g)
@@ -126,7 +128,7 @@ def range_error(solution: Solution, echoes: PickedEchoes, estimates: SourceEstim
     return np.asarray(np.sqrt(beside**2 + clock**2 + np.maximum(snap, 0.0) + speed**2))
 
 
-def _towards(echoes: PickedEchoes, source: Floats) -> Floats:
+def _angle_error(echoes: PickedEchoes, source: Floats) -> Floats:
     """Standard error (echo,) in rad of the angle between echo and source."""
     beam = direction(echoes.azimuth, echoes.elevation)
     sine, cosine = np.sin(echoes.azimuth), np.cos(echoes.azimuth)
@@ -138,7 +140,7 @@ def _towards(echoes: PickedEchoes, source: Floats) -> Floats:
     return np.asarray(np.sqrt(share * sideways**2 + (1.0 - share) * echoes.elevation_error**2))
 
 
-def _across(echoes: PickedEchoes, distance: Floats) -> Floats:
+def _slope_error(echoes: PickedEchoes, distance: Floats) -> Floats:
     """What the slope of the surface adds (echo,) in m."""
     sideways = echoes.azimuth_error * np.cos(echoes.elevation)
     return np.asarray(echoes.slope * distance * np.sqrt(0.5 * (sideways**2 + echoes.elevation_error**2)))

@@ -10,7 +10,7 @@ from sonarsynth.description import description
 from sonarsynth.description.method import Demand, Method
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.signals.direct_sum import DirectSum
-from sonarsynth.signals.gridded_synthesis import ROUNDING, GriddedSynthesis, kernel_error, spent
+from sonarsynth.signals.gridded_synthesis import ROUNDING, GriddedSynthesis, error_over_tolerance, kernel_error
 from sonarsynth.signals.segments import Reception
 from sonarsynth.state import Emission
 
@@ -27,8 +27,8 @@ def deposit_for(error: float, bandwidth: float = np.inf) -> GriddedSynthesis:
     for width in range(6, 17, 2):
         kernel = kernel_error(width, GriddedSynthesis().oversampling, bandwidth)
         for precision in PRECISIONS:
-            allowed = (error - kernel - ROUNDING[precision]) / spent(bandwidth)
-            if allowed >= LEFT * error / spent(bandwidth):
+            allowed = (error - kernel - ROUNDING[precision]) / error_over_tolerance(bandwidth)
+            if allowed >= LEFT * error / error_over_tolerance(bandwidth):
                 tolerance = min(allowed, MOST_TOLERANCE)
                 digit = 10.0 ** np.floor(np.log10(tolerance))
                 down = float(f"{np.floor(tolerance / digit) * digit:.1g}")

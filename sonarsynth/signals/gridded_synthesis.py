@@ -24,12 +24,12 @@ from sonarsynth.state import Emission
 
 ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
 """Relative error by the precision of the grid and of its table of the kernel."""
-SPENT = 0.75
+ERROR_OVER_TOLERANCE = 0.75
 """Error of the signals over the tolerance of each other approximation of `GriddedSynthesis`, at most: 0.7 was seen of
 one in 60 random sets of paths of one sign, heard by 15 to 35 hydrophones, 0.25 of a hull (its table)."""
-NARROW, KERNEL_MORE, OTHERS_MORE = 10e3, 6.0, 1.5
-"""Hz: in narrower bands the paths of an echo may cancel each other wherever it is heard. How many times as much the
-kernel and the other approximations then err by, of its peak, as measured."""
+NARROW_BAND, NARROW_BAND_KERNEL, NARROW_BAND_OTHERS = 10e3, 6.0, 1.5
+"""Hz: in narrower bands the paths of an echo may cancel each other wherever it is heard. The kernel and the other
+approximations then err by so many times as much of its peak, as measured."""
 
 
 def kernel_error(width: int, oversampling: float, bandwidth: float = np.inf) -> float:
@@ -40,22 +40,22 @@ def kernel_error(width: int, oversampling: float, bandwidth: float = np.inf) -> 
     the same decay).
     """
     error = float(2.0 * np.exp(-np.pi * width * np.sqrt(1.0 - 1.0 / oversampling)))
-    return error * (KERNEL_MORE if bandwidth < NARROW else 1.0)
+    return error * (NARROW_BAND_KERNEL if bandwidth < NARROW_BAND else 1.0)
 
 
-def spent(bandwidth: float = np.inf) -> float:
-    """`SPENT` in a band (Hz)."""
-    return SPENT * (OTHERS_MORE if bandwidth < NARROW else 1.0)
+def error_over_tolerance(bandwidth: float = np.inf) -> float:
+    """`ERROR_OVER_TOLERANCE` in a band (Hz)."""
+    return ERROR_OVER_TOLERANCE * (NARROW_BAND_OTHERS if bandwidth < NARROW_BAND else 1.0)
 
 
 def deposit_error(method: GriddedSynthesis, bandwidth: float = np.inf) -> float:
     """Error of echoes in a band (Hz) relative to their peak, a bound on what was measured (the tables of
     `GriddedSynthesis`)."""
     kernel = kernel_error(method.width, method.oversampling, bandwidth)
-    return kernel + spent(bandwidth) * method.tolerance + ROUNDING[method.precision]
+    return kernel + error_over_tolerance(bandwidth) * method.tolerance + ROUNDING[method.precision]
 
 
-def _apart(paths: Ints) -> Ints:
+def _neighbours_apart(paths: Ints) -> Ints:
     """The paths in an order that puts neighbours, which arrive at nearly one time, apart: a sum that was just written
     cannot be read at once, and deposits take a third more."""
     return paths[np.argsort(np.arange(paths.size) % max(-(-paths.size // 8), 1), kind="stable")]
@@ -138,7 +138,7 @@ class GriddedSynthesis(UnroundedSynthesis):
         out = np.zeros((elements.count, samples), self.precision)
         method = (self.width, self.oversampling, self.precision, self.tolerance)
         for span in plan.stretches:
-            paths, bins = bins_of(span, front.select(_apart(span.paths)), sonar, absorption, self.tolerance)
+            paths, bins = bins_of(span, front.select(_neighbours_apart(span.paths)), sonar, absorption, self.tolerance)
             origin, stop = start + span.first / fs, stop_frequency(sonar.antialias)
             add_segment(out, span, paths, elements, bins, origin=origin, stop=stop, method=method)
         return out, plan.outside

@@ -45,39 +45,39 @@ def trace_each(
 ) -> list[Arrivals]:
     """As `trace`, for each choice of snaps in the place of the context's. The way from facets to the array is traced
     once for all, where what moves meets their sound at about one place (`Tolerances.shared`)."""
-    receiver, snaps = context.receiver, tuple(snap for of in choices for snap in of)
-    last = np.cumsum([0, *map(len, choices)]).tolist()
-    own = [range(start, stop) for start, stop in pairwise(last)]
+    receiver, snaps = context.receiver, tuple(snap for choice in choices for snap in choice)
+    first = np.cumsum([0, *map(len, choices)]).tolist()
+    numbers = [range(start, stop) for start, stop in pairwise(first)]  # of the snaps of each choice
     context, moving = replace(context, snaps=snaps), receiver.track
     still = all(body.track.still for body in context.bodies) and not any(snap.velocity.any() for snap in snaps)
     if moving is None or (moving.still and still) or not snaps:
         array = facet_paths_at_rest(context, propagation, snaps)
-        found = [[*(_direct(array, index) for index in of), *_echoes(array, of)] for of in own]
+        blocks = [[*(_direct(array, snap) for snap in own), *_echoes(array, own)] for own in numbers]
     else:
-        found = [[] for _ in own]
-        begun = set[int]()
+        blocks = [[] for _ in numbers]
+        heard_directly = set[int]()
         times = meetings(context, moving, propagation.bounces)
         for group in occasions(context, times):
             moved = replace(context, bodies=group.bodies, receiver=replace(receiver, pose=group.meeting.sonar.pose))
-            lights = None if group.reflected else tuple(snaps[index] for index in group.snaps)
+            lights = None if group.reflected else tuple(snaps[snap] for snap in group.snaps)
             array = facet_paths(moved, propagation.reflected(group.bounces), group.owners, lights, group.ways)
             array = replace(array, propagation=propagation, meeting=group.meeting)
-            for of, own_blocks in zip(own, found, strict=True):
-                together = [index for index in group.snaps if index in of]
-                new = [index for index in together if group.direct and index not in begun]
-                own_blocks.extend(
-                    _direct(_hearing(array, meeting), index, ways)
-                    for index in new
-                    for ways, meeting in times.heard(index)
+            for own, arrivals in zip(numbers, blocks, strict=True):
+                together = [snap for snap in group.snaps if snap in own]
+                arrivals.extend(
+                    _direct(_where_heard(array, meeting), snap, ways)
+                    for snap in together
+                    if group.direct and snap not in heard_directly
+                    for ways, meeting in times.heard(snap)
                 )
-                own_blocks.extend(_echoes(array, together))
-            begun |= set(group.snaps if group.direct else ())
+                arrivals.extend(_echoes(array, together))
+            heard_directly |= set(group.snaps if group.direct else ())
     speed = receiver.speed(context.medium)
-    every = [join(blocks or [no_arrivals(array.legs)], speed, receiver.centre) for blocks in found]
-    return [of.but(snap=of.snap - first) for of, first in zip(every, last, strict=False)]
+    traced = [join(arrivals or [no_arrivals(array.legs)], speed, receiver.centre) for arrivals in blocks]
+    return [arrivals.but(snap=arrivals.snap - start) for arrivals, start in zip(traced, first, strict=False)]
 
 
-def _hearing(array: FacetPaths, meeting: Meeting) -> FacetPaths:
+def _where_heard(array: FacetPaths, meeting: Meeting) -> FacetPaths:
     """The array where it hears a snap itself."""
     context = replace(array.context, receiver=replace(array.context.receiver, pose=meeting.sonar.pose))
     return replace(array, context=context, meeting=meeting)

@@ -93,15 +93,15 @@ class _EchoBlock:
         if few is not None:
             return self.few, self.gain
         (row,) = _columns(self.groups, "row")
-        more = np.concatenate([g.over(self.away(g, MORE)) for g in self.groups])
+        more = np.concatenate([g.over(self.towards_probes(g, MORE)) for g in self.groups])
         return np.concatenate([self.few, more], axis=1), self.array.fronts.gain(self.leg[row])
 
-    def away(self, group: EchoBatch, some: slice = slice(None)) -> Floats:
-        """Where some probes are seen from the facets of a group (echo, probe, xyz), as `_away`."""
-        return _away(self.array, self.leg, self.carried, group, some)
+    def towards_probes(self, group: EchoBatch, some: slice = slice(None)) -> Floats:
+        """Where some probes are seen from the facets of a group (echo, probe, xyz), as `_towards_probes`."""
+        return _towards_probes(self.array, self.leg, self.carried, group, some)
 
-    def seen(self) -> EchoLevels:
-        """What decides which of them are kept."""
+    def levels(self) -> EchoLevels:
+        """What decides which echoes are kept."""
         row, amplitude = _columns(self.groups, "row", "amplitude")
         strongest = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
         owner = self.array.facets.owner[self.out.facet[row]]
@@ -131,7 +131,7 @@ def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...
     blocks.reverse()
     for variation in terms:
         block = blocks.pop()
-        over = _turned(block, strongest)
+        over = _with_reflection_phases(block, strongest)
         spot = np.concatenate([g.spot for g in block.groups])
         if spot.any() and not block.array.bending.profile.uniform:
             over = delay_to_scattering_points(over, block.array, block.leg, spot)
@@ -162,27 +162,27 @@ def _loudest(array: FacetPaths, snap: Emission, components: tuple[tuple[Componen
     """
     blocks = in_blocks(len(array.facets.facet))
     if len(blocks) == 1:
-        block = _found(array, snap, components)
-        return [block.heard(loud_ones(block.seen(), array.context.tolerances.negligible))]
+        block = _all_echoes(array, snap, components)
+        return [block.heard(loud_ones(block.levels(), array.context.tolerances.negligible))]
     loud: list[_EchoBlock] = []
     levels: list[EchoLevels] = []
     masks: list[Bools] = []
     for rows in blocks:
-        block = _found(array.part(rows), snap, components)
-        levels.append(block.seen())
+        block = _all_echoes(array.part(rows), snap, components)
+        levels.append(block.levels())
         masks.append(loud_of_all(levels, PRUNE_MARGIN * array.context.tolerances.negligible)[-1])
         loud.append(block.select(masks[-1]))
     for n, wanted in enumerate(loud_of_all(levels, array.context.tolerances.negligible)):
         if (wanted & ~masks[n]).any():
-            loud[n] = _found(array.part(blocks[n]), snap, components).heard(wanted)
+            loud[n] = _all_echoes(array.part(blocks[n]), snap, components).heard(wanted)
         else:
             loud[n] = loud[n].heard(wanted[masks[n]])
     return loud
 
 
-def _found(array: FacetPaths, snap: Emission, components: tuple[tuple[Component, ...], ...]) -> _EchoBlock:
+def _all_echoes(array: FacetPaths, snap: Emission, components: tuple[tuple[Component, ...], ...]) -> _EchoBlock:
     """All echoes of a snap from the facets of the legs."""
-    out, fronts = _ways(array, snap), array.fronts
+    out, fronts = _ways_to_facets(array, snap), array.fronts
     way, leg = path_pairs(out, array.legs, len(array.facets.facet), array.propagation.bounces)
     if array.ways is not None:
         wanted = np.zeros((2 * array.propagation.bounces + 1,) * 2, bool)
@@ -194,7 +194,7 @@ def _found(array: FacetPaths, snap: Emission, components: tuple[tuple[Component,
         out, carried = _carried(array, snap, out, leg)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
     groups = echo_batches(array, out, leg, components, carried, factor)
-    few = np.concatenate([g.over(_away(array, leg, carried, g, FEW)) for g in groups])
+    few = np.concatenate([g.over(_towards_probes(array, leg, carried, g, FEW)) for g in groups])
     pulses = PulseResponse.join([g.pulses(array.context.receiver.centre) for g in groups])
     rows = leg[_columns(groups, "row")[0]]
     gain, over = fronts.gain(rows, QUADRATIC_PROBES), fronts.expansion[rows]
@@ -212,7 +212,7 @@ def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -
     return met_out, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
 
 
-def _away(array: FacetPaths, leg: Ints, carried: MotionTerms | None, group: EchoBatch, some: slice) -> Floats:
+def _towards_probes(array: FacetPaths, leg: Ints, carried: MotionTerms | None, group: EchoBatch, some: slice) -> Floats:
     """Where some probes are seen from the facets of a group (echo, probe, xyz), in the frame of its body; leg, carried:
     of all pairs (pair,)."""
     rows, body, fronts, legs = leg[group.row], group.surface.pose, array.fronts, array.legs
@@ -229,7 +229,7 @@ def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:
     return [np.concatenate([getattr(g, name) for g in groups]) for name in names]
 
 
-def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
+def _ways_to_facets(array: FacetPaths, snap: Emission) -> TransmitPaths:
     """Ways from a snap to the lit side of facets that no body hides; of facets in one place, the first body's."""
     medium, bodies, facets = array.context.medium, array.context.bodies, array.facets
     row = np.flatnonzero(may_face_receiver(facets, snap.position, array.propagation.bounces, medium))
@@ -259,7 +259,7 @@ def _hides(
     return hidden(bodies, array.bending, *ways, bounces=out.bounces, turning=out.turning)
 
 
-def _turned(block: _EchoBlock, strongest: float) -> ArrayExpansion:
+def _with_reflection_phases(block: _EchoBlock, strongest: float) -> ArrayExpansion:
     """Wavefronts (path,) of echoes, with the phases of reflections from facets to each probe; strongest: of all.
 
     They vary over the aperture where part of the sound enters the body; what polynomials miss counts as far as the echo
@@ -269,7 +269,7 @@ def _turned(block: _EchoBlock, strongest: float) -> ArrayExpansion:
     over, array = block.terms, block.array
     if not any(g.turns for g in block.groups):
         return over
-    shift = np.concatenate([g.turned(block.away(g)) for g in block.groups])
+    shift = np.concatenate([g.turned(block.towards_probes(g)) for g in block.groups])
     leaps = np.abs(shift).max(axis=1, initial=0.0) > MAX_PHASE_CHANGE
     if not shift.any():
         return over

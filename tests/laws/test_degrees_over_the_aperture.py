@@ -93,7 +93,7 @@ def test_fainter_echoes_are_kept_before_the_array_is_cut(monkeypatch: pytest.Mon
     monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index: Measured()))
     plan = planning.plan(reading.recipe_of(reading.read(TANK, ["accuracy.signal=1e-3"])), products=())
     cut = choosing._subarrays(plan, [0])
-    assert (cut.parts, cut.faint) == (1, choosing.LESS_FAINT) and cut.error < 3e-4
+    assert (cut.parts, cut.faint) == (1, choosing.FAINTER) and cut.error < 3e-4
 
 
 @pytest.mark.parametrize(("sequences", "occlusion"), [(1, "centre"), (2, "sensors")])
