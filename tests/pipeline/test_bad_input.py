@@ -46,7 +46,7 @@ WRONG = [
     ("kind: box, size: [1, 1, 1], edge: 0.25", "kind: mesh_file, path: small.yaml", f"8: {TARGET}.shape: "),
     ("kind: box, size: [1, 1, 1], edge: 0.25", "kind: mesh_file, path: bad.stl", f"8: {TARGET}.shape: "),
     ("stop: [10, 1, -5]", "stop: [10, 1, 0]", f"9: {TARGET}.motion: target 'box'"),
-    ("pitch: 5 cm", "pitch: 5 km", "16: scene.trajectory.sonar: the array is "),
+    ("pitch: 5 cm", "pitch: 5 km", "16: scene.trajectory.sonar: the array, 2.5e+04 m across, is "),
     (
         "pitch: 5 cm",
         "pitch: 5 cm, dead: [20]",

@@ -156,7 +156,8 @@ def check_frame(scene: Scene, frame: Frame) -> None:
         raise FieldError(
             ("scene", "trajectory"), f"{when} is {frame.time:.3g} s from the start of the motions: too far"
         )
-    _check_depth(("scene", "trajectory", "sonar"), "the array", hydrophones, bottom_depth, when)
+    array = f"the array, {np.linalg.norm(np.ptp(hydrophones, axis=0)):.3g} m across,"
+    _check_depth(("scene", "trajectory", "sonar"), array, hydrophones, bottom_depth, when)
     for i, body in enumerate(frame.moment.bodies):
         path = ("scene", "world", "targets", i, "motion")
         if not _box_in_water(body, bottom_depth):
