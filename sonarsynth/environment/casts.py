@@ -60,6 +60,18 @@ def profile_of(sound_speed: SoundSpeed) -> Profile:
 
 
 @lru_cache(maxsize=64)
+def profile_above(sound_speed: SoundSpeed, bottom: float) -> Profile:
+    """The same where a bottom (m) ends the water: formulas go on to depths and speeds that no water has. A measured
+    profile keeps all of its nodes."""
+    profile = profile_of(sound_speed)
+    if sound_speed.measured or profile.depth[-1] <= bottom:
+        return profile
+    count = int(np.searchsorted(profile.depth, bottom, side="left"))
+    last = profile.speed[count] if profile.depth[count] == bottom else profile.at(bottom)
+    return _profile(np.append(profile.depth[:count], bottom), np.append(profile.speed[:count], last), profile.notes)
+
+
+@lru_cache(maxsize=64)
 def _profile_of(sound_speed: SoundSpeed, stamps: tuple[tuple[int, int], ...] | None) -> Profile:
     match sound_speed:
         case Isovelocity():

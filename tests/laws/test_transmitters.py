@@ -141,7 +141,7 @@ def wave(sweep: Sweep, time: Floats) -> Floats:
     else:
         k = (1.0 - sweep.start / sweep.stop) / length  # 1/f = (1 - k t)/f1
         cycles = sweep.start * (t if k == 0.0 else -np.log(np.maximum(1.0 - k * t, 1e-9)) / k)
-    ends = np.clip(np.minimum(t, length - t) / (0.05 * length), 0.0, 1.0)
+    ends = np.clip(np.minimum(t, length - t) / (0.5 * sweep.taper * length), 0.0, 1.0)
     return np.asarray(np.sin(2.0 * np.pi * cycles) * 0.5 * (1.0 - np.cos(np.pi * ends)))
 
 
@@ -149,14 +149,26 @@ LAWS = pytest.mark.parametrize("law", ["linear", "hyperbolic"])
 
 
 @LAWS
-@pytest.mark.parametrize(("start", "stop"), [(40e3, 80e3), (70e3, 30e3), (50e3, 50e3)])
-def test_a_sweep_has_the_spectrum_of_its_waveform(law: Any, start: float, stop: float) -> None:
-    sweep = Sweep(start=start, stop=stop, duration=2e-3, law=law)
-    f = np.linspace(20e3, 100e3, 161)
-    step = 1e-7
-    time = np.arange(-1e-3, 1e-3 + step, step)
+@pytest.mark.parametrize(
+    ("start", "stop", "length", "taper", "highest"),
+    [
+        (40e3, 80e3, 2e-3, 0.1, 100e3),
+        (70e3, 30e3, 2e-3, 0.1, 100e3),
+        (50e3, 50e3, 2e-3, 0.1, 100e3),
+        (3.6e3, 3.9e3, 0.4e-3, 0.1, 12e3),  # a cycle and a half: its ends took a sample each, and it was 0.011 off
+        (5e3, 8e3, 0.2e-3, 0.02, 30e3),
+        (5e3, 8e3, 2e-3, 0.005, 30e3),
+    ],
+)
+def test_a_sweep_has_the_spectrum_of_its_waveform(
+    law: Any, start: float, stop: float, length: float, taper: float, highest: float
+) -> None:
+    sweep = Sweep(start=start, stop=stop, duration=length, law=law, taper=taper)
+    f = np.linspace(0.2 * highest, highest, 161)
+    step = 5e-5 * length
+    time = np.arange(-0.5 * length, 0.5 * length + step, step)
     exact = np.exp(-2j * np.pi * f[:, None] * time) @ wave(sweep, time) * step
-    assert np.abs(pulses.spectrum(f, sweep.pulse(0.0, 100e3)) - exact).max() < 1e-4 * np.abs(exact).max()
+    assert np.abs(pulses.spectrum(f, sweep.pulse(0.0, highest)) - exact).max() < 2e-5 * np.abs(exact).max()
 
 
 @pytest.mark.parametrize(

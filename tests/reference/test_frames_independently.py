@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth.environment.sea import Environment, Isovelocity, Profile
+from sonarsynth.environment.sea import Environment, Isovelocity, Linear, Profile
 from sonarsynth.equations.rays import ray_solutions
 from sonarsynth.geometry.hovering import Hover
 from sonarsynth.geometry.motion import Circle, ConstantVelocity, Motion, Still
@@ -19,6 +19,7 @@ from sonarsynth.recipe import Accuracy, Recipe, reading
 from sonarsynth.recipe.scene import Physics, Scene, Trajectory, World
 from sonarsynth.scattering import Isotropic
 from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.sources.transmitter import Sweep, TransmitBeam, Transmitter
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target import Target
 from sonarsynth.validation.rays.ray_matching import Rays, rays_of
@@ -97,6 +98,32 @@ def test_it_says_where_there_are_rays_that_it_does_not_know() -> None:
         frame = made.recipe.frame(0)[1]
         assert bool(FramePressure(made.scene, frame, channel).unknown) == refused
         assert not FramePressure(made.scene, frame, made.profile).unknown  # the water of one speed
+
+
+def test_what_moves_in_water_that_a_formula_describes_is_heard() -> None:
+    """Which ends at the bottom: a gradient of -1 leads on to 100 m/s, where 4 m/s was refused as too fast, and records
+    were as long as sound takes there. No longer than those in water that is faster below."""
+    ours, start = Still(position=(0.0, 0.0, -30.0), heading=0.5 * np.pi), (22.0, 1.0, -29.0)
+    plans = []
+    for slope in (-0.1, 0.1):
+        scene = crossing(ConstantVelocity(start=start, heading=3.5, speed=8.0), ours, times=(0.0,)).recipe.scene
+        water = replace(scene.world.environment, sound_speed=Linear(surface_speed=1500.0, gradient=slope))
+        scene = replace(scene, world=replace(scene.world, environment=water))
+        plans.append(plan(Recipe(title="linear", scene=scene, accuracy=Accuracy(signal=1e-3)), ("signals",), Choices()))
+        assert max(away(plans[-1], [0, 47])) < ALLOWED
+    assert abs(plans[0].windows.samples - plans[1].windows.samples) < 0.02 * plans[1].windows.samples
+
+
+def test_a_ping_is_heard_as_it_is_sent_on_the_way() -> None:
+    """By a sonar that moves: in each direction as its beam and its speed make it, by surface and bottom too."""
+    ours = ConstantVelocity(start=(0.0, 0.0, -30.0), heading=np.deg2rad(80), speed=4.0)
+    scene = crossing(Still(position=(22.0, 1.0, -29.0), heading=0.4), ours, 0.35, 1).recipe.scene
+    beam = TransmitBeam(azimuth_width=np.deg2rad(50), elevation_width=np.deg2rad(80), azimuth=0.2)
+    pulse = Sweep(start=40e3, stop=70e3, duration=0.4e-3)
+    ping = Transmitter(position=(0.1, 0.2, -0.3), pulse=pulse, source_level=200.0, beam=beam)
+    scene = replace(scene, world=replace(scene.world, sources=(ping,)))
+    made = plan(Recipe(title="ping", scene=scene, accuracy=Accuracy(signal=1e-3)), ("signals",), Choices(subarrays=1))
+    assert away(made, [0, 47])[0] < ALLOWED
 
 
 @pytest.mark.parametrize("sonar", [0.0, 5.0])

@@ -18,6 +18,9 @@ SPREAD = 6.5
 
 OVERSAMPLED = 2.0
 """Rate of the samples of a sweep, over what its middle would need: its ends have waves beyond its band."""
+ENDS, MOST_ENDS = 200.0, 2e4
+"""Samples of a sweep at least, where each of its ends is a twentieth of it: what aliases is 8e-6 of it then; more where
+they are shorter, up to so many."""
 
 
 def logarithmic(bubble: Bubble, highest: float) -> Pulse:
@@ -89,7 +92,8 @@ def sweep(start: float, stop: float, duration: float, taper: float, hyperbolic: 
     Its phase, t (s) from its beginning, is 2 pi (f1 t + (f2 - f1) t^2/(2 T)) if linear. Hyperbolic, the period changes
     evenly: 2 pi ln(1 + f1 k t)/k, k = (1/f2 - 1/f1)/T. Source: Altes & Titlebaum (1970), J. Acoust. Soc. Am. 48, 1014.
     """
-    time, step = _grid(0.5 * duration, OVERSAMPLED * (highest + max(start, stop)))
+    least = min(ENDS * max(0.1 / taper, 1.0) ** (2.0 / 3.0), MOST_ENDS)  # corners of the ends: waves fall by 1/f^3
+    time, step = _grid(0.5 * duration, max(OVERSAMPLED * (highest + max(start, stop)), least / duration))
     since = time + 0.5 * duration
     if hyperbolic and start != stop:
         rate = (1.0 / stop - 1.0 / start) / duration

@@ -9,7 +9,7 @@ import numpy as np
 from sonarsynth.casting.surface_distances import enclosed
 from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats, depth
 from sonarsynth.description import FieldError
-from sonarsynth.environment.casts import profile_of
+from sonarsynth.environment.casts import profile_above, profile_of
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays.ray_solutions import TOLERANCE
 from sonarsynth.geometry.mesh import in_blocks
@@ -55,6 +55,7 @@ def read_inputs(scene: Scene) -> Profile:
     except (ValueError, OSError, ImportError) as error:
         raise FieldError((*world, "environment", "sound_speed"), str(error)) from None
     _check_profile(scene, profile)
+    profile = _water(scene)
     check_noises(scene)
     check_tracks(scene)
     for i, (target, law) in enumerate(zip(scene.world.targets, scene.laws, strict=True)):
@@ -70,6 +71,11 @@ def read_inputs(scene: Scene) -> Profile:
     except ValueError as error:
         raise FieldError(("scene", "sonar", "array"), str(error)) from None
     return profile
+
+
+def _water(scene: Scene) -> Profile:
+    environment = scene.world.environment
+    return profile_above(environment.sound_speed, environment.depth)
 
 
 def _check_profile(scene: Scene, profile: Profile) -> None:
@@ -181,7 +187,7 @@ def check_frame(scene: Scene, frame: Frame) -> None:
 
 def _check_met(scene: Scene, frame: Frame, number: int) -> None:
     """A body must be in the water where the sound of each snap meets it, and no snap inside it when it sounds."""
-    body, slowest = frame.moment.bodies[number], float(profile_of(scene.world.environment.sound_speed).speed.min())
+    body, slowest = frame.moment.bodies[number], float(_water(scene).speed.min())
     snaps, path = frame.moment.snaps, ("scene", "world", "targets", number, "motion")
     if body.track.still or not snaps:
         return
@@ -201,7 +207,7 @@ def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
     """Nothing moves so fast that the pulses are stretched beyond what the synthesis can do (`MAX_DOPPLER`)."""
     body, sonar = frame.moment.bodies[number], frame.sonar_track
     array, own = _fastest(sonar, elements(scene.sonar.array).aperture), _fastest(body.track, body.mesh.radius)
-    slowest = float(profile_of(scene.world.environment.sound_speed).speed.min())
+    slowest = float(_water(scene).speed.min())
     if array + 2.0 * own > 0.9 * MAX_DOPPLER * slowest:
         faster = array > 2.0 * own
         path = ("scene", "trajectory", "sonar") if faster else ("scene", "world", "targets", number, "motion")
@@ -219,7 +225,7 @@ def _check_snaps(scene: Scene, frame: Frame) -> None:
     """No source is at the centre of the array, at a hydrophone, or inside a target."""
     owners = [i for i, source in enumerate(scene.world.sources) for _ in source.times]
     hydrophones = frame.sonar_pose.to_world(elements(scene.sonar.array).position)
-    slowest, bottom = float(profile_of(scene.world.environment.sound_speed).speed.min()), scene.world.environment.depth
+    slowest, bottom = float(_water(scene).speed.min()), scene.world.environment.depth
     for owner, snap in zip(owners, frame.moment.snaps, strict=True):
         path = ("scene", "world", "sources", owner, "position")
         if np.linalg.norm(snap.position - frame.sonar_pose.position) < CLOSEST:

@@ -71,8 +71,6 @@ class FramePressure:
     @property
     def unknown(self) -> str:
         """Why this frame cannot be computed here; empty where it can."""
-        if any(snap.velocity.any() or snap.directivity for snap in self.frame.moment.snaps):
-            return "sources that move, or are not alike in all directions, are not in the independent computation"
         wrong = [type(law).__name__ for law in self.scene.laws if not known(law)]
         if wrong:
             return f"{wrong[0]} is not among the laws of the independent computation"
@@ -130,15 +128,17 @@ class FramePressure:
         return self.scene.physics.tracing.bounces
 
     def _ends(self) -> tuple[Floats, Floats]:
-        """Points (ray, xyz) that rays join: snaps, the outermost facets of bodies and their middles, and the array."""
-        points = [self.sonar.points(np.zeros((1, 3)), np.zeros(1))]
+        """Points (ray, xyz) that rays join: snaps, outermost facets of bodies and their middles, and hydrophones."""
+        array = elements(self.scene.sonar.array).position
+        heard = np.vstack([np.zeros(3), array[array.argmin(axis=0)], array[array.argmax(axis=0)]])
+        points = [self.sonar.points(heard, np.zeros(len(heard)))]
         for body in self.bodies:
             outermost = np.unique([body.centre.argmin(axis=0), body.centre.argmax(axis=0)])
             chosen = np.vstack([body.centre.mean(axis=0), body.centre[outermost]])
             points.append(body.solid.mover.points(chosen, np.zeros(len(chosen))))
         ends = np.vstack(points)
         starts = np.array([snap.position for snap in self.frame.moment.snaps] + [ends[0]])
-        rows = [(n, m) for n in range(len(starts)) for m in range(n == len(starts) - 1, len(ends))]
+        rows = [(n, m) for n in range(len(starts)) for m in range(len(heard) * (n == len(starts) - 1), len(ends))]
         return starts[[n for n, _ in rows]], ends[[m for _, m in rows]]
 
     def _lit(self, snap: Emission, body: Body) -> list[_LitFacets]:
@@ -160,8 +160,16 @@ class FramePressure:
             end = np.broadcast_to(snap.position, clear.shape)
             free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, back, time))
             counted = family.bounces - family.ends_at(-snap.position[2], self.water.bottom)
-            groups.append(_LitFacets(body, rows[free], time[free], back.select(free), normal[free], family, counted))
+            of = rows[free], time[free], back.select(free), normal[free]
+            groups.append(_LitFacets(body, *of, family, counted, *self._sent(snap, -back.arrival[free])))
         return groups
+
+    def _sent(self, snap: Emission, departure: Floats) -> tuple[Floats, Floats]:
+        """What a snap sends in directions (ray, xyz), world, over what it would if alike in all, and how many times as
+        long its pulse is there, by its motion."""
+        loud = np.ones(len(departure)) if snap.directivity is None else snap.directivity(departure)
+        velocity = snap.velocity if self.scene.physics.doppler else 0.0 * snap.velocity
+        return loud, 1.0 - departure @ velocity / float(self.water.at(-snap.position[2:])[0])
 
     def _towards(self, body: Body, rows: np.ndarray, time: Floats, position: Floats, family: Family) -> np.ndarray:
         """Facets whose outer side may face the image of a position (xyz)."""
@@ -202,12 +210,9 @@ class FramePressure:
         velocity = mover.velocity(body.centre[facets.row], facets.time)
         c = self.water.at(-mover.points(body.centre[facets.row], facets.time)[:, 2])
         out, away = (np.einsum("nx,nx->n", velocity, x) / c for x in (-facets.back.departure, ray.departure))
-        size = size * body.sign[facets.row] * facets.back.spreading * ray.spreading
-        return [
-            self._arriving(
-                position, late, size, (1.0 - away) / (1.0 - out), (facets.back, facets.family), (ray, family)
-            )
-        ]
+        size = size * body.sign[facets.row] * facets.loud * facets.back.spreading * ray.spreading
+        longer = facets.longer * (1.0 - away) / (1.0 - out)
+        return [self._arriving(position, late, size, longer, (facets.back, facets.family), (ray, family))]
 
     def _direct(self, snap: Emission, position: Floats) -> list[Contributions]:
         """What one hydrophone hears without a target."""
@@ -216,7 +221,8 @@ class FramePressure:
             late, ray = arrival_times(self.water, snap.position[None], sent, self.sonar, position, family)
             end = self.sonar.points(position[None], late)
             if not hidden(self.solids, self.water, snap.position[None], end, ray, sent)[0]:
-                contributions.append(self._arriving(position, late, ray.spreading, np.ones(1), (ray, family)))
+                loud, longer = self._sent(snap, ray.departure)
+                contributions.append(self._arriving(position, late, loud * ray.spreading, longer, (ray, family)))
         return contributions
 
     def _arriving(
@@ -285,8 +291,10 @@ class _LitFacets:
     normal: Floats  # (facet, xyz) world, then
     family: Family  # of the rays back
     counted: int  # reflections, but for one at the very place of a snap that lies on the bottom
+    loud: Floats  # (facet,) what the snap sends that way, over its level
+    longer: Floats  # (facet,) its pulse lasts so many times as long, by its motion
 
     def select(self, rows: np.ndarray) -> _LitFacets:
         """Some of them."""
         of = self.row[rows], self.time[rows], self.back.select(rows), self.normal[rows]
-        return _LitFacets(self.body, *of, self.family, self.counted)
+        return _LitFacets(self.body, *of, self.family, self.counted, self.loud[rows], self.longer[rows])

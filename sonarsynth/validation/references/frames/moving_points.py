@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import ConstantVelocity, Line, Motion, Still, pose, velocity
 
 STEP = 1e-4
@@ -28,7 +29,7 @@ class Mover:
         if self._straight:
             position, rotation, speed = self._line
             return position + (t if self.moves else 0.0 * t)[:, None] * speed, np.broadcast_to(rotation, (len(t), 3, 3))
-        poses = [pose(self.motion, self.instant + float(elapsed)) for elapsed in t]
+        poses = [self._pose(elapsed) for elapsed in t.tolist()]
         positions, rotations = np.array([p.position for p in poses]), np.array([p.rotation for p in poses])
         return positions.reshape(-1, 3), rotations.reshape(-1, 3, 3)
 
@@ -53,6 +54,17 @@ class Mover:
         if self._straight:
             return np.broadcast_to(self._line[2], (len(time), 3))
         return (self.points(body, time + STEP) - self.points(body, time - STEP)) / (2.0 * STEP)
+
+    def _pose(self, elapsed: float) -> Pose:
+        found = self._poses.get(elapsed)
+        if found is None:
+            found = self._poses[elapsed] = pose(self.motion, self.instant + elapsed)
+        return found
+
+    @cached_property
+    def _poses(self) -> dict[float, Pose]:
+        """By time: rays are tested against bodies piece by piece, at the same times."""
+        return {}
 
     @property
     def _straight(self) -> bool:

@@ -15,7 +15,7 @@ NODES = ((1e-9, 1), (1e-5, 2), (1e-3, 3), (1e-2, 5), (1.0, 9))
 """Of spectra at so many Chebyshev nodes, where Doppler varies by as much."""
 
 BLOCK = 8
-"""Bins over which the exponent of losses is linear: to 1e-8 of a neper at 100 Hz apart."""
+"""Bins over which the exponent of absorption is linear: to 1e-8 of a neper at 100 Hz apart."""
 FLAT = 1e-12
 """s: faces over which a wave is as late as this, or less, hear it as a point."""
 
@@ -94,6 +94,7 @@ def _sum(delay, size, weight, length, delay_std, face, step, first, loss, invers
         phasor = size[n] * np.exp(-2j * np.pi * step * first * delay[n])
         y, z = np.exp(1j * phase_y * first), np.exp(1j * phase_z * first)
         spread = 0.5 * (2.0 * np.pi * step) ** 2 * delay_std[n]
+        falls = np.exp(-2.0 * spread)
         flat_y, flat_z = abs(face[n, 0]) < FLAT, abs(face[n, 1]) < FLAT
         for block in range(0, bins, BLOCK):
             end = min(block + BLOCK, bins)
@@ -101,11 +102,11 @@ def _sum(delay, size, weight, length, delay_std, face, step, first, loss, invers
             for c in range(3):
                 low += length[n, c] * loss[block, c]
                 high += length[n, c] * loss[end - 1, c]
-            low += spread * (first + block) ** 2
-            high += spread * (first + end - 1) ** 2
             gain, ratio = np.exp(-low), np.exp((low - high) / max(end - 1 - block, 1))
+            blur = np.exp(-spread * (first + block) ** 2)
+            fall = np.exp(-spread * (2 * (first + block) + 1))
             for k in range(block, end):
-                value = gain
+                value = gain * blur
                 if not flat_y and first + k > 0:
                     value *= y.imag * inverse[k] / face[n, 0]
                 if not flat_z and first + k > 0:
@@ -115,3 +116,4 @@ def _sum(delay, size, weight, length, delay_std, face, step, first, loss, invers
                     out[m, k, 0] += weight[n, m] * real
                     out[m, k, 1] += weight[n, m] * imaginary
                 phasor, y, z, gain = phasor * turn, y * turn_y, z * turn_z, gain * ratio
+                blur, fall = blur * fall, fall * falls
