@@ -174,17 +174,19 @@ class DiffuseKirchhoff(Component):
     """As of `Lobe`."""
 
     def _powers(self, incident: Floats, scattered: Floats, patch: FacetGeometry) -> tuple[Floats, Floats]:
-        """Cross-sections per area (...) (1/sr) of the lobe, where heights are large, and of the floor."""
+        """Cross-sections per area (...) (1/sr) of the lobe, where heights are large, and of the floor, which is below 0
+        where a facet is not seen."""
         lit = lit_and_seen(incident, scattered, patch.normal, self.beyond)
         returned = np.where(lit, np.abs(reflection(self.law, incident, scattered)) ** 2, 0.0)
         lobe = slope_lobe(incident, scattered, patch.normal, self.law.slope) if self.law.roughness > 0 else 0.0
         floor = lambert(incident, scattered, patch.normal, self.law.diffuse)
+        floor -= lambert(incident, -scattered, patch.normal, self.law.diffuse)
         return np.asarray(returned * (1.0 - self.law.diffuse) * lobe), np.asarray(returned * floor)
 
     def amplitude(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
         """As `Component.amplitude`: root of the area times lobe and floor."""
         lobe, floor = self._powers(incident, scattered, patch)
-        return np.sqrt(patch.area * (lobe + floor))
+        return np.sqrt(patch.area * np.abs(lobe + floor))
 
     def past_limb(self) -> DiffuseKirchhoff:
         """As `Component.past_limb`."""
@@ -210,13 +212,13 @@ class DiffuseKirchhoff(Component):
         """Power (...) in m2 that is sent without phase in common."""
         lobe, floor = self._powers(incident, scattered, patch)
         g = wavenumber * self.law.roughness * dot(patch.normal, scattered - incident)
-        return np.asarray(patch.area * (floor - lobe * np.expm1(-g * g)))
+        return np.asarray(patch.area * np.abs(floor - lobe * np.expm1(-g * g)))
 
     def pulses(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> PulseResponse:
         """As `Component.pulses`: without the share of the power that is coherent still."""
         count, zero = len(incident), np.zeros(len(incident))
         lobe, floor = self._powers(incident, scattered, patch)
-        share = lobe / np.where(lobe + floor > 0.0, lobe + floor, 1.0)
+        share = np.minimum(lobe / np.where(lobe + floor > 0.0, lobe + floor, 1.0), 1.0)
         delay = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
         late = dot(patch.spot, incident - scattered) / sound_speed
         return PulseResponse(np.zeros(count, bool), np.zeros((count, 3)), share, delay, late, zero, zero)

@@ -14,7 +14,7 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import POINT, Elements, Sonar
-from sonarsynth.scattering import Kirchhoff, PartlyReflecting
+from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.scattering.components import CoherentKirchhoff
 from sonarsynth.scattering.facet_geometry import patches
 from sonarsynth.signals.direct_sum import DirectSum
@@ -39,21 +39,23 @@ FLUID = PartlyReflecting(density_ratio=1.5, speed_ratio=1.2)
 LAWS = [(Kirchhoff(), 5.0), (Kirchhoff(edges="sharp"), 50.0), (Kirchhoff(surface=FLUID, roughness=0.001), 4.0)]
 
 
-def traced(law: Kirchhoff, place: Floats, array: Elements, occlusion: OcclusionPoint = "sensors") -> Arrivals:
-    """Coherent echoes of a ball 8 m ahead, lit from the side."""
+def traced(
+    law: Kirchhoff | MirrorLobe, place: Floats, array: Elements, occlusion: OcclusionPoint = "sensors"
+) -> Arrivals:
+    """Echoes of a ball 8 m ahead, lit from the side: the coherent ones, or those of laws with a diffuse floor."""
     ball = PlacedTarget("ball", BALL, Pose(PLACE + [8.0, 0.3, 0.2], EAST), np.zeros(3))
     receiver = Receiver(Pose(place, EAST), array, SONAR)
     none = Tolerances(negligible=0.0, quadratic=0.0, occlusion=occlusion)
     context = FrameContext(0.0, (ball,), (SNAP,), Medium(WATER, PROFILE), receiver, (law,), none)
     found = trace(context, AutoTracing())
-    return found.select(found.coherent)
+    return found.select(found.coherent == (isinstance(law, Kirchhoff) and law.diffuse == 0.0))
 
 
 def heard(found: Arrivals, array: Elements, start: float) -> Floats:
     return DirectSum().pressure(found, (SNAP,), Reception(array, SONAR, None, start, 512))[0]
 
 
-def alone(law: Kirchhoff, sensor: int) -> Arrivals:
+def alone(law: Kirchhoff | MirrorLobe, sensor: int) -> Arrivals:
     return traced(law, Pose(PLACE, EAST).to_world(ARRAY.position[sensor][None])[0], SINGLE)
 
 
@@ -113,3 +115,13 @@ def test_amplitudes_go_on_from_those_that_are_seen(law: Kirchhoff) -> None:
     assert not plain[~seen].any()
     assert np.abs(np.diff(goes_on, 2)).max() < 1e-3 * np.abs(goes_on).max()
     assert not CoherentKirchhoff(law, True).amplitude(-incident, scattered, patch, wavenumber).any()
+
+
+@pytest.mark.parametrize(
+    "law", [MirrorLobe(reflectivity=0.5, diffuse=0.2), Kirchhoff(diffuse=0.2), Kirchhoff(diffuse=0.2, roughness=1e-3)]
+)
+def test_facets_with_a_diffuse_floor_are_heard_where_the_centre_does_not_see_them(law: MirrorLobe | Kirchhoff) -> None:
+    found = traced(law, PLACE, ARRAY)
+    for sensor in FAR:
+        seen = ~found.hidden(ARRAY.count)[:, sensor]
+        assert set(found.facet[seen]) == set(alone(law, int(sensor)).facet)

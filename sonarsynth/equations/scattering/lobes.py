@@ -54,7 +54,8 @@ def lobe_amplitude(
     beyond: bool = False,
 ) -> Floats:
     """Amplitude sqrt(area (share sigma0 + albedo/pi cos_i cos_s)) (...) in m of facets lit and seen, 0 of others;
-    `beyond` that, it goes on where they are lit and not seen.
+    `beyond` that, it goes on where they are lit and not seen, as the root of |...|: with nothing at the array centre
+    it could not be followed to hydrophones that see them.
 
     Unit vectors (..., xyz) and area (...) m2 broadcast; slope as for `slope_lobe`, albedo as for `lambert`.
     """

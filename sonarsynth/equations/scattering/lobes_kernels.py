@@ -33,7 +33,7 @@ def amplitudes(
     incident: Floats, scattered: Floats, normal: Floats, area: Floats, slope: float, share: float, albedo: float,
     beyond: bool, out: Floats,
 ) -> None:  # fmt: skip
-    """sqrt(area (share sigma0 + albedo/pi cos cos)) where lit and seen, or `beyond` that lit alone, of vectors (row,
+    """sqrt(area |share sigma0 + albedo/pi cos cos|) where lit and seen, or `beyond` that lit alone, of vectors (row,
     column, xyz) into out."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
@@ -43,4 +43,4 @@ def amplitudes(
             out[i, j] = 0.0
             if inward > 0.0 and (outward > 0.0 or beyond):
                 power = share * slope_lobe(a, b, n, slope) + albedo / math.pi * inward * outward
-                out[i, j] = math.sqrt(area[i, j] * max(power, 0.0))
+                out[i, j] = math.sqrt(area[i, j] * abs(power))
