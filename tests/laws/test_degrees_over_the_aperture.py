@@ -90,7 +90,7 @@ def test_fainter_echoes_are_kept_before_the_array_is_cut(monkeypatch: pytest.Mon
         def own_views(self) -> float:
             return 0.0
 
-    monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index: Measured()))
+    monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index, **how: Measured()))
     plan = planning.plan(reading.recipe_of(reading.read(TANK, ["accuracy.signal=1e-3"])), products=())
     cut = choosing._subarrays(plan, [0])
     assert (cut.parts, cut.faint) == (1, choosing.FAINTER) and cut.error < 3e-4
@@ -109,6 +109,6 @@ def test_occlusion_that_matters_where_it_was_measured_is_followed_where_it_was_n
         def own_views(self) -> float:
             return 0.0
 
-    monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index: Measured()))
+    monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index, **how: Measured()))
     plan = planning.plan(reading.recipe_of(reading.read(TANK, [f"repeats={sequences}"])), products=())
     assert choosing._subarrays(plan, [0]).occlusion == occlusion
