@@ -53,7 +53,7 @@ def test_beams_of_a_lattice_equal_direct_sums(array, focus):
         exact = np.einsum("qf,bqf->bf", spectra[live].astype(complex), phasor) / len(live)
         beams = lattice_beams(spectra, frequencies, heard, u, focus)
         assert beams.shape == (9, bins)
-        error = max(2e-6, 5e-8 * max(heard.columns, heard.rows))
+        error = max(3e-6, 7e-8 * max(heard.columns, heard.rows))
         np.testing.assert_allclose(beams, exact, atol=error * np.abs(exact).max())
 
 
