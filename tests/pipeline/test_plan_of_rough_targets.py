@@ -15,7 +15,7 @@ SMOOTH, ROUGH = "{kind: kirchhoff}", "{kind: kirchhoff, roughness: 2 mm, slope: 
     ("law", "signal", "parts"),
     [
         (ROUGH, 1e-2, (1, "centre")),
-        pytest.param(ROUGH, 1e-3, (4, "sensors"), marks=pytest.mark.long),
+        pytest.param(ROUGH, 1e-3, (8, "sensors"), marks=pytest.mark.long),
         pytest.param(SMOOTH, 1e-3, (1, "sensors"), marks=pytest.mark.long),
     ],
 )
