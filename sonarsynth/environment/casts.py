@@ -59,12 +59,15 @@ def profile_of(sound_speed: SoundSpeed) -> Profile:
     return _profile_of(sound_speed, None)
 
 
-@lru_cache(maxsize=64)
 def profile_above(sound_speed: SoundSpeed, bottom: float) -> Profile:
-    """The same where a bottom (m) ends the water: formulas go on to depths and speeds that no water has. A measured
-    profile keeps all of its nodes."""
-    profile = profile_of(sound_speed)
-    if sound_speed.measured or profile.depth[-1] <= bottom:
+    """As `profile_of`, of water that a bottom (m) ends: no sound goes to nodes below, and formulas go on to depths and
+    speeds that no water has."""
+    return _above(profile_of(sound_speed), bottom)
+
+
+@lru_cache(maxsize=64)
+def _above(profile: Profile, bottom: float) -> Profile:
+    if profile.depth[-1] <= bottom:
         return profile
     count = int(np.searchsorted(profile.depth, bottom, side="left"))
     last = profile.speed[count] if profile.depth[count] == bottom else profile.at(bottom)

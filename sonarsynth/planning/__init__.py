@@ -12,7 +12,7 @@ from sonarsynth.planning.choosing import choose
 from sonarsynth.planning.costs import machine_factor, stages
 from sonarsynth.planning.listening_windows import frame_start, listening_windows
 from sonarsynth.planning.measured.path_counts import room_for_paths
-from sonarsynth.planning.measured.ray_bending import above_bottom, propagation
+from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, behind_baffle, context_of, receiver_of, survey_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene, check_alike, sample_frames
 from sonarsynth.planning.notes.omissions import left_out
@@ -102,7 +102,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
     windows = listening_windows(recipe, looks)
     check_windows(scene, windows)
     sizes = _sizes(recipe, windows)
-    resolved = Plan(recipe, products, above_bottom(scene, profile), paths, windows, sizes=sizes)
+    resolved = Plan(recipe, products, profile, paths, windows, sizes=sizes)
     resolved = choose(resolved, looks) if choices is None else replace(resolved, choices=choices)
     if "paths" in products:
         resolved = replace(resolved, sizes=sizes | {"path": room_for_paths(resolved, looks)})

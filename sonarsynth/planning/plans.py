@@ -18,7 +18,7 @@ from sonarsynth.planning.choices import Choices
 from sonarsynth.planning.measured.absorption_error import StraightPaths, mean_absorption, passed_by, shape_error
 from sonarsynth.planning.measured.chorus_reach import band_frequencies, chorus_reach
 from sonarsynth.planning.measured.distant_chorus import DistantChorus, distant_chorus
-from sonarsynth.planning.measured.ray_bending import above_bottom, propagation
+from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
 from sonarsynth.planning.plan_tables import Omission, Stage, as_html, as_text
 from sonarsynth.propagation import Propagation
@@ -267,4 +267,4 @@ def _of_sequence(plan: Plan, sequence: int) -> Plan:
         first, last = plan.recipe.first_frame(sequence), plan.recipe.first_frame(sequence + 1) - 1
         ends = (plan.recipe.frame(first)[1], plan.recipe.frame(last)[1])
     paths = propagation(scene, profile, ends, plan.recipe.accuracy.signal)
-    return replace(plan, sequence=sequence, profile=above_bottom(scene, profile), propagation=paths)
+    return replace(plan, sequence=sequence, profile=profile, propagation=paths)

@@ -1,4 +1,4 @@
-"""Nodes of a measured profile below the bottom are left out: no ray is there."""
+"""Nodes of a profile below the bottom are left out, and the last is on it: no ray is below."""
 
 from __future__ import annotations
 
@@ -30,6 +30,6 @@ def test_what_is_below_the_bottom_needs_no_nodes(tmp_path):
     plan = ss.plan(ss.load(tmp_path / "box.yaml"), products=["signals"])
     whole = profile_of(plan.scene.world.environment.sound_speed)
     assert len(whole.depth) == 6
-    np.testing.assert_array_equal(plan.profile.depth, whole.depth[:4])
-    np.testing.assert_array_equal(plan.profile.speed, whole.speed[:4])
+    np.testing.assert_array_equal(plan.profile.depth, [*whole.depth[:3], 60.0])
+    np.testing.assert_array_equal(plan.profile.speed, [*whole.speed[:3], whole.at(60.0)])
     assert [row.why for row in plan.left_out if "nodes" in row.what] == ["2 of 6: no sound goes there"]

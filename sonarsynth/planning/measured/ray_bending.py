@@ -58,15 +58,6 @@ def bending_error(model: Propagation, scene: Scene, profile: Profile, frames: It
     return worst
 
 
-def above_bottom(scene: Scene, profile: Profile) -> Profile:
-    """A measured profile down to the first node at or below the bottom; any other as it is."""
-    bottom, count = scene.world.environment.depth, len(profile.depth)
-    first = int(np.searchsorted(profile.depth, bottom, side="left")) + 1
-    if not scene.world.environment.sound_speed.measured or first >= count or bottom < profile.depth[0]:
-        return profile
-    return Profile(profile.depth[:first], profile.speed[:first], profile.notes)
-
-
 def ways(frame: Frame, bottom: float) -> tuple[Floats, Floats]:
     """Starts and ends (pair, xyz) from each snap to `around` bodies and scatterers, from there to the array, and
     straight in."""

@@ -145,7 +145,7 @@ def _refraction_bound(plan: Plan, frame: Frame) -> str:
 
 
 def _below_bottom(plan: Plan) -> list[Omission]:
-    """Nodes of a measured profile that are not needed."""
+    """Nodes of a profile that are not needed."""
     left = len(profile_of(plan.scene.world.environment.sound_speed).depth) - len(plan.profile.depth)
     why = f"{left} of {left + len(plan.profile.depth)}: no sound goes there"
     return [Omission("nodes of the sound speed below the bottom", why, "0")] if left else []

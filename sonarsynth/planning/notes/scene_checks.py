@@ -48,14 +48,14 @@ STEEPEST = 1e6
 
 
 def read_inputs(scene: Scene) -> Profile:
-    """Read cast, tracks and meshes, so that a missing or broken file is known before anything is computed."""
+    """Read cast, tracks and meshes, so that a missing or broken file is known before anything is computed; the sound
+    speed of the water down to the bottom."""
     world = ("scene", "world")
     try:
         profile = profile_of(scene.world.environment.sound_speed)
     except (ValueError, OSError, ImportError) as error:
         raise FieldError((*world, "environment", "sound_speed"), str(error)) from None
     _check_profile(scene, profile)
-    profile = _water(scene)
     check_noises(scene)
     check_tracks(scene)
     for i, (target, law) in enumerate(zip(scene.world.targets, scene.laws, strict=True)):
@@ -70,10 +70,11 @@ def read_inputs(scene: Scene) -> Profile:
         elements(scene.sonar.array)
     except ValueError as error:
         raise FieldError(("scene", "sonar", "array"), str(error)) from None
-    return profile
+    return _water(scene)
 
 
 def _water(scene: Scene) -> Profile:
+    """The sound speed down to the bottom."""
     environment = scene.world.environment
     return profile_above(environment.sound_speed, environment.depth)
 
