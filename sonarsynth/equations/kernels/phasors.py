@@ -13,7 +13,17 @@ import numpy.typing as npt
 
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats
-from sonarsynth.equations.kernels.lanes import LANES, load, load_complex, nearest, ramp, splat, store, store_complex
+from sonarsynth.equations.kernels.lanes import (
+    LANES,
+    WIDE,
+    load,
+    load_complex,
+    nearest,
+    ramp,
+    splat,
+    store,
+    store_complex,
+)
 
 # Series for +-1/4 turn, least squares weighted towards minimax; each coefficient was rounded to float32 before the next
 # were fitted, so that roundings make up for one another: 4e-9 of truncation, and no bias of the amplitude.
@@ -36,10 +46,14 @@ Spectra = npt.NDArray[np.complex64]
 
 ZERO, HALF, TWO = np.float32(0.0), np.float32(0.5), np.float32(2.0)
 
-GROUPS = 4
-"""Groups of lanes in a chunk: a phase is reduced once a chunk, then turned on from group to group (6e-8 each time)."""
+GROUPS = 4 if WIDE else 2
+"""Groups of lanes in a chunk: a phase is reduced once a chunk, then turned on from group to group (6e-8 each time). Of
+narrow lanes four would be no faster, and the beams of 64 hydrophones in a row err by a third more."""
 
 CHUNK = GROUPS * LANES
+
+STEERED = 4 * LANES
+"""Frequencies that `_steered_sums` sums at once."""
 
 
 @compiled(forceinline=True)
@@ -116,7 +130,7 @@ def _steered_sums(pairs: Any, delay: Any, weight: Any, frequency: float, spacing
     for beam in range(len(delay)):
         half_delay[:sensors] = 0.5 * delay[beam]
         group_steps(half_delay, spacing, step_c, step_s)
-        for low in range(0, bins, CHUNK):
+        for low in range(0, bins, STEERED):
             r0 = i0 = r1 = i1 = r2 = i2 = r3 = i3 = zero
             for q in range(sensors):
                 c, s = phasors(delay[beam, q], frequency + low * spacing, spacing)
@@ -153,7 +167,7 @@ def steered_sums(spectra: Spectra, delay: Floats, weight: Floats, frequency: flo
     """
     live = np.flatnonzero(weight)
     bins = spectra.shape[1]
-    padded_spectra = padded_bins(spectra[live], len(live), CHUNK)
+    padded_spectra = padded_bins(spectra[live], len(live), STEERED)
     beams = np.empty((len(delay), padded_spectra.shape[1]), np.complex64)
     _steered_sums(
         padded_spectra.view(np.float32).ravel(),

@@ -45,7 +45,7 @@ def _seeds(c: Any, s: Any, odd: bool) -> Any:
 
 
 @compiled(forceinline=True)
-def _sums_of_two(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, t: Any) -> Any:
+def sums_of_two(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, t: Any) -> Any:
     """As `term_sums`: twenty multiply-adds a term and nothing else, in 26 registers."""
     c, c_, s, s_, p = _seeds(c, s, odd)
     d, d_, t, t_, q = _seeds(d, t, odd)
@@ -74,7 +74,7 @@ def _sums_of_two(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d
 
 
 @compiled(forceinline=True)
-def _sums_of_one(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any) -> Any:
+def sums_of_one(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any) -> Any:
     """The sums of one direction, in 14 registers: where there are sixteen, half of 26 would be kept in memory."""
     c, c_, s, s_, p = _seeds(c, s, odd)
     a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = splat(ZERO)
@@ -98,8 +98,8 @@ def term_sums(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: A
     The terms lie at terms[start : stop : TERM].
     """
     if WIDE:
-        return _sums_of_two(terms, start, stop, odd, c, s, d, t)
-    return _sums_of_one(terms, start, stop, odd, c, s), _sums_of_one(terms, start, stop, odd, d, t)
+        return sums_of_two(terms, start, stop, odd, c, s, d, t)
+    return sums_of_one(terms, start, stop, odd, c, s), sums_of_one(terms, start, stop, odd, d, t)
 
 
 @compiled(forceinline=True)
