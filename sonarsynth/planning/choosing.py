@@ -32,9 +32,11 @@ from sonarsynth.tracing.occlusion.sensor_occlusion import rim
 
 FAINT, SYNTHESIS, EXPANSION = 0.1, 0.4, 0.5
 """Shares of the square of the error allowed to signals: of paths left out, of the synthesis, of expansions."""
-HEARD_AT, FEW = 6, 24
-"""Hydrophones spread through the array that are traced by themselves to measure what expansions err by, and, in one
-frame, those farthest out, where that is most; and how many are so few that all are."""
+HEARD_AT = 6
+"""Hydrophones spread through the array that are traced by themselves to measure what expansions err by; in one frame
+those farthest out as well, where that is most."""
+SMALL_ARRAY = 24
+"""Hydrophones of an array all of which are, in that frame."""
 SEEN_AT = 64
 """Hydrophones, at most, whose views of the targets are compared with that of the middle of the array."""
 MEASURED = 3
@@ -154,7 +156,7 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
     if physics.subarrays == "sensors" or (physics.subarrays == "auto" and plan.recipe.accuracy.exact):
         return _ArrayModel(count, "centre", 0.0)
     middle = len(indices) // 2  # of these frames: the one that is looked at most closely
-    measures = [PerSensorReference.of(plan, index, everywhere=n == middle) for n, index in enumerate(indices)]
+    measures = [PerSensorReference.of(plan, index, outermost=n == middle) for n, index in enumerate(indices)]
     allowed = np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
     fixed = physics.subarrays != "auto"
     first = min(physics.subarrays, count) if physics.subarrays != "auto" else 1
@@ -221,13 +223,15 @@ class PerSensorReference:
     exact: tuple[Floats, Floats]  # echoes, and direct arrivals (heard, sample) Pa
 
     @staticmethod
-    def of(plan: Plan, index: int, *, everywhere: bool = False) -> PerSensorReference:
-        """Trace a frame to some hydrophones one by one, and synthesise what each hears; everywhere: to those farthest
-        out, too, or to all of a few."""
+    def of(plan: Plan, index: int, *, outermost: bool = False) -> PerSensorReference:
+        """Trace a frame to some hydrophones one by one, and synthesise what each hears; outermost: to those farthest
+        out as well, or to all of a small array."""
         plan = plan.at(index)
         frame = plan.recipe.frame(index)[1]
-        large = _facets(plan.scene) > LARGE_MESH_FACETS
-        sensor = _outermost(plan.elements) if everywhere and not large else heard_at(plan.elements)[:: 1 + large]
+        if _facets(plan.scene) > LARGE_MESH_FACETS:
+            sensor = heard_at(plan.elements, HEARD_AT // 2)
+        else:
+            sensor = _with_outermost(plan.elements) if outermost else heard_at(plan.elements)
         every = replace(plan, choices=replace(plan.choices, negligible=FAINTER_MEASURED * plan.choices.negligible))
         rows = []
         for channel in sensor:
@@ -279,10 +283,10 @@ def heard_at(elements: Elements, most: int = HEARD_AT) -> Ints:
     return np.unique(live[np.floor(np.mod((np.arange(count) + 0.5) * 0.6180339887498949, 1.0) * len(live)).astype(int)])
 
 
-def _outermost(elements: Elements) -> Ints:
-    """Those of `heard_at` and the live hydrophones that are farthest out, ascending; all, where there are few."""
+def _with_outermost(elements: Elements) -> Ints:
+    """Those of `heard_at` and the live hydrophones that are farthest out, ascending; all of a small array."""
     live = np.flatnonzero(elements.gain)
-    return live if len(live) <= FEW else np.union1d(heard_at(elements), np.intersect1d(rim(elements), live))
+    return live if len(live) <= SMALL_ARRAY else np.union1d(heard_at(elements), np.intersect1d(rim(elements), live))
 
 
 def _measuring(plan: Plan) -> Synthesis:

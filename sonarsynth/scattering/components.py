@@ -180,7 +180,8 @@ class DiffuseKirchhoff(Component):
         returned = np.where(lit, np.abs(reflection(self.law, incident, scattered)) ** 2, 0.0)
         lobe = slope_lobe(incident, scattered, patch.normal, self.law.slope) if self.law.roughness > 0 else 0.0
         floor = lambert(incident, scattered, patch.normal, self.law.diffuse)
-        floor -= lambert(incident, -scattered, patch.normal, self.law.diffuse)
+        if self.beyond:
+            floor -= lambert(incident, -scattered, patch.normal, self.law.diffuse)
         return np.asarray(returned * (1.0 - self.law.diffuse) * lobe), np.asarray(returned * floor)
 
     def amplitude(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:

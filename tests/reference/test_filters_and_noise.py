@@ -148,9 +148,9 @@ def test_normal_numbers_are_those_of_box_and_muller_in_double_precision() -> Non
     power = np.linspace(0.5, 2.0, bits.size // 2).astype(np.float32)
     pairs = np.empty(bits.size, np.float32)
     box_muller(power, bits, pairs)
-    angle, even = 2.0 * np.pi * bits[::2] / 2.0**32, (bits[1::2] + 0.5) / 2.0**32
-    exact = np.sqrt(-2.0 * power * np.log(even)) * np.exp(1j * angle)
+    angle, uniform = 2.0 * np.pi * bits[::2] / 2.0**32, (bits[1::2] + 0.5) / 2.0**32
+    exact = np.sqrt(-2.0 * power * np.log(uniform)) * np.exp(1j * angle)
     # a number near one is known to half of the last of 24 bits, its logarithm to as much: sqrt(2 power 2^-24)
-    assert np.abs(pairs[::2] + 1j * pairs[1::2] - exact)[even < 0.999].max() < 1e-5
+    assert np.abs(pairs[::2] + 1j * pairs[1::2] - exact)[uniform < 0.999].max() < 1e-5
     assert np.abs(pairs[::2] + 1j * pairs[1::2] - exact).max() < np.sqrt(2.0 * 2.0 * 2.0**-24)
     assert abs(pairs[:2] - [np.sqrt(2.0 * 0.5 * 33.0 * np.log(2.0)), 0.0]).max() < 1e-5

@@ -29,7 +29,8 @@ SQRT_HALF, MANTISSA = np.int32(0x3F3504F3), np.int32(23)
 
 
 def complex_normals(power: npt.NDArray[np.float32], random: np.random.Generator) -> npt.NDArray[np.complex64]:
-    """Complex normal numbers (...) of mean 0; power (...): variance of the real part, and of the imaginary part."""
+    """Complex normal numbers (...) of mean 0; power (...), in their unit squared: variance of the real part, and of the
+    imaginary part."""
     bits = random.integers(0, 1 << 64, power.shape, np.uint64).view(np.uint32)
     wave = np.empty(power.shape, np.complex64)
     box_muller(power.ravel(), bits.ravel(), wave.view(np.float32).ravel())
@@ -38,12 +39,12 @@ def complex_normals(power: npt.NDArray[np.float32], random: np.random.Generator)
 
 @compiled(fastmath={"contract"})
 def box_muller(power: Any, bits: Any, pairs: Any) -> None:
-    """Fill pairs (2 number,) float32 with normal numbers of variances (number,), from random bits (2 number,) uint32:
-    of a pair, its angle and its radius."""
+    """Fill pairs (2 number,) float32 with normal numbers of variances (number,) float32, from random bits (2
+    number,) uint32: of each pair its angle, then its radius."""
     for i in range(len(power)):
-        even = np.float32((np.float32(bits[2 * i + 1]) + HALF) * UNIT)
-        exponent = (even.view(np.int32) - SQRT_HALF) >> MANTISSA
-        x = np.int32(even.view(np.int32) - (exponent << MANTISSA)).view(np.float32) - ONE
+        uniform = np.float32((np.float32(bits[2 * i + 1]) + HALF) * UNIT)
+        exponent = (uniform.view(np.int32) - SQRT_HALF) >> MANTISSA
+        x = np.int32(uniform.view(np.int32) - (exponent << MANTISSA)).view(np.float32) - ONE
         tail = L3 + x * (L4 + x * (L5 + x * (L6 + x * (L7 + x * (L8 + x * (L9 + x * (L10 + x * L11)))))))
         log = x * (x * (x * tail - HALF)) + x + np.float32(exponent) * LN_2
         radius = np.sqrt(-TWO * power[i] * log)

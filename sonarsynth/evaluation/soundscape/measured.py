@@ -38,7 +38,7 @@ class Figures:
     octaves: Floats  # (band,) dB re 1 Pa2/Hz: of the mean density of 1/3 octaves
     rates: Floats  # (level,) 1/s, the mean over hydrophones
     exceedance: Floats  # (tail,) probability
-    stable: Floats  # exponent alpha of a stable law, and its scale in dB re 1 Pa
+    stable: Floats  # (2,) exponent alpha of a stable law, and its scale in dB re 1 Pa
     moments: Floats  # (2,) root mean square in dB re 1 Pa, excess kurtosis
     percentiles: Floats  # (percent,) dB re 1 Pa: levels of 1 ms
     coherence: Floats  # (frequency, pair)

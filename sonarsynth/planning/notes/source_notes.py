@@ -29,7 +29,7 @@ from sonarsynth.signals.isolated_paths import whole_spectrum
 from sonarsynth.sources import snap_pulses
 from sonarsynth.tracing.arrivals import trace
 
-FAINT = -20.0
+OUT_OF_BAND = -20.0
 """Peak (dB) of a pulse in the band over that of all of it, under which a source is out of it; snaps have -7."""
 HEARD = 8
 """Frames that are heard, at most, to see whether snaps clip."""
@@ -90,7 +90,7 @@ def out_of_band(scene: Scene) -> list[str]:
         pressure = irfft(np.where((f >= sonar.band.low) & (f <= sonar.band.high), spectrum, 0.0)) * 2.0 * f[-1]
         peak = shape.model.pulse(0.0, float(f[-1])).peak
         over = 20.0 * np.log10(max(float(np.abs(pressure).max()) / peak, 1e-10)) if np.isfinite(peak) else 0.0
-        if over < FAINT:
+        if over < OUT_OF_BAND:
             lines.append(
                 f"{source.name}: what its pulse has in the band of the sonar, {sonar.band.low / 1e3:g} to "
                 f"{sonar.band.high / 1e3:g} kHz, is {-over:.0f} dB under its source level: its echoes are faint or not "
