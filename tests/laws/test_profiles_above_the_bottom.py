@@ -33,3 +33,10 @@ def test_what_is_below_the_bottom_needs_no_nodes(tmp_path):
     np.testing.assert_array_equal(plan.profile.depth, [*whole.depth[:3], 60.0])
     np.testing.assert_array_equal(plan.profile.speed, [*whole.speed[:3], whole.at(60.0)])
     assert [row.why for row in plan.left_out if "nodes" in row.what] == ["2 of 6: no sound goes there"]
+
+
+def test_a_cast_that_changes_is_read_again(tmp_path):
+    (tmp_path / "box.yaml").write_text(BOX)
+    for speed in (1500.0, 1510.0):
+        (tmp_path / "cast.csv").write_text(f"depth (m),sound speed (m/s)\n1,{speed}\n30,1505\n80,{speed + 2.0:.2f}\n")
+        assert ss.plan(ss.load(tmp_path / "box.yaml"), products=["signals"]).profile.speed[0] == speed
