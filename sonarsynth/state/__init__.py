@@ -128,8 +128,9 @@ class Tolerances:
     quadratic: float = 1e-4
     """Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree do."""
     shared: float = 1e-2
-    """What moves by less than this part of the radius of a body from one snap to another, and keeps as near to what
-    its velocity and spin say, in radians of the highest frequency, is traced for both together."""
+    """What moves by less than this part of the radius of a body from one snap to another, or turns by less than this
+    (rad) in the sight of snap and array from one family of rays to another, and keeps as near to what its velocity and
+    spin say, in radians of the highest frequency, is traced for both together."""
     occlusion: OcclusionPoint = "centre"
     """From where facets must be seen."""
     every: int = 1

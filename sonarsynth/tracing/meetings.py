@@ -2,8 +2,8 @@
 
 A body that moves is met elsewhere by each snap, and an array that moves hears the echoes of each body elsewhere. Snaps
 and bodies for which that is nearly the same are traced together; by what is left paths are carried (`tracing.doppler`).
-A body that turns shows another side to what comes later by surface and bottom, and an array that turns hears that as it
-stands by then: these families are traced with both as they have turned.
+What comes later by surface and bottom meets a body that has turned, or has gone on before others, and an array that has
+turned: where that shows or hides other facets, or moves them otherwise, these families are traced anew.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, depth
+from sonarsynth.conventions import Bools, Floats, depth
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation.images import lengths
@@ -56,6 +56,12 @@ class MeetingTimes:
     met: Floats  # (family, snap, owner) s
     arrival_time: Floats  # (family, family on, snap, owner) s
     direct_time: Floats  # (family, snap) s: when the array hears the snap itself
+    snaps: tuple[Emission, ...]
+    place: Floats  # (owner, xyz) m: middles, at the frame's time
+    velocity: Floats  # (owner, xyz) m/s
+    spin: Floats  # (owner, xyz) rad/s
+    radius: Floats  # (owner,) m
+    speed: float  # m/s, of sound
     bounces: int  # of a path, at most
     shared: float
     wavenumber: float  # rad/m at the highest frequency
@@ -80,18 +86,46 @@ class MeetingTimes:
         """Ways by which the sound of a snap meets an owner, and that the array, those together that meet both in about
         one attitude."""
         body = self.bodies[owner] if owner < len(self.bodies) else None
-        if self.sonar.straight and (body is None or body.track.straight):
-            return (None,)
         met, arrival_time = self.met[:, snap, owner], self.arrival_time[:, :, snap, owner]
+        if len(met) == 1:
+            return (None,)
+        between = self._between(snap, owner)
 
         def near(first: tuple[int, int], pair: tuple[int, int]) -> bool:
             heard = self._alike(self.sonar, float(arrival_time[first]), float(arrival_time[pair]), self.aperture)
             times = float(met[first[0]]), float(met[pair[0]])
-            return heard and (body is None or self._alike(body.track, *times, body.mesh.radius))
+            alike = heard and (body is None or self._alike(body.track, *times, body.mesh.radius))
+            return alike and self._in_sight(snap, owner, first, pair, between)
 
         order = [divmod(n, len(met)) for n in np.argsort(arrival_time, axis=None, kind="stable").tolist()]
         found = [tuple(sorted(of)) for of in groups(order, near) if not self.every.isdisjoint(of)]
         return tuple(found) if len(found) > 1 else (None,)
+
+    def _in_sight(self, snap: int, owner: int, first: tuple[int, int], pair: tuple[int, int], between: Bools) -> bool:
+        """Whether an owner that sound meets by other families is lit and seen from nearly the same sides then, and
+        hidden alike by bodies that may come between (body,)."""
+        met, heard = self.met[:, snap], self.arrival_time[:, :, snap, owner]
+        late, later = met[pair[0]] - met[first[0]], heard[pair] - heard[first]
+        gone, moved = self.velocity * late[:, None], self.sonar.velocity * later
+        way, way_on = met[pair[0], owner] - self.snaps[snap].time, heard[pair] - met[pair[0], owner]
+        past = np.linalg.norm(gone[owner]) / way, np.linalg.norm(gone[owner] - moved) / way_on
+        turned = max(past) / self.speed + np.linalg.norm(self.spin[owner]) * abs(late[owner])
+        beside = np.linalg.norm(gone - gone[owner], axis=1)[: len(between)]
+        return bool(turned <= self.shared and (beside <= self.shared * self.radius[: len(between)])[between].all())
+
+    def _between(self, snap: int, owner: int) -> Bools:
+        """(body,) which may stand in rays from a snap to an owner and on to the array: seen from above, where all
+        families are one line."""
+        level, found = (
+            (self.place + self.velocity * self.met[0, snap][:, None])[:, :2],
+            np.zeros(len(self.bodies), bool),
+        )
+        for end in (self.snaps[snap].position, self.sonar.pose.position):
+            line, beside = end[:2] - level[owner], level[: len(found)] - level[owner]
+            along = np.clip(beside @ line / max(line @ line, 1e-30), 0.0, 1.0)
+            apart = np.linalg.norm(beside - along[:, None] * line, axis=1)
+            found |= apart < self.radius[: len(found)] + self.radius[owner]
+        return found
 
     @property
     def every(self) -> frozenset[tuple[int, int]]:
@@ -174,24 +208,25 @@ def family_times(
     return np.array([meeting_times(tracks, snaps, family) for family in families])
 
 
-def meetings(context: FrameContext, sonar: Track, bounces: int, every: bool = False) -> MeetingTimes:
-    """By straight lines and, where anything turns or for `every` family of up to so many reflections, their images;
-    sonar: the track of the array."""
+def meetings(context: FrameContext, sonar: Track, bounces: int) -> MeetingTimes:
+    """By straight lines and their images of up to so many reflections; sonar: the track of the array."""
     receiver, bottom_depth, snaps = context.receiver, context.medium.depth, context.snaps
     speed = float(context.medium.profile.at(depth(sonar.pose.position)))
     tracks = [surface.track.part(surface.middle) for surface in context.scattering]
-    turns = not sonar.straight or any(not body.track.straight for body in context.bodies)
-    reflections = bounces if turns or every else 0
 
     def heard(position: Floats, sent: Floats) -> Floats:
-        return hearing_times(position, sent, sonar, bottom_depth, reflections, speed)
+        return hearing_times(position, sent, sonar, bottom_depth, bounces, speed)
 
-    met = family_times(tracks, snaps, bottom_depth, reflections, speed)
+    met = family_times(tracks, snaps, bottom_depth, bounces, speed)
     arrival_time = np.array([heard(positions(tracks, of), of) for of in met])
     direct = heard(np.array([snap.position for snap in snaps]), np.array([snap.time for snap in snaps]))
+    moving = [(track.pose.position, track.velocity, track.spin) for track in tracks]
+    place, velocity, spin = np.reshape(moving, (-1, 3, 3)).swapaxes(0, 1)
+    radius = np.array([surface.radius for surface in context.scattering])
     wavenumber, aperture = 2.0 * np.pi * receiver.band[1] / speed, receiver.elements.aperture
     shared = context.tolerances.shared
-    return MeetingTimes(context.bodies, sonar, met, arrival_time, direct, bounces, shared, wavenumber, aperture)
+    times, middles = (met, arrival_time, direct), (place, velocity, spin, radius)
+    return MeetingTimes(context.bodies, sonar, *times, snaps, *middles, speed, bounces, shared, wavenumber, aperture)
 
 
 def occasions(context: FrameContext, times: MeetingTimes) -> list[TracingGroup]:

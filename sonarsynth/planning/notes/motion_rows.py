@@ -60,7 +60,7 @@ def _carried(plan: Plan, frame: Frame) -> str:
     last does, and what comes from the far side of bodies: the rest of the phase, of families as loud as they are beside
     the direct one; and how far bodies are that hide others from where they are then."""
     context, speed = context_of(plan, frame), float(plan.profile.speed.min())
-    times, signal, off = meetings(context, frame.sonar_track, plan.propagation.bounces, every=True), 0.0, 0.0
+    times, signal, off = meetings(context, frame.sonar_track, plan.propagation.bounces), 0.0, 0.0
     for snap in range(len(context.snaps)):
         signal = max(signal, _rest_of_direct(times, context, snap), _rest_of_echoes(times, context, snap, speed))
         off = max(off, _hiding_bodies_off(times, context, snap, speed))
