@@ -55,6 +55,16 @@ def at_boundaries(
     )
 
 
+def along(
+    environment: Environment, profile: Profile, depth: Floats, direction: Floats, surface: Ints, bottom: Ints,
+    centre: float,
+) -> Reflections:  # fmt: skip
+    """Of so many reflections (path,) of rays that have directions (path, xyz) at depths (path,) m, by Snell's law."""
+    slowness = np.hypot(direction[:, 0], direction[:, 1]) / profile.at(depth)
+    over, under = (np.arccos(np.minimum(slowness * float(profile.at(z)), 1.0)) for z in (0.0, environment.depth))
+    return at_boundaries(environment, profile, over, surface, under, bottom, centre)
+
+
 def as_sign(phase: Floats) -> tuple[Floats, Floats]:
     """Sign (path,) and rest of phases (path,): 0 for whole multiples of pi, else the phase between -pi and pi."""
     if not phase.any():

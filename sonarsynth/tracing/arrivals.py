@@ -109,13 +109,14 @@ def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) 
     count = len(legs.row)
     over = aperture_paths(legs, np.zeros(count, int), array.bending, receiver, array.propagation)
     one, none, none_out = np.ones(count), np.full(count, NO_TARGET), TransmitPaths.none(count)
-    rows, (loud, turned) = np.arange(count), directed(snap, legs.departure)
+    rows = np.arange(count)
     gain, met = over.gain(rows), MotionTerms.direct(count, snap)
     if snap.directivity is not None:  # seen from the source, hydrophones are in other directions than the centre
         gain = gain * (snap.directivity(over.departure(rows)) / snap.directivity(legs.departure)[:, None])
     amplitude, error = fitted(array, gain, legs.spreading)
+    legs = legs if meeting is None else received(legs, met, meeting, medium, receiver.centre)
+    loud, turned = directed(snap, legs.departure)
     legs = legs.but(spreading=legs.spreading * loud, phase=legs.phase + turned)
-    legs = legs if meeting is None else received(legs, met, meeting, medium.profile)
     direct = assemble(
         legs, over.expansion.but(amplitude=amplitude), none_out, index, snap.time, path_loss(array, snap, legs),
         kind=Kind.DIRECT, target=none, facet=none, scattering=one, pulses=PulseResponse.plain(count),

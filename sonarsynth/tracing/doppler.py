@@ -9,18 +9,20 @@ m and h those of the poses that rays were traced between,
     m + tau_1 = t_s + T_out + (v.a/c) tau_1,    h + tau_2 = m + tau_1 + T_in - (v.d/c) tau_1 + (u.b/c) tau_2
 
 and each leg is longer by its curvature, as a straight one of its length is (`moving_ends`), so that times are exact in
-uniform water. Directions at facet and array, and spreading, are those of the lengthened leg, exact there as well. v is
-the velocity of the facet: its body may turn, by omega tau_1 till then, and with it all that its law asks for. The pulse
-is longer by dt_2/dt_s; of a source that moves at w by 1 - w.n/c times as much, n the direction in which the ray leaves
-it. Of direct sound the source is the facet. Each sensor meets the wavefront when it is there (`_over_aperture`). Left
-out in bent water: how much more or less than straight rays the rays turn and spread for the remainder v tau_1; and of
-the pulse's length, not of its delay, that what moves is seen from another side at each sensor, v/c of the angle that
-the array takes up there: parts of the array see it from their own.
+uniform water. Directions at facet and array, and spreading, are those of the lengthened leg, exact there as well; so
+are what surface and bottom reflect, and what a source sends into its beam. v is the velocity of the facet: its body may
+turn, by omega tau_1 till then, and with it all that its law asks for. The pulse is longer by dt_2/dt_s; of a source
+that moves at w by 1 - w.n/c times as much, n the direction in which the ray leaves it. Of direct sound the source is
+the facet. Each sensor meets the wavefront when it is there (`_over_aperture`). Left out in bent water: how much more or
+less than straight rays the rays turn and spread for the remainder v tau_1; and of the pulse's length, not of its delay,
+that what moves is seen from another side at each sensor, v/c of the angle that the array takes up there: parts of the
+array see it from their own.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -34,15 +36,19 @@ from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry import Pose, unit
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import ArrayExpansion, Arrivals
+from sonarsynth.propagation.reflections import along
 from sonarsynth.receiver import Elements
 from sonarsynth.scattering import Scatterers
-from sonarsynth.state import Emission
+from sonarsynth.state import Emission, Medium
 from sonarsynth.tracing.expansion.probe_sensors import probes, sphere
 from sonarsynth.tracing.receive_paths import ReceivePaths
 from sonarsynth.tracing.transmit_paths import TransmitPaths
 
 Ways = tuple[tuple[int, int], ...]
 """Families (`images.family`) by which sound comes to what scatters, each with one by which it goes on to the array."""
+Bounced = TypeVar("Bounced", TransmitPaths, ReceivePaths)
+SAME = 1e-6
+"""rad: directions that differ by less are reflected alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +124,22 @@ def meets(
     return out.but(arrival=arrival, length=length, travel_time=travel_time, spreading=spreading), late
 
 
+def bounced_anew(paths: Bounced, z: Floats, before: Floats, after: Floats, medium: Medium, centre: float) -> Bounced:
+    """Paths of which surface and bottom reflect what has another direction (path, xyz) at depths z (path,) m than was
+    traced; centre (Hz): of the band."""
+    rows = np.flatnonzero(paths.bounces)
+    rows = rows[(np.abs(after[rows] - before[rows]) > SAME).any(axis=1)]
+    if not len(rows):
+        return paths
+    counts = paths.surface[rows], paths.bottom[rows], centre
+    old, new = (along(medium.environment, medium.profile, z[rows], of[rows], *counts) for of in (before, after))
+    boundary, phase, blur = paths.boundary.copy(), paths.phase.copy(), paths.delay_std.copy()
+    boundary[rows] *= new.modulus / np.maximum(old.modulus, 1e-300)
+    phase[rows] += new.phase - old.phase
+    blur[rows] = np.sqrt(np.maximum(blur[rows] ** 2 + (new.delay_std**2 - old.delay_std**2), 0.0))
+    return paths.but(boundary=boundary, phase=phase, delay_std=blur)
+
+
 def mirrored(velocity: Floats, bounces: Ints) -> Floats:
     """Velocities (path, xyz) of images after so many reflections (path,) from level surfaces."""
     image = velocity.copy()
@@ -136,22 +158,25 @@ def met_paths(
     return MotionTerms(met, late, velocity, spin, apart)
 
 
-def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, profile: Profile) -> ReceivePaths:
-    """Legs from facets that move to an array that does: from where they are met to where they are heard."""
+def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, medium: Medium, centre: float) -> ReceivePaths:
+    """Legs from facets that move to an array that does: from where they are met to where they are heard; centre (Hz)
+    of the band."""
+    profile = medium.profile
     pose, u = meeting.sonar.pose, meeting.sonar.velocity
     c_facet, c_array = profile.at(depth(legs.point)), float(profile.at(depth(pose.position)))
     moved, begun = of.velocity * of.late[:, None], of.met + of.late
     gone = begun - meeting.arrival_time + legs.travel_time - dot(moved, legs.departure) / c_facet
     source = pose.turn_to_world(legs.radius[:, None] * legs.direction)
     late, apparent = moving_ends.hear(legs.length, legs.arrival, source, gone, u, c_array, moved, legs.bounces)
-    radius = np.sqrt(dot(apparent, apparent))
+    radius, departure = np.sqrt(dot(apparent, apparent)), of.departure(legs.length, legs.departure)
+    legs = bounced_anew(legs, depth(legs.point), legs.departure, departure, medium, centre)
     arrival = -apparent / radius[:, None]
     direction = -pose.turn_to_body(arrival)
     if meeting.sonar.spin.any():
         direction = direction - np.cross(pose.turn_to_body(meeting.sonar.spin), direction) * late[:, None]
         direction /= np.sqrt(dot(direction, direction))[:, None]
     return legs.but(
-        point=legs.point + moved, departure=of.departure(legs.length, legs.departure), arrival=arrival,
+        point=legs.point + moved, departure=departure, arrival=arrival,
         direction=direction, radius=radius, length=legs.length + (radius - legs.radius),
         spreading=legs.spreading * (legs.radius / radius), travel_time=meeting.arrival_time - begun + late,
     )  # fmt: skip

@@ -10,6 +10,7 @@ import numpy as np
 from sonarsynth.columns import alike, picked, rows_of
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.equations.kernels.unit_vectors import to_moved_images
+from sonarsynth.geometry import unit
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind
@@ -17,7 +18,16 @@ from sonarsynth.propagation.reflections import reflections
 from sonarsynth.scattering import Component
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Emission
-from sonarsynth.tracing.doppler import MotionTerms, apply_doppler, meets, met_paths, received, velocities
+from sonarsynth.tracing.doppler import (
+    MotionTerms,
+    apply_doppler,
+    bounced_anew,
+    meets,
+    met_paths,
+    mirrored,
+    received,
+    velocities,
+)
 from sonarsynth.tracing.echo_batches import PRUNE_MARGIN, EchoBatch, echo_batches, in_band
 from sonarsynth.tracing.expansion.amplitude_polynomials import variations
 from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
@@ -138,7 +148,7 @@ def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...
         array, out, legs, meeting = block.array, block.out, block.legs, block.array.meeting
         assert legs is not None
         if meeting is not None and block.carried is not None:
-            legs = received(legs, block.carried, meeting, profile)
+            legs = received(legs, block.carried, meeting, array.context.medium, receiver.centre)
         kinds, target, facet = array.met(out.facet, kind)
         amplitude, sign = _columns(block.groups, "amplitude", "sign")
         scattered, loss = sign * amplitude, path_loss(array, snap, legs, out)
@@ -208,7 +218,12 @@ def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -
     owner, point = facets.owner[out.facet], rows_of(facets.point, out.facet)
     velocity, spin = velocities(array.context.scattering, owner, point)
     met = meeting.met[owner]
-    met_out, late = meets(out, met, velocity, snap.time, array.context.medium.profile.at(depth(point)))
+    medium, z = array.context.medium, depth(point)
+    met_out, late = meets(out, met, velocity, snap.time, medium.profile.at(z))
+    met_out = bounced_anew(met_out, z, out.arrival, met_out.arrival, medium, array.context.receiver.centre)
+    if snap.directivity is not None or snap.velocity.any():
+        departure = unit(out.departure + mirrored(met_out.arrival - out.arrival, out.bounces))
+        met_out = met_out.leaving(departure, snap, float(medium.profile.at(depth(snap.position))))
     return met_out, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
 
 

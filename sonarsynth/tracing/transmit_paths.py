@@ -26,6 +26,7 @@ class TransmitPaths(Columns):
     """Ways from a snap to facets."""
 
     facet: Ints  # (way,) which facet
+    departure: Floats  # (way, xyz) world
     arrival: Floats  # (way, xyz) world
     travel_time: Floats  # (way,) s
     length: Floats  # (way,) m
@@ -45,17 +46,24 @@ class TransmitPaths(Columns):
         loud, turned = directed(snap, paths.departure)
         approach = paths.departure @ snap.velocity / speed if snap.velocity.any() else alike(0.0, len(facet))
         return TransmitPaths(
-            facet, paths.arrival, paths.travel_time, paths.length, paths.spreading * loud, paths.surface, paths.bottom,
-            paths.turning, paths.caustics, bounced.modulus, bounced.phase + turned if np.any(turned) else bounced.phase,
-            bounced.delay_std, approach,
+            facet, paths.departure, paths.arrival, paths.travel_time, paths.length, paths.spreading * loud,
+            paths.surface, paths.bottom, paths.turning, paths.caustics, bounced.modulus,
+            bounced.phase + turned if np.any(turned) else bounced.phase, bounced.delay_std, approach,
         )  # fmt: skip
+
+    def leaving(self, departure: Floats, snap: Emission, speed: float) -> TransmitPaths:
+        """The ways, where they leave their snap in other directions (way, xyz), world; speed of sound there, m/s."""
+        approach = self.approach + (departure - self.departure) @ snap.velocity / speed
+        (loud, turned), (before, first) = (directed(snap, towards) for towards in (departure, self.departure))
+        spreading = self.spreading * (loud / np.maximum(before, 1e-300))
+        return self.but(departure=departure, spreading=spreading, phase=self.phase + turned - first, approach=approach)
 
     @staticmethod
     def none(count: int) -> TransmitPaths:
         """No way at all, of paths that come straight from the snap; its spreading is that of the leg."""
-        zero, none = np.zeros(count), np.zeros(count, int)
+        zero, none, nowhere = np.zeros(count), np.zeros(count, int), np.zeros((count, 3))
         return TransmitPaths(
-            none, np.zeros((count, 3)), zero, zero, zero + 1.0, none, none, none, none, zero + 1.0, zero, zero, zero
+            none, nowhere, nowhere, zero, zero, zero + 1.0, none, none, none, none, zero + 1.0, zero, zero, zero
         )
 
     def merged(self) -> TransmitPaths:
