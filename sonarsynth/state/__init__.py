@@ -154,14 +154,17 @@ class FrameContext(WorldState):
         return (*of_bodies, *self.scatterers)
 
 
-def meeting_times(tracks: Sequence[Track], snaps: tuple[Emission, ...], travel_time: TravelTime) -> Floats:
-    """When the sound of each snap meets what is on each track (snap, track), s on the clock of the frame.
+def meeting_times(
+    tracks: Sequence[Track], snaps: tuple[Emission, ...], travel_time: TravelTime, ways: tuple[int, ...] = ()
+) -> Floats:
+    """When the sound of each snap meets what is on each track (*ways, snap, track), s on the clock of the frame.
 
-    tracks: from the instant of the frame on; travel_time: of direct paths. Solves t = t_snap + T(x(t)), x the track, by
-    iteration; NaN where no sound arrives.
+    tracks: from the instant of the frame on; travel_time: of direct paths, or of so many ways, each on pairs of its
+    own. Solves t = t_snap + T(x(t)), x the track, by iteration; NaN where no sound arrives.
     """
-    emitted = np.array([snap.time for snap in snaps])[:, None] + np.zeros((len(snaps), len(tracks)))
-    start = np.array([snap.position for snap in snaps]).reshape(-1, 1, 3) + np.zeros((len(tracks), 3))
+    shape = (*ways, len(snaps), len(tracks))
+    emitted = np.broadcast_to(np.array([snap.time for snap in snaps])[:, None], shape)
+    start = np.broadcast_to(np.array([snap.position for snap in snaps]).reshape(-1, 1, 3), (*shape, 3))
     met, arrives = emitted, np.ones(emitted.shape, bool)
     for _ in range(MEETINGS if emitted.size else 0):
         arrival = emitted + travel_time(start.reshape(-1, 3), positions(tracks, met).reshape(-1, 3)).reshape(met.shape)
@@ -174,10 +177,10 @@ def meeting_times(tracks: Sequence[Track], snaps: tuple[Emission, ...], travel_t
 
 
 def positions(tracks: Sequence[Track], times: Floats) -> Floats:
-    """Where tracks are (snap, track, xyz) m, world, at times (snap, track) s of the frame; NaN where these are."""
+    """Where tracks are (..., track, xyz) m, world, at times (..., track) s of the frame; NaN where these are."""
     places, unknown = np.empty((*times.shape, 3)), np.isnan(times)
     known = np.where(unknown, 0.0, times)
     for number, track in enumerate(tracks):
-        places[:, number] = track.positions(known[:, number])
+        places[..., number, :] = track.positions(known[..., number])
     places[unknown] = np.nan
     return places

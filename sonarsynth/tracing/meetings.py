@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
@@ -19,6 +19,7 @@ from sonarsynth.conventions import Bools, Floats, depth
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation.images import lengths
+from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Emission, FrameContext, meeting_times, positions
 from sonarsynth.tracing.doppler import Meeting, Ways
 
@@ -57,10 +58,7 @@ class MeetingTimes:
     arrival_time: Floats  # (family, family on, snap, owner) s
     direct_time: Floats  # (family, snap) s: when the array hears the snap itself
     snaps: tuple[Emission, ...]
-    place: Floats  # (owner, xyz) m: middles, at the frame's time
-    velocity: Floats  # (owner, xyz) m/s
-    spin: Floats  # (owner, xyz) rad/s
-    radius: Floats  # (owner,) m
+    owners: tuple[Scatterers, ...]
     speed: float  # m/s, of sound
     bounces: int  # of a path, at most
     shared: float
@@ -106,26 +104,34 @@ class MeetingTimes:
         hidden alike by bodies that may come between (body,)."""
         met, heard = self.met[:, snap], self.arrival_time[:, :, snap, owner]
         late, later = met[pair[0]] - met[first[0]], heard[pair] - heard[first]
-        gone, moved = self.velocity * late[:, None], self.sonar.velocity * later
+        _, velocity, spin, radius = self._middles
+        gone, moved = velocity * late[:, None], self.sonar.velocity * later
         way, way_on = met[pair[0], owner] - self.snaps[snap].time, heard[pair] - met[pair[0], owner]
         past = np.linalg.norm(gone[owner]) / way, np.linalg.norm(gone[owner] - moved) / way_on
-        turned = max(past) / self.speed + np.linalg.norm(self.spin[owner]) * abs(late[owner])
+        turned = max(past) / self.speed + np.linalg.norm(spin[owner]) * abs(late[owner])
         beside = np.linalg.norm(gone - gone[owner], axis=1)[: len(between)]
-        return bool(turned <= self.shared and (beside <= self.shared * self.radius[: len(between)])[between].all())
+        return bool(turned <= self.shared and (beside <= self.shared * radius[: len(between)])[between].all())
 
     def _between(self, snap: int, owner: int) -> Bools:
         """(body,) which may stand in rays from a snap to an owner and on to the array: seen from above, where all
         families are one line."""
-        level, found = (
-            (self.place + self.velocity * self.met[0, snap][:, None])[:, :2],
-            np.zeros(len(self.bodies), bool),
-        )
+        place, velocity, _, radius = self._middles
+        level = (place + velocity * self.met[0, snap][:, None])[:, :2]
+        found = np.zeros(len(self.bodies), bool)
         for end in (self.snaps[snap].position, self.sonar.pose.position):
             line, beside = end[:2] - level[owner], level[: len(found)] - level[owner]
             along = np.clip(beside @ line / max(line @ line, 1e-30), 0.0, 1.0)
             apart = np.linalg.norm(beside - along[:, None] * line, axis=1)
-            found |= apart < self.radius[: len(found)] + self.radius[owner]
+            found |= apart < radius[: len(found)] + radius[owner]
         return found
+
+    @cached_property
+    def _middles(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Place (owner, xyz) m, velocity (owner, xyz) m/s and spin (owner, xyz) rad/s of middles, at the frame's time,
+        and radii (owner,) m."""
+        tracks = [owner.track.part(owner.middle) for owner in self.owners]
+        moving = np.reshape([(of.pose.position, of.velocity, of.spin) for of in tracks], (-1, 3, 3)).swapaxes(0, 1)
+        return moving[0], moving[1], moving[2], np.array([owner.radius for owner in self.owners])
 
     @property
     def every(self) -> frozenset[tuple[int, int]]:
@@ -200,12 +206,15 @@ def family_times(
 ) -> Floats:
     """When the sound of each snap meets what is on each track by each family of up to so many reflections (family,
     snap, track), s on the clock of the frame: by straight lines and their images, at one speed (m/s)."""
+    travel_time = partial(_times_of_families, bottom_depth, bounces, speed)
+    return meeting_times(tracks, snaps, travel_time, (2 * bounces + 1,))
 
-    def travel_time(start: Floats, end: Floats, number: int) -> Floats:
-        return np.asarray(lengths(start, end, bottom_depth, bounces)[number] / speed)
 
-    families = [partial(travel_time, number=number) for number in range(2 * bounces + 1)]
-    return np.array([meeting_times(tracks, snaps, family) for family in families])
+def _times_of_families(bottom_depth: float, bounces: int, speed: float, start: Floats, end: Floats) -> Floats:
+    """Travel times (pair,) s from start to end (pair, xyz), each family of `images` on pairs of its own, in turn."""
+    number = range(2 * bounces + 1)
+    every = lengths(start, end, bottom_depth, bounces).reshape(len(number), len(number), -1)
+    return np.asarray(every[number, number].ravel() / speed)
 
 
 def meetings(context: FrameContext, sonar: Track, bounces: int) -> MeetingTimes:
@@ -218,15 +227,12 @@ def meetings(context: FrameContext, sonar: Track, bounces: int) -> MeetingTimes:
         return hearing_times(position, sent, sonar, bottom_depth, bounces, speed)
 
     met = family_times(tracks, snaps, bottom_depth, bounces, speed)
-    arrival_time = np.array([heard(positions(tracks, of), of) for of in met])
+    arrival_time = heard(positions(tracks, met), met).swapaxes(0, 1)
     direct = heard(np.array([snap.position for snap in snaps]), np.array([snap.time for snap in snaps]))
-    moving = [(track.pose.position, track.velocity, track.spin) for track in tracks]
-    place, velocity, spin = np.reshape(moving, (-1, 3, 3)).swapaxes(0, 1)
-    radius = np.array([surface.radius for surface in context.scattering])
     wavenumber, aperture = 2.0 * np.pi * receiver.band[1] / speed, receiver.elements.aperture
     shared = context.tolerances.shared
-    times, middles = (met, arrival_time, direct), (place, velocity, spin, radius)
-    return MeetingTimes(context.bodies, sonar, *times, snaps, *middles, speed, bounces, shared, wavenumber, aperture)
+    times, tolerance = (met, arrival_time, direct), (shared, wavenumber, aperture)
+    return MeetingTimes(context.bodies, sonar, *times, snaps, context.scattering, speed, bounces, *tolerance)
 
 
 def occasions(context: FrameContext, times: MeetingTimes) -> list[TracingGroup]:
@@ -253,12 +259,9 @@ def hearing_times(
 ) -> Floats:
     """When an array on a track hears what was sent from places (..., xyz) m at times (...) s, by each family of up to
     so many reflections (family, ...): by straight lines and their images, at one speed (m/s)."""
-    families, begin = [], position.reshape(-1, 3)
-    for number in range(2 * bounces + 1):
-        arrival_time = sent
-        for _ in range(1 if sonar.still else 6):
-            end = sonar.positions(arrival_time).reshape(-1, 3)
-            gone = lengths(begin, end, bottom_depth, bounces)[number] / speed
-            arrival_time = sent + gone.reshape(sent.shape)
-        families.append(arrival_time)
-    return np.array(families)
+    shape = (2 * bounces + 1, *sent.shape)
+    begin, arrival_time = np.broadcast_to(position, (*shape, 3)).reshape(-1, 3), np.broadcast_to(sent, shape)
+    for _ in range(1 if sonar.still else 6):
+        end = sonar.positions(arrival_time).reshape(-1, 3)
+        arrival_time = sent + _times_of_families(bottom_depth, bounces, speed, begin, end).reshape(shape)
+    return arrival_time
