@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sonarsynth.cli.options import Settings
 from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import frame_numbers
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
 
 COCO, SONAR_NETCDF, BELLHOP = "coco", "sonar-netcdf", "bellhop"
 
@@ -62,6 +66,8 @@ def export(
     if to == BELLHOP:
         if relative_to is not None:
             raise BadOption("--relative-to is for point clouds: Bellhop has no such axes")
+        if Path(source).is_dir():
+            raise BadOption(f"{source} is a folder: bellhop is of a recipe")
         _bellhop(Path(source), out, frames, settings)
     elif to not in (*FORMATS, COCO, SONAR_NETCDF):
         raise BadOption(f"--to must be one of {', '.join((*FORMATS, COCO, SONAR_NETCDF, BELLHOP))}, not {to}")
@@ -80,10 +86,11 @@ def _points(store: str, to: str, out: Path | None, frames: str | None, relative_
     from sonarsynth.store import named_after, open_store
 
     tree = open_store(store)
-    numbers = frame_numbers(frames, tree.sizes["frame"])
-    file = out or named_after(store).with_suffix(f".{to}")
+    beside = named_after(store).with_suffix(f".{to}")
+    file = out or beside
+    file = file / beside.name if file.is_dir() else file
     try:
-        cloud = points(tree, numbers, relative_to=relative_to)
+        cloud = points(tree, _built(tree, store, frames), relative_to=relative_to)
         written = write_points(cloud, file if file.suffix else file.with_suffix(f".{to}"))
     except (ValueError, ImportError) as error:
         raise BadOption(str(error)) from None
@@ -92,18 +99,12 @@ def _points(store: str, to: str, out: Path | None, frames: str | None, relative_
 
 def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
     """A folder of files: images and annotations, or signals and beams."""
-    import numpy as np
-
     from sonarsynth.cli import printing
     from sonarsynth.export import coco_files, sonar_netcdf
-    from sonarsynth.store import built_frames, named_after, open_store
+    from sonarsynth.store import named_after, open_store
 
     tree = open_store(store)
-    wanted = frame_numbers(frames, tree.sizes["frame"])
-    chosen = built_frames(tree)
-    chosen = chosen if wanted is None else np.intersect1d(chosen, wanted)
-    if not len(chosen):
-        raise BadOption("--frames: none of these frames has been built" if wanted else f"{store} has no frames yet")
+    chosen = _built(tree, store, frames)
     folder = _new(out or named_after(store).with_name(f"{named_after(store).name}.{to}"))
     write, lost = (
         (coco_files.write_coco, coco_files.LOST) if to == COCO else (sonar_netcdf.write_sonar_netcdf, sonar_netcdf.LOST)
@@ -117,6 +118,20 @@ def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
         typer.echo(str(file))
     for note in lost:
         typer.echo(f"note: {note}")
+
+
+def _built(tree: xr.DataTree, store: str, frames: str | None) -> np.ndarray:
+    """Numbers (frame,) of the frames that were asked for and built. Raises BadOption where there is none."""
+    import numpy as np
+
+    from sonarsynth.store import built_frames
+
+    wanted = frame_numbers(frames, tree.sizes["frame"])
+    chosen = built_frames(tree)
+    chosen = chosen if wanted is None else np.intersect1d(chosen, wanted)
+    if not len(chosen):
+        raise BadOption("--frames: none of these frames has been built" if wanted else f"{store} has no frames yet")
+    return chosen
 
 
 def _new(folder: Path) -> Path:

@@ -22,6 +22,8 @@ STATUS = dict.fromkeys(("StoreLocked", "BuildEnded", "Damage", "DamagedFile"), S
     INPUT,
 )
 """Of errors that say all there is to say, by name: what raises them may not be imported yet."""
+BAD_PLACE = PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError
+"""What the system says of a place that a command was given and cannot use."""
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -75,7 +77,7 @@ def _explain(error: Exception, shown: bool) -> int:
         return max(_say(line, STATUS.get(name, INPUT)) for line in lines)
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""
-        return _say(f"{file}{error.strerror}", OURS)
+        return _say(f"{file}{error.strerror}", INPUT if isinstance(error, BAD_PLACE) else OURS)
     line = f"{type(error).__name__}: {error}"
     return _say(line if shown else f"{line} (traceback in {_keep_traceback(error)})", OURS)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.store import Damage
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +62,7 @@ def beam_width(tree: xr.DataTree | FrameReader) -> float:
 
 
 def views(tree: xr.DataTree, frames: np.ndarray) -> Iterator[tuple[int, SonarView]]:
-    """Each of some frames of a store whose images were built, with its number."""
+    """Each of some frames of a store whose images were built, with its number. Raises Damage where one is missing."""
     image = tree["image"].dataset
     width = float(np.rad2deg(beam_width(tree)))
     azimuth, elevation = (np.asarray(image[axis].values, float) for axis in ("azimuth", "elevation"))
@@ -69,7 +70,14 @@ def views(tree: xr.DataTree, frames: np.ndarray) -> Iterator[tuple[int, SonarVie
         block = frames[start : start + BLOCK]
         energy = np.asarray(image["energy"].isel(frame=block).values)
         for row, (frame, points) in enumerate(zip(block.tolist(), _points(tree, block), strict=True)):
+            must_be_there(energy[row], frame)
             yield frame, SonarView(energy[row].astype(float), azimuth, elevation, width, points)
+
+
+def must_be_there(energy: np.ndarray, frame: int) -> None:
+    """Raise Damage where the image of a frame that was built has no number: its file is gone, and zarr fills in NaN."""
+    if np.isnan(energy).all():
+        raise Damage(f"image/energy: that of frame {frame} is missing: 'sonarsynth repair' restores it")
 
 
 def _points(tree: xr.DataTree, frames: np.ndarray) -> list[Floats]:

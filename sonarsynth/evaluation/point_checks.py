@@ -169,7 +169,7 @@ def _few(numbers: dict[str, float]) -> str:
     """A warning where most points are no direct echoes."""
     count = numbers["points"] + numbers["off_target"]
     return (
-        f"only {100 * numbers['points'] / count:.0f} % of the points are direct echoes of targets: {_said(numbers)}"
+        f"only {100 * numbers['points'] / count:.2g} % of the points are direct echoes of targets: {_said(numbers)}"
         if numbers["points"] < 0.5 * count
         else ""
     )

@@ -11,6 +11,7 @@ import numpy as np
 
 from sonarsynth.conventions import Progress
 from sonarsynth.description import FieldError
+from sonarsynth.detection.sonar_view import must_be_there
 from sonarsynth.evaluation.detectors import true_objects
 from sonarsynth.evaluation.detectors.true_objects import TrueObjects, category_names
 from sonarsynth.labels.views.range_cells_met import box_of
@@ -103,7 +104,10 @@ def _write_image(tree: xr.DataTree, folder: Path, frame: int, pictures: _Picture
     """Write an image; its entry."""
     from PIL import Image
 
-    energy = np.nan_to_num(np.asarray(tree[f"{pictures.group}/energy"].isel(frame=frame).values))
+    energy = np.asarray(tree[f"{pictures.group}/energy"].isel(frame=frame).values)
+    if pictures.group == "image":
+        must_be_there(energy, frame)
+    energy = np.nan_to_num(energy)
     file = folder / pictures.folder / f"{frame:06d}.png"
     Image.fromarray(grey(energy)).save(file)
     height, width = energy.shape

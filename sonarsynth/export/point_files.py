@@ -30,6 +30,9 @@ def write_points(points: xr.Dataset, path: str | Path) -> Path:
         raise ValueError(f"{file}: the name must end in .{' or .'.join(FORMATS)}")
     if not points.sizes.get("point"):
         raise ValueError(f"{file}: there is no point to write")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("ab"):  # raises what says why it cannot be written: Open3D does not
+        pass
     cloud = o3d.t.geometry.PointCloud()
     energy = np.maximum(points["energy"].values.astype(float), np.finfo(float).tiny)
     level = 10.0 * np.log10(energy / energy.max())

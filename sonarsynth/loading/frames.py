@@ -15,6 +15,7 @@ from sonarsynth.products import SPLITS
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.store.frame_reading import FrameReader
+from sonarsynth.store.marks import must_hold_files
 
 
 class Frames:
@@ -40,7 +41,8 @@ class Frames:
     pickled and read from several processes. `collate` makes a batch of samples.
 
     Raises FieldError for a word that is not among these or a split without frames, KeyError for what the store has not,
-    Mismatch where there is no store of this format, and, when a frame is read, Damage.
+    Mismatch where there is no store of this format, Damage for a file that is missing, and, when a frame is read, for
+    one that is damaged.
     """
 
     collate = staticmethod(collate)
@@ -58,6 +60,7 @@ class Frames:
         self._form = SampleForm(image, targets, signals)
         if missing := [name for name in self._form.needs if name not in self._reader]:
             raise KeyError(f"{missing[0]}: the store was built without it")
+        must_hold_files(self._reader.root, ("truth/sonar_position", *self._form.needs))
         chosen = np.isfinite(self._reader.array("truth/sonar_position").every()[:, 0])
         if split is not None:
             chosen &= self._reader.array("split").every() == _number(split)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonarsynth.conventions import counted
 from sonarsynth.evaluation import bounds, brightest_beam_on_target, range_errors
 from sonarsynth.pictures.store_reading import built, echo_levels, mesh_group, needed, read
 from sonarsynth.products import View
@@ -64,7 +65,8 @@ def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
         reach = f"{distance.min():.2f} to {distance.max():.2f} m away" if len(distance) else "in none of these frames"
         ratio = "" if snr is None or not np.isfinite(snr[frames, i]).any() else _ratios(snr[frames, i])
         within = "" if inside is None or inside[i] == visible[i] else f" ({inside[i]} within the beams)"
-        lines.append(f"  target     {name}: {facets}{reach}, in sight in {visible[i]} frames{within}{ratio}")
+        seen = counted(int(visible[i]), "frame")
+        lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen}{within}{ratio}")
     return [*lines, *_ghosts(tree, frames, list(map(str, names)))]
 
 

@@ -148,6 +148,20 @@ def _marks_asked_for(store: Remote) -> list[int]:
     return [number for number, mark in load_marks(store, range(shards)) if mark is not None]
 
 
+def must_hold_files(store: Folder, arrays: Iterable[str]) -> None:
+    """Raise Damage where a file of an array is missing from a store, since readers take it for one of fill values.
+
+    arrays: paths in the store, the first axis of each `frame`. Files that no mark names were not built."""
+    numbers = marked(store)
+    for array in arrays:
+        there = {name.split(".")[1] for name in entries(store, array) if name.startswith("c.")}
+        for number in (number for number in numbers if str(number) not in there):
+            mark = load_mark(store, number)
+            for file, record in mark.files.items() if mark else ():
+                if file.startswith(f"{array}/") and record != ABSENT:
+                    raise Damage(f"{file}: the file is missing: 'sonarsynth repair' restores it")
+
+
 def all_files(store: Folder) -> Iterator[str]:
     """Every file in the store but the marks, as paths within it; links to folders too."""
     return place.all_files(store, apart=MARKS)

@@ -134,7 +134,7 @@ def test_drawing_what_is_not_there(command: Command, small_file: Path, tmp_path:
 
 def test_a_store_needs_a_name(command: Command, small_file: Path) -> None:
     status, out, err = command("build", small_file, "/", "--workers", "0")
-    assert (status, out, err) == (1, "", "sonarsynth: /: is no place for a store\n")
+    assert (status, out, err) == (2, "", "sonarsynth: /: is no place for a store\n")
 
 
 def test_calls_that_cannot_be(small: Recipe, tmp_path: Path) -> None:

@@ -130,7 +130,9 @@ def test_files_hold_the_points_with_colours_normals_and_labels(crossing: Path, t
         (["a.ply", "--out", "b.ply"], "--out: where to write is given twice"),
         (["--to", "las"], "--to must be one of ply, pcd, coco, sonar-netcdf, bellhop, not las"),
         (["--frames", "5:70"], "ends past the last frame, 63"),
-        (["--frames", "1:3"], "there is no point to write"),
+        (["--frames", "1:3"], "--frames: none of these frames has been built"),
+        (["--to", "bellhop"], "is a folder: bellhop is of a recipe"),
+        (["--out", "/dev/null/x.ply"], "/dev/null: File exists"),
     ],
 )
 def test_bad_input_gets_one_line(
@@ -140,6 +142,12 @@ def test_bad_input_gets_one_line(
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_points_go_into_a_folder_that_is_there_or_not(crossing: Path, tmp_path: Path) -> None:
+    for out, file in ((tmp_path, tmp_path / "remus.ply"), (tmp_path / "new" / "x.ply",) * 2):
+        assert run(app, ["export", str(crossing), "--out", str(out)]) == 0
+        assert file.stat().st_size > 1000
 
 
 def test_the_command_writes_beside_the_store(crossing: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,6 +19,7 @@ from sonarsynth.pipeline import Values
 from sonarsynth.planning import Plan, plan
 from sonarsynth.recipe.reading import loads
 from sonarsynth.store import layout_of
+from sonarsynth.store.files.within import write_atomically
 
 MadeUp = Callable[[Plan, int], Values]
 
@@ -204,3 +205,11 @@ def test_scenes_without_targets_or_snaps_have_a_store(tmp_path: Path, small_text
     assert opened(path)["truth/targets/position"].shape == (20, 0, 3)
     assert store.verify(path).problems == ()
     shutil.rmtree(path)
+
+
+def test_a_file_that_cannot_be_written_is_named_whole(tmp_path: Path) -> None:
+    """By its own name and folder, not by that of the file which would have become it."""
+    name = "n" * 250  # fits, but not with what a file has in its name until it is whole
+    with pytest.raises(OSError, match="too long") as raised:
+        write_atomically(tmp_path, name, b"")
+    assert raised.value.filename == f"{tmp_path}/{name}"

@@ -16,6 +16,7 @@ import pytest
 import sonarsynth as ss
 from sonarsynth import planning, schedule
 from sonarsynth.evaluation.detectors import true_objects
+from sonarsynth.export.coco_files import write_coco
 from sonarsynth.loading import Frames, RenderedFrames
 from sonarsynth.loading.training_samples import FLOOR
 from sonarsynth.recipe import Recipe, reading
@@ -184,6 +185,27 @@ def test_a_damaged_file_is_no_data(store: Path, tmp_path: Path) -> None:
     file.symlink_to(store / "zarr.json")
     with pytest.raises(OSError, match="link"):
         _ = [FrameReader(copy).array("signals/pressure")[frame] for frame in range(20)]
+
+
+@pytest.mark.parametrize(
+    "name", ["image/energy", "signals/pressure", "truth/targets/pixel_box", "truth/sonar_position"]
+)
+def test_a_missing_file_is_no_data(store: Path, tmp_path: Path, name: str) -> None:
+    """zarr takes it for one of fill values: images of -60 dB everywhere, frames without boxes, or fewer frames."""
+    copy = tmp_path / "s.zarr"
+    shutil.copytree(store, copy)
+    (file, *_) = sorted((copy / name).glob("c.*"))
+    file.unlink()
+    with pytest.raises(Damage, match=f"^{name}/{file.name}: the file is missing: 'sonarsynth repair' restores it$"):
+        Frames(copy, signals=True)
+    if name != "truth/sonar_position":
+        assert len(Frames(copy, image="none", targets="points")) == 16
+    if name == "image/energy":
+        for use in (lambda: ss.detect(copy), lambda: write_coco(ss.open(copy), tmp_path, np.arange(2, 18))):
+            with pytest.raises(
+                Damage, match="image/energy: that of frame 2 is missing: 'sonarsynth repair' restores it"
+            ):
+                use()
 
 
 @pytest.mark.parametrize(

@@ -188,7 +188,8 @@ plt.show()
 drawn, axes = plt.subplots(1, 2, figsize=(10, 4), sharey=True)
 for name, ax in zip(stores, axes, strict=True):
     groups = list(figures[name, "peaks"][0]["by_snr"])
-    print(f"\n| {name} water, by snr | {' | '.join(groups)} |\n|{'---|' * (len(groups) + 1)}")
+    water = "same" if name == "same" else "other"
+    print(f"\n| {water} water, by snr | {' | '.join(groups)} |\n|{'---|' * (len(groups) + 1)}")
     for place, kind in enumerate(detectors):
         rows = {group: [found["by_snr"][group] for found in figures[name, kind]] for group in groups}
         share = np.array([rows[group][0]["detected"] for group in groups])

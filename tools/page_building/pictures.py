@@ -44,12 +44,14 @@ GHOSTS = 46
 IMAGES = ("focused", "sub_band", "clean", "capon", "lp", "order_statistic")
 """Beamformers whose images of a frame of boat.yaml are drawn."""
 SHADOW = (
+    "scene.world.sources.0.position=[25 cm, 0 cm, -25 cm]",
     "scene.sonar.array={kind: planar_lattice, columns: 160, rows: 3, pitch: 1 cm}",
     "scene.sonar.beams={azimuth_span: 50 deg, azimuths: 161, elevation_span: 30 deg, elevations: 9}",
     "scene.sonar.ranges={near: 12 m, far: 24 m, step: 2 cm}",
     "accuracy.speckle=0.004",
 )
-"""Changes of ping.yaml that let a shadow be seen: a wide array, and as many scatterers as fill its beams."""
+"""Changes of ping.yaml that let a shadow be seen: a wide array, the transmitter so far ahead that its direct sound does
+not clip at the ends of it, and as many scatterers as fill its beams."""
 LAWS = {
     "lobe": "{kind: mirror_lobe, width: 30 deg}",
     "smooth": "{kind: kirchhoff}",

@@ -122,9 +122,11 @@ def write_atomically(root: Root, name: str, content: bytes) -> None:
                 out.flush()
                 os.fsync(out.fileno())
             os.replace(scratch, last, src_dir_fd=folder, dst_dir_fd=folder)
-        except BaseException:
-            with suppress(FileNotFoundError):
+        except BaseException as error:
+            with suppress(OSError):
                 os.unlink(scratch, dir_fd=folder)
+            if isinstance(error, OSError) and error.filename == scratch:
+                error.filename = f"{root}/{name}"
             raise
         os.fsync(folder)
 
