@@ -13,7 +13,7 @@ from sonarsynth.equations.rays.ray_solutions import water
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.state import Medium
 
-SAGITTA_TOLERANCE = 1e-4
+SAGITTA_TOLERANCE = 1e-5
 """Largest distance (m) of a bent ray from the chords that stand for it when it is tested against bodies."""
 
 
