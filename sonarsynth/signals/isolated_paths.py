@@ -120,9 +120,9 @@ def measured_levels(
 def _sent(waveform: Waveform, sonar: Sonar, samples: int, doppler: float) -> np.ndarray:
     """Spectrum (bin,) of the filtered snap at 1 m that lasts 1 + doppler times as long, from spectra that are kept."""
     chosen, fs = sonar.antialias, sonar.sampling_frequency
-    if doppler == 0.0:
-        return pulse_spectrum(waveform, chosen, fs, samples)[1]
     widest = rounded_up(abs(doppler), 2.0)
+    if widest == 0.0:
+        return pulse_spectrum(waveform, chosen, fs, samples)[1]
     sizes = np.array(stretch_sizes(at_longest(waveform), chosen, widest))
     enough = np.flatnonzero(np.append(np.cumsum(sizes[::-1])[::-1], 0.0) <= STRETCH_TOLERANCE)[0]
     series = stretched_spectra(waveform, chosen, fs, samples, widest, int(max(enough, 1)))
