@@ -12,7 +12,8 @@ import numpy.typing as npt
 from sonarsynth.conventions import Floats
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize, Method
-from sonarsynth.equations.arrays.apertures import element_directivity
+from sonarsynth.equations.arrays.apertures import face_spectra
+from sonarsynth.equations.kernels.fourier_sums import parts, waves
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import Elements
@@ -21,6 +22,9 @@ from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.pulse_variation import changed, from_the_sharpest
 from sonarsynth.signals.segments import Reception, fast_length, layout
 from sonarsynth.state import Emission
+
+FINER = 64
+"""Parts of what `fourier_sums.parts` holds at once that stay in the cache of a core."""
 
 
 def relative_absorption(absorption: Callable[[Floats], Floats] | None, frequency: Floats, centre: float) -> Floats:
@@ -50,9 +54,7 @@ def exact_spectra(
         delay, gain = delay_and_gain(path, elements.position)
         u = arrival_directions(path, elements.position)
         late = path.delay[0] - origin + delay[0]
-        face = element_directivity(frequency, u[0][:, None, :], elements.face, path.sound_speed)
         farther = path.attenuation * path.sound_speed * delay[0]  # dB
-        loss = lost(np.multiply.outer(path.loss[0] + farther, relative))
         shape = np.exp(1j * path.phase[0] - 0.5 * path.variance[0] * (2.0 * np.pi * frequency) ** 2)
         if facets:
             shape = shape * facet_response(
@@ -60,10 +62,14 @@ def exact_spectra(
             )
         if path.expansion.phase.any() or path.expansion.delay_variance.any():
             shape = shape * changed(path, elements.position, frequency)[0]
+        shape = np.broadcast_to(shape, total.shape)
         gain_of_sensors = elements.gain * ~path.hidden(elements.count)[0] if path.occluded.any() else elements.gain
-        total += (path.amplitude[0] * gain[0] * gain_of_sensors)[:, None] * (
-            face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
-        )
+        size = path.amplitude[0] * gain[0] * gain_of_sensors
+        for some in parts(size, FINER * frequency.size):
+            face = face_spectra(frequency, u[0, some], elements.face, path.sound_speed)
+            face *= lost(np.multiply.outer(path.loss[0] + farther[some], relative))
+            face *= size[some, None]
+            total[some] += face * (waves(frequency, late[some]) * shape[some])
     return total
 
 

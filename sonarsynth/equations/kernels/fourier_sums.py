@@ -12,6 +12,8 @@ from sonarsynth.conventions import Complexes, Floats
 
 MOST = 1 << 21
 """Products of times and frequencies that are held at once: bounds the memory."""
+FEWEST = 16
+"""Fewer frequencies are taken one by one."""
 EVEN = 1e-13
 """What frequencies may be off equal steps, relative to the largest, and count as even."""
 
@@ -38,6 +40,19 @@ def fourier_sums(frequency: Floats, time: Floats, strength: Floats, longer: npt.
         fine = _powers(strength[near], np.exp(step * turn), columns)
         out += coarse @ fine.swapaxes(1, 2)
     return out.reshape(stretch.size, -1)[:, : f.size]
+
+
+def waves(frequency: Floats, time: Floats) -> Complexes:
+    """exp(-i 2 pi f t) (point, bin) at frequencies (bin,) in Hz and times (point,) in s; of equal steps as a product
+    of coarse and fine ones, some 20 times faster, to 1e-15 of the largest phase."""
+    f, turn = np.asarray(frequency, float), -2j * np.pi * np.asarray(time, float)
+    if f.size < FEWEST or not _even(f):
+        return np.asarray(np.exp(np.multiply.outer(turn, f)))
+    columns = int(np.ceil(np.sqrt(f.size)))
+    step = (f[-1] - f[0]) / (f.size - 1)
+    coarse = np.exp(np.multiply.outer(turn, f[::columns]))
+    fine = np.exp(np.multiply.outer(turn, step * np.arange(columns)))
+    return np.asarray((coarse[:, :, None] * fine[:, None]).reshape(turn.size, -1)[:, : f.size])
 
 
 def parts(points: Floats, columns: int) -> Iterator[slice]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.fft import irfft, next_fast_len, rfft
 
 from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.equations.kernels.fourier_sums import waves
 from sonarsynth.equations.noise import filters
 from sonarsynth.receiver import Elements
 from sonarsynth.signals.array_paths import NEPER, Wavefronts, delay_and_gain, steered_spread, tilt
@@ -154,8 +155,8 @@ def _alone(tile: Tile, paths: Wavefronts, points: Floats, begin: Floats, stage: 
     of the snap, through its face."""
     bins, steering = stage.bins, Steering.at(points, tile.reference)
     field = np.zeros((paths.count, len(points), stage.segment.samples + 1), np.result_type(stage.dtype, np.complex64))
-    response = responses(paths.modes, stage) * absorbed(tile.reference, stage, stage.wave.spectrum)
-    response = response * np.exp(-2j * np.pi * np.multiply.outer(paths.delay - stage.origin - begin, bins.frequency))
+    pulse = responses(paths.modes, stage) * absorbed(tile.reference, stage, stage.wave.spectrum)
+    response = pulse * waves(bins.frequency, paths.delay - stage.origin - begin)
     directed = faces(tile, steering, stage).reshape(paths.count, len(points), -1)
     field[:, :, bins.first : bins.first + bins.frequency.size] = directed * response[:, None]
     return field

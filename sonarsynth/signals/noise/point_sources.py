@@ -55,6 +55,7 @@ def add_noise_source(
     frequency = rfftfreq(length, 1.0 / fs)
     through = response(frequency, passed)
     drawn = np.flatnonzero((through**2 > QUIETEST) & (frequency > 0.0))
+    heard = slice(drawn[0], drawn[-1] + 1)
     f = frequency[drawn]
     sent = np.zeros(frequency.size, complex)
     if isinstance(source.sound, NoiseRecording):
@@ -64,8 +65,8 @@ def add_noise_source(
     else:
         normal = random.standard_normal((2, drawn.size))
         sent[drawn] = (normal[0] + 1j * normal[1]) * through[drawn] * np.sqrt(source.sound.density(f) * fs * length) / 2
-    relative = relative_absorption(absorption, f, sonar.band.centre)
-    spectrum = np.zeros((elements.count, frequency.size), complex)
-    spectrum[:, drawn] = exact_spectra(front, elements, f, relative, early) * sent[drawn]
+    relative = relative_absorption(absorption, frequency[heard], sonar.band.centre)
+    spectrum = np.zeros((elements.count, frequency.size), np.complex64)  # as exact as pressure is
+    spectrum[:, heard] = exact_spectra(front, elements, frequency[heard], relative, early) * sent[heard]
     sound = irfft(spectrum, length, axis=1)[:, lead : lead + samples]
-    return replace(signals, pressure=(signals.pressure + sound).astype(np.float32))
+    return replace(signals, pressure=signals.pressure + sound)
