@@ -25,6 +25,8 @@ from tests.pipeline.test_same_anywhere import contents
 from tests.waiting import wait_until
 
 HERE = Path(__file__).resolve().parents[2]
+PATIENCE = {"distributed.comm.timeouts.tcp": "600s", "distributed.comm.timeouts.connect": "600s"}
+"""A busy machine is slow, not gone."""
 
 
 def certificate(folder: Path) -> tuple[Path, Path]:
@@ -49,6 +51,7 @@ def environment(tmp_path: Path) -> dict[str, str]:
         for what, file in (("KEY", key), ("CERT", made))
     }
     settings = {f"DASK_DISTRIBUTED__COMM__TLS__{name}": str(file) for name, file in tls.items()}
+    settings |= {f"DASK_{name.upper().replace('.', '__')}": value for name, value in PATIENCE.items()}
     encrypted = {"DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION": "True", "OMP_NUM_THREADS": "1"}
     return {**os.environ, **settings, **encrypted, "PYTHONPATH": str(HERE)}
 
@@ -142,5 +145,5 @@ def trusted(environment: dict[str, str]) -> Iterator[None]:
     found = {name.removeprefix(prefix): value for name, value in environment.items() if name.startswith(prefix)}
     keys = {name.lower().replace("__", ".").replace("_", "-"): value for name, value in found.items()}
     settings = {f"distributed.comm.tls.{name}": value for name, value in keys.items()}
-    with dask.config.set({"distributed.comm.require-encryption": True, **settings}):
+    with dask.config.set({"distributed.comm.require-encryption": True, **PATIENCE, **settings}):
         yield
