@@ -228,7 +228,8 @@ def meetings(context: FrameContext, sonar: Track, bounces: int) -> MeetingTimes:
 
     met = family_times(tracks, snaps, bottom_depth, bounces, speed)
     arrival_time = heard(positions(tracks, met), met).swapaxes(0, 1)
-    direct = heard(np.array([snap.position for snap in snaps]), np.array([snap.time for snap in snaps]))
+    places = np.reshape([snap.position for snap in snaps], (-1, 3))  # of none as well
+    direct = heard(places, np.array([snap.time for snap in snaps]))
     wavenumber, aperture = 2.0 * np.pi * receiver.band[1] / speed, receiver.elements.aperture
     shared = context.tolerances.shared
     times, tolerance = (met, arrival_time, direct), (shared, wavenumber, aperture)
