@@ -13,6 +13,7 @@ from sonarsynth.conventions import Bools, Decibels, Floats, Number, PositiveMetr
 from sonarsynth.description import description
 from sonarsynth.description.method import FrameSize
 from sonarsynth.equations.arrays.apertures import focus_delay
+from sonarsynth.equations.kernels.fourier_sums import waves
 from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
 from sonarsynth.imaging.delay_and_sum.focused import FocusedDelayAndSum
 from sonarsynth.imaging.image_window import Shading, weights
@@ -75,7 +76,7 @@ class Clean(Steering):
         def point(beam: Place) -> Floats:
             u = direction(sonar.beams.azimuth[beam[1]], sonar.beams.elevation[beam[0]])
             delay = focus_delay(elements.position, u, self.focus, sonar.assumed_sound_speed)
-            wave = (amplitude * np.exp(-2j * np.pi * snapshots.frequency * delay[:, None])).astype(np.complex64)
+            wave = (amplitude * waves(snapshots.frequency, delay)).astype(np.complex64)
             return plain.energies(replace(snapshots, spectra=wave), elements, sonar)
 
         dirty = plain.energies(snapshots, elements, sonar)

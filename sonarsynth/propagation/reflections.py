@@ -55,7 +55,7 @@ def at_boundaries(
     )
 
 
-def along(
+def reflections_along(
     environment: Environment, profile: Profile, depth: Floats, direction: Floats, surface: Ints, bottom: Ints,
     centre: float,
 ) -> Reflections:  # fmt: skip

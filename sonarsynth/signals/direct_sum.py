@@ -12,7 +12,7 @@ import numpy.typing as npt
 from sonarsynth.conventions import Floats
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize, Method
-from sonarsynth.equations.arrays.apertures import face_spectra
+from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.kernels.fourier_sums import parts, waves
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.products import Arrivals, Signals
@@ -66,10 +66,9 @@ def exact_spectra(
         gain_of_sensors = elements.gain * ~path.hidden(elements.count)[0] if path.occluded.any() else elements.gain
         size = path.amplitude[0] * gain[0] * gain_of_sensors
         for some in parts(size, FINER * frequency.size):
-            face = face_spectra(frequency, u[0, some], elements.face, path.sound_speed)
-            face *= lost(np.multiply.outer(path.loss[0] + farther[some], relative))
-            face *= size[some, None]
-            total[some] += face * (waves(frequency, late[some]) * shape[some])
+            face = element_directivity(frequency, u[0, some, None], elements.face, path.sound_speed)
+            loss = lost(np.multiply.outer(path.loss[0] + farther[some], relative))
+            total[some] += size[some, None] * face * loss * (waves(frequency, late[some]) * shape[some])
     return total
 
 

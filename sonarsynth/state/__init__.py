@@ -155,14 +155,14 @@ class FrameContext(WorldState):
 
 
 def meeting_times(
-    tracks: Sequence[Track], snaps: tuple[Emission, ...], travel_time: TravelTime, ways: tuple[int, ...] = ()
+    tracks: Sequence[Track], snaps: tuple[Emission, ...], travel_time: TravelTime, families: tuple[int, ...] = ()
 ) -> Floats:
-    """When the sound of each snap meets what is on each track (*ways, snap, track), s on the clock of the frame.
+    """When the sound of each snap meets what is on each track (*families, snap, track), s on the clock of the frame.
 
-    tracks: from the instant of the frame on; travel_time: of direct paths, or of so many ways, each on pairs of its
-    own. Solves t = t_snap + T(x(t)), x the track, by iteration; NaN where no sound arrives.
+    tracks: from the instant of the frame on; travel_time: of direct paths, or of so many families of rays, each
+    on pairs of its own. Solves t = t_snap + T(x(t)), x the track, by iteration; NaN where no sound arrives.
     """
-    shape = (*ways, len(snaps), len(tracks))
+    shape = (*families, len(snaps), len(tracks))
     emitted = np.broadcast_to(np.array([snap.time for snap in snaps])[:, None], shape)
     start = np.broadcast_to(np.array([snap.position for snap in snaps]).reshape(-1, 1, 3), (*shape, 3))
     met, arrives = emitted, np.ones(emitted.shape, bool)

@@ -36,7 +36,7 @@ from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry import Pose, unit
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import ArrayExpansion, Arrivals
-from sonarsynth.propagation.reflections import along
+from sonarsynth.propagation.reflections import reflections_along
 from sonarsynth.receiver import Elements
 from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Emission, Medium
@@ -132,7 +132,9 @@ def bounced_anew(paths: Bounced, z: Floats, before: Floats, after: Floats, mediu
     if not len(rows):
         return paths
     counts = paths.surface[rows], paths.bottom[rows], centre
-    old, new = (along(medium.environment, medium.profile, z[rows], of[rows], *counts) for of in (before, after))
+    old, new = (
+        reflections_along(medium.environment, medium.profile, z[rows], of[rows], *counts) for of in (before, after)
+    )
     boundary, phase, blur = paths.boundary.copy(), paths.phase.copy(), paths.delay_std.copy()
     boundary[rows] *= new.modulus / np.maximum(old.modulus, 1e-300)
     phase[rows] += new.phase - old.phase

@@ -19,7 +19,6 @@ from sonarsynth.conventions import Bools, Floats, depth
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation.images import lengths
-from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Emission, FrameContext, meeting_times, positions
 from sonarsynth.tracing.doppler import Meeting, Ways
 
@@ -58,7 +57,8 @@ class MeetingTimes:
     arrival_time: Floats  # (family, family on, snap, owner) s
     direct_time: Floats  # (family, snap) s: when the array hears the snap itself
     snaps: tuple[Emission, ...]
-    owners: tuple[Scatterers, ...]
+    middles: tuple[Track, ...]  # of owners
+    radius: Floats  # (owner,) m
     speed: float  # m/s, of sound
     bounces: int  # of a path, at most
     shared: float
@@ -104,34 +104,34 @@ class MeetingTimes:
         hidden alike by bodies that may come between (body,)."""
         met, heard = self.met[:, snap], self.arrival_time[:, :, snap, owner]
         late, later = met[pair[0]] - met[first[0]], heard[pair] - heard[first]
-        _, velocity, spin, radius = self._middles
+        _, velocity, spin = self._places
         gone, moved = velocity * late[:, None], self.sonar.velocity * later
         way, way_on = met[pair[0], owner] - self.snaps[snap].time, heard[pair] - met[pair[0], owner]
         past = np.linalg.norm(gone[owner]) / way, np.linalg.norm(gone[owner] - moved) / way_on
         turned = max(past) / self.speed + np.linalg.norm(spin[owner]) * abs(late[owner])
         beside = np.linalg.norm(gone - gone[owner], axis=1)[: len(between)]
-        return bool(turned <= self.shared and (beside <= self.shared * radius[: len(between)])[between].all())
+        return bool(turned <= self.shared and (beside <= self.shared * self.radius[: len(between)])[between].all())
 
     def _between(self, snap: int, owner: int) -> Bools:
         """(body,) which may stand in rays from a snap to an owner and on to the array: seen from above, where all
         families are one line."""
-        place, velocity, _, radius = self._middles
+        place, velocity, _ = self._places
         level = (place + velocity * self.met[0, snap][:, None])[:, :2]
         found = np.zeros(len(self.bodies), bool)
         for end in (self.snaps[snap].position, self.sonar.pose.position):
             line, beside = end[:2] - level[owner], level[: len(found)] - level[owner]
             along = np.clip(beside @ line / max(line @ line, 1e-30), 0.0, 1.0)
             apart = np.linalg.norm(beside - along[:, None] * line, axis=1)
-            found |= apart < radius[: len(found)] + radius[owner]
+            found |= apart < self.radius[: len(found)] + self.radius[owner]
         return found
 
     @cached_property
-    def _middles(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Place (owner, xyz) m, velocity (owner, xyz) m/s and spin (owner, xyz) rad/s of middles, at the frame's time,
-        and radii (owner,) m."""
-        tracks = [owner.track.part(owner.middle) for owner in self.owners]
-        moving = np.reshape([(of.pose.position, of.velocity, of.spin) for of in tracks], (-1, 3, 3)).swapaxes(0, 1)
-        return moving[0], moving[1], moving[2], np.array([owner.radius for owner in self.owners])
+    def _places(self) -> tuple[Floats, Floats, Floats]:
+        """Place (owner, xyz) m, velocity (owner, xyz) m/s and spin (owner, xyz) rad/s of middles, at the frame's
+        time."""
+        moving = [(track.pose.position, track.velocity, track.spin) for track in self.middles]
+        place, velocity, spin = np.reshape(moving, (-1, 3, 3)).swapaxes(0, 1)
+        return place, velocity, spin
 
     @property
     def every(self) -> frozenset[tuple[int, int]]:
@@ -233,7 +233,8 @@ def meetings(context: FrameContext, sonar: Track, bounces: int) -> MeetingTimes:
     wavenumber, aperture = 2.0 * np.pi * receiver.band[1] / speed, receiver.elements.aperture
     shared = context.tolerances.shared
     times, tolerance = (met, arrival_time, direct), (shared, wavenumber, aperture)
-    return MeetingTimes(context.bodies, sonar, *times, snaps, context.scattering, speed, bounces, *tolerance)
+    radius = np.array([surface.radius for surface in context.scattering])
+    return MeetingTimes(context.bodies, sonar, *times, snaps, tuple(tracks), radius, speed, bounces, *tolerance)
 
 
 def occasions(context: FrameContext, times: MeetingTimes) -> list[TracingGroup]:

@@ -6,10 +6,6 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
-from sonarsynth.equations.kernels.fourier_sums import waves
-
-SMALL = 1e-3
-"""rad: below it sin x / x is 1 - x^2/6 to 1e-14."""
 
 
 def element_directivity(frequency: npt.ArrayLike, direction: npt.ArrayLike, face: float, sound_speed: float) -> Floats:
@@ -22,19 +18,6 @@ def element_directivity(frequency: npt.ArrayLike, direction: npt.ArrayLike, face
     u = np.asarray(direction, float)
     scale = np.asarray(frequency, float) * (face / sound_speed)
     return np.asarray(np.sinc(scale * u[..., 1]) * np.sinc(scale * u[..., 2]))
-
-
-def face_spectra(frequency: Floats, direction: Floats, face: float, sound_speed: float) -> Floats:
-    """As `element_directivity`, (wave, bin), of waves from directions (wave, xyz) at frequencies (bin,) in Hz."""
-    response = np.ones((len(direction), len(frequency)))
-    for across in direction[:, 1:].T if face > 0.0 else ():
-        late = across * (0.5 * face / sound_speed)  # s, half of what the wave takes across the face
-        x = np.multiply.outer(2.0 * np.pi * late, frequency)
-        sine = -waves(frequency, late).imag
-        small = np.nonzero(np.abs(x) < SMALL)
-        sine[small], x[small] = 1.0 - x[small] ** 2 / 6.0, 1.0
-        response *= sine / x
-    return response
 
 
 def focus_delay(position: npt.ArrayLike, direction: npt.ArrayLike, focus: float | None, sound_speed: float) -> Floats:

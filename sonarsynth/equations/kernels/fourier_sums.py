@@ -44,7 +44,7 @@ def fourier_sums(frequency: Floats, time: Floats, strength: Floats, longer: npt.
 
 def waves(frequency: Floats, time: Floats) -> Complexes:
     """exp(-i 2 pi f t) (point, bin) at frequencies (bin,) in Hz and times (point,) in s; of equal steps as a product
-    of coarse and fine ones, some 20 times faster, to 1e-15 of the largest phase."""
+    of coarse and fine ones, nine times as fast for 1000, to 1e-15 of the largest phase."""
     f, turn = np.asarray(frequency, float), -2j * np.pi * np.asarray(time, float)
     if f.size < FEWEST or not _even(f):
         return np.asarray(np.exp(np.multiply.outer(turn, f)))

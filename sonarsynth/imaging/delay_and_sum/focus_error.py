@@ -9,6 +9,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.beams import beam_spectra
+from sonarsynth.equations.kernels.fourier_sums import waves
 from sonarsynth.imaging.delay_and_sum.lattice_image import lattice_image, steered_zones
 from sonarsynth.imaging.delay_and_sum.zones import Subarrays, cuts
 from sonarsynth.imaging.image_window import Shading, weights
@@ -38,7 +39,7 @@ def focus_error(elements: Elements, shading: Shading, sonar: Sonar, focus: float
 
     def error(source: Floats) -> float:
         late = focus_delay(elements.position, source, focus, speed)
-        wave = np.exp(-2j * np.pi * frequency * late[:, None]).astype(np.complex64)
+        wave = waves(frequency, late).astype(np.complex64)
         image = lattice_image(wave, elements, weight, frequency, beams, zones)
         bright = np.nonzero(image >= image.max() * 10.0 ** (-WITHIN / 10.0))
         row, column = (index[:: -(-len(index) // COMPARED)] for index in bright)

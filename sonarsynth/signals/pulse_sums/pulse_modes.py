@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy.fft import irfft
 
 from sonarsynth.conventions import Complexes, Floats
-from sonarsynth.equations.arrays.apertures import face_spectra
+from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.randomness import stream
 from sonarsynth.signals.array_paths import NEPER
 from sonarsynth.signals.gridded.nodes import analysis, chebyshev
@@ -54,7 +54,7 @@ def shape_of(
     if delay_std.any():
         factor *= np.exp(-0.5 * (2.0 * np.pi * np.multiply.outer(delay_std, frequency)) ** 2)
     if face > 0.0:
-        factor *= face_spectra(frequency, direction, face, speed)
+        factor *= element_directivity(frequency, direction[:, None, :], face, speed)
     return np.asarray(factor, float)
 
 
