@@ -12,7 +12,15 @@ from sonarsynth.casting.shadows import hide
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.motion import ConstantVelocity
 from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box
+from sonarsynth.validation.references.frames.line_of_sight import Surface
+from sonarsynth.validation.references.frames.moving_points import Mover
+from sonarsynth.validation.references.frames.sound_paths import Solid, hidden
+from sonarsynth.validation.references.rays.layered_rays import families, rays
+from sonarsynth.validation.references.rays.layers_crossed import Water
 from tests.bodies import mesh_from
 
 SPHERE = mesh_from(trimesh.creation.icosphere(subdivisions=3), 0.5)
@@ -170,3 +178,18 @@ def test_a_wrong_proposal_is_passed_over() -> None:
     facet, distance = lying.cast(origin, direction, np.full(300, np.inf))
     np.testing.assert_array_equal(facet, honest)
     np.testing.assert_allclose(distance, at, rtol=1e-12)
+
+
+def test_a_moving_body_hides_where_it_is_when_the_ray_passes_it() -> None:
+    """In the independent computation: a box that crosses a ray at 100 m/s is 1 m farther on after 10 ms, and 27 mm
+    farther where the ray leaves it than where that enters."""
+    box = mesh_of(Box(size=(0.4, 0.4, 0.4)))
+    north = ConstantVelocity(start=(15.0, 0.0, -5.0), speed=100.0)  # towards y
+    crossing = Solid(Mover(north, 0.0), Surface.of(box.vertices[box.faces]))
+    beside, front, back = np.linspace(-3.0, 3.0, 399), 100.0 * 14.8 / 1500.0, 100.0 * 15.2 / 1500.0
+    start, end = (np.column_stack([np.full(399, x), beside, np.full(399, -5.0)]) for x in (0.0, 30.0))
+    for slower in (0.0, 1e-6):  # rays in one piece, and bent ones in several
+        water = Water(np.array([0.0, 10.0]), np.array([1500.0, 1500.0 - slower]), 10.0)
+        ray = rays(water, start, end, families(0)[0])
+        found = hidden([crossing], water, start, end, ray, np.zeros(399), ray.time)
+        np.testing.assert_array_equal(found, (beside > front - 0.2) & (beside < back + 0.2))

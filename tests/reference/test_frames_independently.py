@@ -262,10 +262,10 @@ def test_a_ray_that_does_not_arrive_is_hidden() -> None:
     end = np.column_stack([np.linspace(5.0, 200.0, 40), np.zeros(40), np.full(40, -2.5)])
     start = np.broadcast_to([0.0, 0.0, -4.25], end.shape)
     ray = rays(water, start, end, families(1)[0])
-    found = hidden([], water, start, end, ray, np.zeros(40))
+    found = hidden([], water, start, end, ray, *np.zeros((2, 40)))
     np.testing.assert_array_equal(found, ~np.isfinite(ray.time))
     assert 0 < found.sum() < 40
-    assert hidden([], water, start, end, ray.select(np.flatnonzero(found)[[0] * 40]), np.zeros(40)).all()
+    assert hidden([], water, start, end, ray.select(np.flatnonzero(found)[[0] * 40]), *np.zeros((2, 40))).all()
 
 
 def _family(some: Rays, bounces: int, bottom: int) -> np.ndarray:

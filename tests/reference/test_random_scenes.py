@@ -1,7 +1,7 @@
 """Random scenes, planned, against the independent computation of whole frames: at every hydrophone, as the recipe asks.
 
-Left out are scenes in which a body that moves passes another: a plan poses each where sound meets it, the independent
-computation where the others are met, and shadows differ by as much. Bodies that move are alone here; two stand still.
+Left out are scenes in which a body that moves passes another: tracing poses each where sound meets it, the independent
+computation where the ray passes it, and shadows differ by as much. Bodies that move are alone here; two stand still.
 """
 
 import json

@@ -158,7 +158,8 @@ class FramePressure:
             rows, time, back, normal = rows[lit], time[lit], back.select(lit), normal[lit]
             clear = body.solid.mover.points(body.clear[rows], time)
             end = np.broadcast_to(snap.position, clear.shape)
-            free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, back, time))
+            sent = np.full(len(time), snap.time)
+            free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, back, time, sent))
             counted = family.bounces - family.ends_at(-snap.position[2], self.water.bottom)
             of = rows[free], time[free], back.select(free), normal[free]
             groups.append(_LitFacets(body, *of, family, counted, *self._sent(snap, -back.arrival[free])))
@@ -203,7 +204,7 @@ class FramePressure:
         facets, ray, late = facets.select(visible), ray.select(visible), late[visible]
         end = self.sonar.points(np.broadcast_to(position, (len(visible), 3)), late)
         clear = mover.points(body.clear[facets.row], facets.time)
-        free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, ray, facets.time))
+        free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, ray, facets.time, late))
         facets, ray, late = facets.select(free), ray.select(free), late[free]
         law = self.scene.laws[body.number]
         size = amplitudes(law, -facets.back.departure, ray.departure, facets.normal, body.area[facets.row])
@@ -220,7 +221,7 @@ class FramePressure:
         for family in families(self.bounces):
             late, ray = arrival_times(self.water, snap.position[None], sent, self.sonar, position, family)
             end = self.sonar.points(position[None], late)
-            if not hidden(self.solids, self.water, snap.position[None], end, ray, sent)[0]:
+            if not hidden(self.solids, self.water, snap.position[None], end, ray, sent, late)[0]:
                 loud, longer = self._sent(snap, ray.departure)
                 contributions.append(self._arriving(position, late, loud * ray.spreading, longer, (ray, family)))
         return contributions

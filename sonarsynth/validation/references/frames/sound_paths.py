@@ -10,7 +10,7 @@ facet, d on the way from it and b at the hydrophone, a pulse lasts
 
     dt_2/dt_s = (1 - v.d/c)/((1 - v.a/c)(1 - u.b/c_y))
 
-times as long. Bodies that may stand in the way are where they are at t_1.
+times as long. Bodies that may stand in the way are where they are when the ray passes them.
 """
 
 from __future__ import annotations
@@ -67,16 +67,20 @@ def arrival_times(
     return late, ray
 
 
-def hidden(solids: list[Solid], water: Water, start: Floats, end: Floats, ray: Rays, time: Floats) -> Bools:
-    """Whether bodies stand in rays from start to end (ray, xyz), at times (ray,), or there is no ray; `start` may be
-    moved off a facet."""
+def hidden(
+    solids: list[Solid], water: Water, start: Floats, end: Floats, ray: Rays, leaves: Floats, arrives: Floats
+) -> Bools:
+    """Whether bodies stand in rays between start and end (ray, xyz), where sound is at two times (ray,), or there is
+    no ray; `start` may be moved off a facet. Bodies go on at their velocity from the first of the times."""
     out = ~np.isfinite(ray.time)
     if out.any():
         there = np.flatnonzero(~out)
         if len(there):
-            out[there] = hidden(solids, water, start[there], end[there], ray.select(there), time[there])
+            rest = start[there], end[there], ray.select(there), leaves[there], arrives[there]
+            out[there] = hidden(solids, water, *rest)
         return out
     points = _unfolded(water, start, end, ray)
+    later = (arrives - leaves)[:, None] * (np.arange(points.shape[1]) / (points.shape[1] - 1)) ** 2
     for k in range(points.shape[1] - 1):
         a, b = points[:, k], points[:, k + 1]
         low, high = (np.floor(f(a[:, 2], b[:, 2]) / water.bottom).astype(int) for f in (np.minimum, np.maximum))
@@ -86,7 +90,11 @@ def hidden(solids: list[Solid], water: Water, start: Floats, end: Floats, ray: R
                 continue
             ends = [_folded(x[rows], copy, water.bottom) for x in (a, b)]
             for solid in solids:
-                own = [solid.mover.own(x, time[rows]) for x in ends]
+                gone = solid.mover.velocity(np.zeros((len(rows), 3)), leaves[rows])
+                own = [
+                    solid.mover.own(x - gone * later[rows, n, None], leaves[rows])
+                    for x, n in zip(ends, (k, k + 1), strict=True)
+                ]
                 out[rows] |= solid.surface.between(*own)
     return out
 
