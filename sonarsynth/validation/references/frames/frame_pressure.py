@@ -42,7 +42,6 @@ OFF = 1e-6
 """Of a body's size: how far off a facet a line of sight begins."""
 SLANT = 0.3
 """Bent rays leave a facet by less than this (rad) beside straight ones: others are not looked for."""
-
 STOPPED = 2e-5
 """What the filter leaves of the snap may be so little of the largest, and be left out."""
 
