@@ -128,7 +128,7 @@ def digitise(plan: Plan, frame: Frame, signals: Signals, recorder: Recorder = NO
     `plan` is that of the sequence. Each part draws from a random stream of its own.
     """
     mark_stage("synthesise")
-    sonar, pose = plan.scene.sonar, frame.sonar_pose
+    sonar, pose, sensors = plan.scene.sonar, frame.sonar_pose, true_elements(plan, frame)
     sound_speed = float(plan.profile.at(depth(pose.position)))
     noises = plan.scene.world.environment.noises
     for number, (name, noise) in enumerate(zip(part_names(noises), noises, strict=True)):
@@ -136,7 +136,7 @@ def digitise(plan: Plan, frame: Frame, signals: Signals, recorder: Recorder = NO
             signals = _with_played_noise(plan, frame, signals, noise, number, sound_speed)
         else:
             random = stream(frame.seed, "noise", frame.key, frame.step, *([number] if number else []))
-            signals = add_noise(signals, noise, sonar, plan.elements, random, pose, sound_speed)
+            signals = add_noise(signals, noise, sonar, sensors, random, pose, sound_speed)
         mark_stage(name)
     for number, source in enumerate(plan.scene.world.noise_sources):
         signals = _with_noise_source(plan, frame, signals, source, number)
@@ -155,8 +155,8 @@ def _with_played_noise(
     def even(stretch: int) -> Floats:
         return stream(frame.seed, "played noise", frame.key, number, stretch).random(2)
 
-    sonar, pose = plan.scene.sonar, frame.sonar_pose
-    return add_played_noise(signals, noise, sonar, plan.elements, pose, sound_speed, time=frame.time, even=even)
+    sonar, pose, sensors = plan.scene.sonar, frame.sonar_pose, true_elements(plan, frame)
+    return add_played_noise(signals, noise, sonar, sensors, pose, sound_speed, time=frame.time, even=even)
 
 
 def _with_noise_source(plan: Plan, frame: Frame, signals: Signals, source: NoiseSource, number: int) -> Signals:
