@@ -58,7 +58,7 @@ def with_chorus(plan: Plan, frame: Frame, signals: Signals, arrivals: ChorusArri
         mark_stage("synthesise")
         random = stream(frame.seed, "distant chorus", frame.key, frame.step)
         pose, speed = frame.sonar_pose, receiver_of(plan, frame).speed(plan.medium)
-        signals = add_noise(signals, distant, plan.scene.sonar, plan.elements, random, pose, speed)
+        signals = add_noise(signals, distant, plan.scene.sonar, true_elements(plan, frame), random, pose, speed)
         mark_stage(DISTANT_CHORUS)
     if not len(arrivals.delay):
         return signals

@@ -25,8 +25,9 @@ from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE
 from sonarsynth.products import Arrivals, EnergyImage, Signals, Truth
 from sonarsynth.recipe.scene import Frame
 
-MOST: Final = 64
-"""Beams of a target that are looked at, spread evenly over all of its beams."""
+MOST: Final = 1024
+"""Beams of a target that are looked at, spread evenly over all of its beams: of a ball that fills 1453 beams of ROMANIS
+its echoes err by 0.03 dB, and by 1.5 dB of 64, for it glints in few of them."""
 FINE: Final = 256
 """Bins of the band at least, so that little lies between its edges and the next bins."""
 SILENCE: Final = 1e-32

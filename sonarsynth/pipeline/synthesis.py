@@ -128,7 +128,7 @@ def digitise(plan: Plan, frame: Frame, signals: Signals, recorder: Recorder = NO
     `plan` is that of the sequence. Each part draws from a random stream of its own.
     """
     mark_stage("synthesise")
-    sonar, pose = plan.scene.sonar, frame.sonar_pose
+    sonar, pose, sensors = plan.scene.sonar, frame.sonar_pose, true_elements(plan, frame)
     sound_speed = float(plan.profile.at(depth(pose.position)))
     noises = plan.scene.world.environment.noises
     for number, (name, noise) in enumerate(zip(part_names(noises), noises, strict=True)):
@@ -136,7 +136,7 @@ def digitise(plan: Plan, frame: Frame, signals: Signals, recorder: Recorder = NO
             signals = _with_played_noise(plan, frame, signals, noise, number, sound_speed)
         else:
             random = stream(frame.seed, "noise", frame.key, frame.step, *([number] if number else []))
-            signals = add_noise(signals, noise, sonar, plan.elements, random, pose, sound_speed)
+            signals = add_noise(signals, noise, sonar, sensors, random, pose, sound_speed)
         mark_stage(name)
     for number, source in enumerate(plan.scene.world.noise_sources):
         signals = _with_noise_source(plan, frame, signals, source, number)
@@ -155,26 +155,28 @@ def _with_played_noise(
     def even(stretch: int) -> Floats:
         return stream(frame.seed, "played noise", frame.key, number, stretch).random(2)
 
-    sonar, pose = plan.scene.sonar, frame.sonar_pose
-    return add_played_noise(signals, noise, sonar, plan.elements, pose, sound_speed, time=frame.time, even=even)
+    sonar, pose, sensors = plan.scene.sonar, frame.sonar_pose, true_elements(plan, frame)
+    return add_played_noise(signals, noise, sonar, sensors, pose, sound_speed, time=frame.time, even=even)
 
 
 def _with_noise_source(plan: Plan, frame: Frame, signals: Signals, source: NoiseSource, number: int) -> Signals:
     """Signals with the sound of one source: all of it takes the paths of the sound that arrives at the frame's time."""
-    own = frame.sonar_pose.position
-    away = np.linalg.norm(pose(source.motion, frame.time).position - own)
-    late = float(away) / float(plan.profile.at(depth(own)))
+    own, late = frame.sonar_pose.position, 0.0
+    for _ in range(3):  # sources make way at a hundredth of the speed of sound, or less
+        away = np.linalg.norm(pose(source.motion, frame.time - late).position - own)
+        late = float(away) / float(plan.profile.at(depth(own)))
     time, position = frame.time - late, pose(source.motion, frame.time - late).position
     pulse = Ricker(frequency=plan.scene.sonar.band.centre)
     instant = Emission(position, -late, pulse, None, illuminates=False)
     arrivals = trace(replace(context_of(plan, frame), snaps=(instant,)), plan.propagation)
     arrivals = replace(arrivals, delay=arrivals.delay + late)
     apart = position - frame.sonar_pose.position
-    closing = (frame.sonar_velocity - velocity(source.motion, time)) @ apart / max(float(np.linalg.norm(apart)), 1e-9)
+    slowness = apart / max(float(np.linalg.norm(apart)), 1e-9) / arrivals.sound_speed
+    ours, theirs = frame.sonar_velocity @ slowness, velocity(source.motion, time) @ slowness
     random = stream(frame.seed, "noise source", frame.key, frame.step, number)
     sonar, sensors = plan.scene.sonar, true_elements(plan, frame)
     arrivals = behind_baffle(arrivals, sonar)
-    moving = partial(add_noise_source, time=frame.time, closing=float(closing), random=random)
+    moving = partial(add_noise_source, time=frame.time, faster=float((1.0 + ours) / (1.0 + theirs)), random=random)
     return moving(signals, source, arrivals, instant, sensors, sonar, plan.absorption)
 
 

@@ -65,8 +65,8 @@ def _edges(
 def _largest(
     power: Any, first: float, step: float, ranges: Any, beams: Any, source: Any, drift: Any, speed: float, cells: Any
 ) -> None:
-    """Raise cells (range, azimuth) to the powers (azimuth, delay) of beams (azimuth, xyz): in the middle of a cell, by
-    lines between delays, and at all delays in it."""
+    """Raise cells (range, azimuth) to the largest of the powers (azimuth, delay) of beams (azimuth, xyz) in each, by
+    lines between delays: at its ends, and at all delays in it. Cells with their middle beyond all delays have none."""
     half = 0.5 * (ranges[1] - ranges[0]) if len(ranges) > 1 else 0.0
     last, edges = power.shape[1] - 1, np.empty(len(ranges) + 1)
     bounds = np.append(ranges - half, ranges[-1] + half)
@@ -74,12 +74,18 @@ def _largest(
         _edges(bounds, beams[a], source, drift, speed, first, step, edges)
         for k in range(len(ranges)):
             begin, end = edges[k], edges[k + 1]
-            middle = 0.5 * (begin + end)
-            n = int(np.floor(middle))
-            if n < 0 or n + 1 > last:
+            if not (last > 0 and 0.0 <= 0.5 * (begin + end) < last):
                 continue
-            loudest = power[a, n] + (middle - n) * (power[a, n + 1] - power[a, n])
+            loudest = max(_between(power[a], begin), _between(power[a], end))
             for m in range(max(int(np.ceil(begin)), 0), min(int(np.floor(end)), last) + 1):
                 loudest = max(loudest, power[a, m])
             if not cells[k, a] >= loudest:
                 cells[k, a] = loudest
+
+
+@compiled
+def _between(power: Any, place: float) -> Any:
+    """Power at a place among delays (delay,), by a line between two of them; beyond them, at the next."""
+    place = min(max(place, 0.0), len(power) - 1.0)
+    n = min(int(place), len(power) - 2)
+    return power[n] + np.float32(place - n) * (power[n + 1] - power[n])

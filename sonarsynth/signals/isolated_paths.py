@@ -30,6 +30,9 @@ from sonarsynth.state import Emission
 if TYPE_CHECKING:
     from sonarsynth.signals import SignalSynthesis
 
+FINER = 4.0
+"""Spectra are so much finer that energy in slices is told: where a rough sea leaves only the lower end of a sweep, the
+level of a path erred by 0.11 dB, and 0.02 dB now."""
 STRETCH_TOLERANCE = 1e-6
 """Error of the spectra of pulses that Doppler stretches, relative to their size."""
 
@@ -37,7 +40,7 @@ STRETCH_TOLERANCE = 1e-6
 @lru_cache(maxsize=64)
 def energy_in_slices(waveform: Waveform, sonar: Sonar, count: int) -> Floats:
     """Energy (slice,) in Pa2 s, at positive frequencies, of the filtered snap at 1 m in equal slices of the band."""
-    f, spectrum = whole_spectrum(waveform, sonar)
+    f, spectrum = whole_spectrum(waveform, sonar, finer=FINER)
     power = np.abs(spectrum) ** 2
     return _in_slices(f, 0.5 * (power[1:] + power[:-1]), sonar, count)
 
@@ -60,10 +63,13 @@ def lateness_in_slices(waveform: Waveform, sonar: Sonar, count: int) -> Floats:
     return np.asarray(late / (2.0 * np.pi * f[1] * np.where(power > 0.0, power, np.inf)))
 
 
-def whole_spectrum(waveform: Waveform, sonar: Sonar, doppler: float = 0.0) -> tuple[Floats, Complexes]:
-    """`pulse_spectrum` of a snap that lasts 1 + doppler times as long, in a window with room for all of it."""
+def whole_spectrum(
+    waveform: Waveform, sonar: Sonar, doppler: float = 0.0, finer: float = 1.0
+) -> tuple[Floats, Complexes]:
+    """`pulse_spectrum` of a snap that lasts 1 + doppler times as long, in a window with room for all of it; finer: of a
+    window so many times as long."""
     fs = sonar.sampling_frequency
-    samples = fast_length(int(np.ceil(2.0 * sum(pulse_support(at_longest(waveform), sonar.antialias)) * fs)))
+    samples = fast_length(int(np.ceil(2.0 * finer * sum(pulse_support(at_longest(waveform), sonar.antialias)) * fs)))
     return pulse_spectrum(waveform, sonar.antialias, fs, samples, doppler)
 
 

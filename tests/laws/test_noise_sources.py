@@ -33,12 +33,14 @@ scene:
 STILL = "{kind: still, position: [12, 3, -17]}"
 
 
-def heard(folder: Path, source: str, noise: str = "null", frame: int = 0, samples: int = 4000) -> Signals:
-    """Signals of a frame in which nothing else sounds, in a window of so many samples."""
+def heard(
+    folder: Path, source: str, noise: str = "null", frame: int = 0, samples: int = 4000, late: float = 0.0
+) -> Signals:
+    """Signals of a frame in which nothing else sounds, in a window of so many samples, so late (s)."""
     (folder / "recipe.yaml").write_text(RECIPE.replace("SOURCE", source).replace("NOISE", noise))
     plan = ss.plan(ss.load(folder / "recipe.yaml"), products=["signals"])
     instant = plan.recipe.frame(frame)[1]
-    quiet = Signals(np.zeros((3, samples), np.float32), frame_start(plan, instant), FS, 0.0, 0, 0)
+    quiet = Signals(np.zeros((3, samples), np.float32), frame_start(plan, instant) + late, FS, 0.0, 0, 0)
     return digitise(plan, instant, quiet)
 
 
@@ -68,7 +70,22 @@ def test_a_recording_that_approaches_is_heard_higher(tmp_path: Path, speed: floa
         tmp_path, f"{{name: a, motion: {motion}, sound: {{kind: noise_recording, path: tone.wav}}}}", samples=16384
     )
     spectrum = np.abs(np.fft.rfft(got.pressure[0] * hann(16384), 1 << 18))
-    assert spectrum.argmax() * FS / (1 << 18) == pytest.approx(60e3 * (1.0 + speed / C), abs=4.0)
+    assert spectrum.argmax() * FS / (1 << 18) == pytest.approx(60e3 / (1.0 - speed / C), abs=1.0)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.1])
+def test_a_recording_that_approaches_is_heard_when_it_must_be(tmp_path: Path, late: float) -> None:
+    """Late in the record too: what is heard at t left at s = t - r(s)/c. It came 0.3 ms off after 0.1 s, and by a
+    period off at once."""
+    tone(tmp_path, 60e3)
+    r, speed = 20.0, 5.0
+    motion = f"{{kind: line, start: [{r}, 0, -20], stop: [{r - speed}, 0, -20], duration: 1 s}}"
+    source = f"{{name: a, motion: {motion}, sound: {{kind: noise_recording, path: tone.wav}}}}"
+    got = heard(tmp_path, source, late=late)
+    t = got.start + np.arange(got.pressure.shape[1]) / FS
+    left, there = (t - r / C) / (1.0 - speed / C), r / (1.0 - speed / C)  # there (m): as loud as at the instant
+    exact = np.sin(2.0 * np.pi * 60e3 * left) / there
+    np.testing.assert_allclose(got.pressure[0, 100:-100], exact[100:-100], atol=0.02 / r)
 
 
 def test_a_spectrum_is_heard_at_its_level_and_changes_no_draw_of_the_ambient_noise(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from sonarsynth.receiver import Band, BandPass, BeamGrid, PlanarLattice, Sonar
 from sonarsynth.receiver.sensor_errors import Electronics
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
-from sonarsynth.scattering import Isotropic
+from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.schedule import predict
 from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.shrimp import SnappingShrimp
@@ -106,6 +106,25 @@ def test_parts_are_those_of_each_sound_alone_in_the_beams_of_the_target() -> Non
             got = float(truth[f"{part}_energy"][n])
             assert got == pytest.approx(10.0 * np.log10(known) + 120.0, abs=0.1), (name, part)
         assert float(truth["snr"][n]) == pytest.approx(10.0 * np.log10(alone / sum(rest)), abs=0.1)
+
+
+def test_a_near_target_has_the_energy_of_all_of_its_beams() -> None:
+    """Of hundreds, in few of which it glints: of 64 of them, spread evenly, it was 0.3 dB too much here."""
+    made = recipe(("left",), ("electronics",))
+    ball = replace(made.scene.world.targets[0], shape=Sphere(radius=1.8, edge=0.1), motion=Still(position=(12, 0, -5)))
+    world = replace(made.scene.world, targets=(ball,))
+    sonar = replace(made.scene.sonar, array=PlanarLattice(columns=24, rows=16, pitch=0.04))
+    physics = replace(made.scene.physics, scattering=MirrorLobe(width=np.deg2rad(10)))
+    heard = replace(made.scene.processing, echo_window=EchoWindow(start=3e-3, stop=9e-3))
+    scene = replace(made.scene, world=world, sonar=sonar, physics=physics, processing=heard)
+    made = replace(made, scene=scene)
+    frame = render(plan(made, ("image", "signals")), 0)
+    image, mine = frame["image"].dataset, np.asarray(frame["truth/beams/target"]) == 0
+    assert mine.sum() > 150
+    towards = direction(*np.deg2rad(np.meshgrid(image.azimuth, image.elevation)))[mine]
+    silent = replace(made, scene=replace(made.scene, sonar=replace(sonar, electronics=None)))
+    known = brute(silent, None, (float(image.start), float(image.stop)), towards)
+    assert float(frame["truth/targets/echo_energy"][0]) == pytest.approx(10.0 * np.log10(known) + 120.0, abs=0.1)
 
 
 def test_odds_count_frames_whose_brightest_beam_is_on_a_target_that_is_no_clutter() -> None:

@@ -154,15 +154,16 @@ def chorus_arrivals(
     """
     heights = image_heights(medium.profile, medium.depth, float(depth(receiver.pose.position)), reach.images)
     emitted, at = (snaps.time - time)[:, None], receiver.pose.position[:2]
-    level = np.broadcast_to((snaps.position - at)[:, None], (len(snaps.time), len(heights.climb), 2))
-    velocity = np.zeros(2) if receiver.track is None else receiver.track.velocity[:2]
-    delay = emitted + np.hypot(np.hypot(level[..., 0], level[..., 1]), heights.climb) * heights.slowness
-    if velocity.any():
-        level = level - delay[..., None] * velocity
-        delay = emitted + np.hypot(np.hypot(level[..., 0], level[..., 1]), heights.climb) * heights.slowness
+    level = away = np.broadcast_to((snaps.position - at)[:, None], (len(snaps.time), len(heights.climb), 2))
+    climb = np.broadcast_to(heights.climb, away.shape[:2])
+    velocity = np.zeros(3) if receiver.track is None else receiver.track.velocity
+    delay = emitted + np.hypot(np.hypot(level[..., 0], level[..., 1]), climb) * heights.slowness
+    for _ in range(2 if velocity.any() else 0):  # it makes way at a hundredth of the speed of sound, or less
+        level = away - delay[..., None] * velocity[:2]
+        climb = np.abs(heights.climb + delay * velocity[2] * heights.turns)
+        delay = emitted + np.hypot(np.hypot(level[..., 0], level[..., 1]), climb) * heights.slowness
     snap, image = np.nonzero((delay > window[0]) & (delay < window[1]))
-    level, delay = level[snap, image], delay[snap, image]
-    climb = heights.climb[image]
+    level, climb, delay = level[snap, image], climb[snap, image], delay[snap, image]
     length = np.maximum(np.hypot(np.hypot(level[:, 0], level[:, 1]), climb), 1e-6)
     own = heights.select(image)
     bounced = reflected(

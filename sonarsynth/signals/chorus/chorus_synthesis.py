@@ -30,7 +30,7 @@ from sonarsynth.sources.pulse_model import PulseModel
 
 SHORT, LONGEST = 0.3e-3, 4e-3
 """s: of a snap behind the gentle filter; and of one that keeps frequencies under `SLOW` (1.1 to 2.1 ms were met)."""
-SLOW = 15e3
+SLOW = 25e3
 """Hz."""
 
 

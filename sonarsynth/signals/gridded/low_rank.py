@@ -18,10 +18,11 @@ from sonarsynth.signals.gridded.nodes import SpectralQuantiles, analysis, chebys
 
 
 def spectral_quantiles(frequency: Floats, spectrum: np.ndarray, highest: float) -> SpectralQuantiles:
-    """Quantiles of the modulus of a spectrum over frequency, over `highest` (Hz), rounded up to a twentieth."""
+    """Quantiles of the modulus of a spectrum over frequency, over `highest` (Hz), rounded up to a twentieth: over 0,
+    also of one of which blur leaves next to nothing but its 0 Hz."""
     mass = np.cumsum(np.abs(spectrum))
     quantiles = np.interp((np.arange(8) + 0.5) / 8.0, mass / mass[-1], frequency / highest)
-    return tuple(float(np.ceil(20.0 * v - 1e-6)) / 20.0 for v in quantiles)
+    return tuple(max(float(np.ceil(20.0 * v - 1e-6)), 1.0) / 20.0 for v in quantiles)
 
 
 DEGREES = np.arange(13)

@@ -35,21 +35,22 @@ def add_noise_source(
     absorption: Callable[[Floats], Floats] | None,
     *,
     time: float,
-    closing: float,
+    faster: float,
     random: np.random.Generator,
 ) -> Signals:
     """Signals with the sound of a source.
 
     arrivals: its paths, of an emission of 1 Pa at 1 m at the instant of the frame (`instant`); time: of the frame, in s
-    since the start of the motions; closing: speed in m/s at which source and array approach.
+    since the start of the motions; faster: how many times as fast as it was played the array hears a recording.
     """
     if not arrivals.delay.size:
         return signals
     fs, samples = signals.sampling_frequency, signals.pressure.shape[1]
     front = array_paths(arrivals, (instant,), elements, attenuation(absorption, sonar.band.centre))
     passed = fir(sonar.antialias)
-    early = float(arrivals.delay.min()) - 2.0 * elements.aperture / arrivals.sound_speed
-    spread = float(arrivals.delay.max()) + 2.0 * elements.aperture / arrivals.sound_speed - early
+    first, beside = float(arrivals.delay.min()), 2.0 * elements.aperture / arrivals.sound_speed
+    early = first - beside
+    spread = float(arrivals.delay.max()) + beside - early
     lead = int(np.ceil((spread + duration(passed)) * fs)) + MARGIN
     length = fast_length(lead + samples + MARGIN)
     frequency = rfftfreq(length, 1.0 / fs)
@@ -59,8 +60,8 @@ def add_noise_source(
     f = frequency[drawn]
     sent = np.zeros(frequency.size, complex)
     if isinstance(source.sound, NoiseRecording):
-        step = (1.0 + closing / arrivals.sound_speed) / fs
-        played = source.sound.segment(time + signals.start - lead / fs - early, step, length)
+        begin = (signals.start + beside) * fs - lead  # paths are those of the instant, 0
+        played = source.sound.segment(time - first + begin * faster / fs, faster / fs, length)
         sent[drawn] = rfft(played)[drawn] * through[drawn]
     else:
         normal = random.standard_normal((2, drawn.size))
