@@ -25,10 +25,12 @@ def card(
     """Describe a store: a dataset card to read (Markdown), and Croissant metadata for programs; where there are images,
     say what a threshold finds in 200 of them at most."""
     from sonarsynth.evaluation.detectors.threshold_baseline import threshold_lines
-    from sonarsynth.store import built_frames, cards, folder_of, open_store
+    from sonarsynth.store import built_frames, cards, open_store
+    from sonarsynth.store.marks import must_hold_all
 
+    must_hold_all(store)
     files = cards.write(store, out)
-    tree = open_store(folder_of(store))
+    tree = open_store(store)
     for line in (*map(str, files), *threshold_lines(tree, built_frames(tree))):
         typer.echo(line)
 
