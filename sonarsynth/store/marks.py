@@ -172,7 +172,7 @@ class WrittenFiles:
         number = f"{file.rpartition('/')[2]}.".split(".")[1]
         if number not in self._absent:
             mark = load_mark(self._store, number)
-            self._absent[number] = mark and frozenset(name for name, size in mark.files.items() if size == ABSENT)
+            self._absent[number] = None if mark is None else frozenset(f for f, r in mark.files.items() if r == ABSENT)
         absent = self._absent[number]
         return absent is not None and file not in absent
 

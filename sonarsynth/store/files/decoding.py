@@ -71,6 +71,6 @@ class WholeReads(WrapperStore[Store]):
         return [await self.get(key, prototype, part) for key, part in key_ranges]
 
 
-def opens_whole(folder: Folder) -> WholeReads:
+def opens_whole(folder: Folder) -> Any:
     """What zarr and xarray open, to read, as `opens`, where nothing may be missing."""
     return WholeReads(opens(folder), WrittenFiles(folder))
