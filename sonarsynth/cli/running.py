@@ -23,7 +23,7 @@ STATUS = dict.fromkeys(("StoreLocked", "BuildEnded", "Damage"), STORE) | dict.fr
     INPUT,
 )
 """Of errors that say all there is to say, by name: what raises them may not be imported yet."""
-BAD_PLACE = PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError
+BAD_PLACE = FileNotFoundError, PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError
 """What the system says of a place that a command was given and cannot use."""
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
