@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -83,7 +84,7 @@ def export(
 
 def _points(store: str, to: str, out: Path | None, frames: str | None, relative_to: str) -> None:
     from sonarsynth.export import points, write_points
-    from sonarsynth.store import named_after, open_store
+    from sonarsynth.store import Damage, named_after, open_store
 
     tree = open_store(store)
     beside = named_after(store).with_suffix(f".{to}")
@@ -92,6 +93,8 @@ def _points(store: str, to: str, out: Path | None, frames: str | None, relative_
     try:
         cloud = points(tree, _built(tree, store, frames), relative_to=relative_to)
         written = write_points(cloud, file if file.suffix else file.with_suffix(f".{to}"))
+    except Damage:
+        raise
     except (ValueError, ImportError) as error:
         raise BadOption(str(error)) from None
     typer.echo(f"{written}: {cloud.sizes['point']} points")
@@ -112,8 +115,11 @@ def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
     try:
         with printing.progress("reading") as progress:
             files = write(tree, folder, chosen, progress)
-    except ImportError as error:
-        raise BadOption(f"{error}: pip install 'sonarsynth[netcdf]'") from None
+    except BaseException as error:
+        shutil.rmtree(folder, ignore_errors=True)  # it was empty, and a part of an export would be taken for all of it
+        if isinstance(error, ImportError):
+            raise BadOption(f"{error}: pip install 'sonarsynth[netcdf]'") from None
+        raise
     for file in files:
         typer.echo(str(file))
     for note in lost:

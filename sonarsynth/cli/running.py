@@ -9,6 +9,7 @@ import signal
 import sys
 import tempfile
 import traceback
+import warnings
 from types import FrameType
 from typing import TYPE_CHECKING
 
@@ -16,13 +17,13 @@ if TYPE_CHECKING:
     import typer
 
 OURS, INPUT, STORE, INTERRUPTED = 1, 2, 4, 130
-STATUS = dict.fromkeys(("StoreLocked", "BuildEnded", "Damage", "DamagedFile"), STORE) | dict.fromkeys(
+STATUS = dict.fromkeys(("StoreLocked", "BuildEnded", "Damage"), STORE) | dict.fromkeys(
     ("RecipeError", "Mismatch", "NothingToDraw", "TooLarge", "Unreachable", "NoScheduler")
     + ("RecordingError", "TrackError", "DetectionsError"),
     INPUT,
 )
 """Of errors that say all there is to say, by name: what raises them may not be imported yet."""
-BAD_PLACE = PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError
+BAD_PLACE = FileNotFoundError, PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError
 """What the system says of a place that a command was given and cannot use."""
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -70,8 +71,9 @@ def _explain(error: Exception, shown: bool) -> int:
     from sonarsynth.description import FieldError
 
     name = type(error).__name__
-    if name == "DamagedFile":
+    if name == "Damage":
         logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # other files that were read are of no interest
+        warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)
     if name in STATUS or isinstance(error, (BadOption, FieldError)):
         lines = str(error).split("\n") if name == "RecipeError" else [str(error)]
         return max(_say(line, STATUS.get(name, INPUT)) for line in lines)

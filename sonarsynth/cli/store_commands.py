@@ -25,10 +25,12 @@ def card(
     """Describe a store: a dataset card to read (Markdown), and Croissant metadata for programs; where there are images,
     say what a threshold finds in 200 of them at most."""
     from sonarsynth.evaluation.detectors.threshold_baseline import threshold_lines
-    from sonarsynth.store import built_frames, cards, folder_of, open_store
+    from sonarsynth.store import built_frames, cards, open_store
+    from sonarsynth.store.marks import must_hold_all
 
+    must_hold_all(store)
     files = cards.write(store, out)
-    tree = open_store(folder_of(store))
+    tree = open_store(store)
     for line in (*map(str, files), *threshold_lines(tree, built_frames(tree))):
         typer.echo(line)
 
@@ -66,6 +68,7 @@ def detect(
     """Run a baseline detector on the images of a store: boxes, scores, ranges as JSON, the results format of COCO."""
     from sonarsynth import detection
     from sonarsynth.cli import printing
+    from sonarsynth.conventions import counted
     from sonarsynth.store import named_after
 
     chosen: detection.DetectionMethod = (
@@ -77,7 +80,7 @@ def detect(
         detections = detection.detect(store, chosen, split=split, progress=progress)
     beside = named_after(store)
     file = detections.write(out or beside.with_name(f"{beside.name}.{chosen.kind}.json"))
-    typer.echo(f"{file}: {len(detections)} detections")
+    typer.echo(f"{file}: {counted(len(detections), 'detection')}")
 
 
 def evaluate(
@@ -117,9 +120,11 @@ def _print(score: dict[str, Any], console: Console) -> None:
     from rich.markup import escape
     from rich.table import Table
 
+    from sonarsynth.conventions import counted
     from sonarsynth.evaluation.detectors.detector_scores import share_found, words_of
 
-    console.print(f"{score['detections']} detections of {score['objects']} objects in {score['frames']} frames")
+    found, sought, frames = (counted(score[f"{name}s"], name) for name in ("detection", "object", "frame"))
+    console.print(f"{found} of {sought} in {frames}")
     table = Table("", "objects", "AP by boxes", "AP50", "AP by distance", "AP 2 m", "found at 1 false alarm a frame")
     at_one = next(rate for rate in score["detection"] if rate["false_alarms_a_frame"] == 1.0)
     table.add_row("all", str(score["objects"]), *words_of(score, at_one))

@@ -58,7 +58,7 @@ class Detections:
         return Detections(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
     def write(self, path: str | Path) -> Path:
-        """Write them as COCO results (see `read`). Raises OSError where the file cannot be written."""
+        """Write them as COCO results (see `read`), into a folder that is made. Raises OSError."""
         columns = {name: getattr(self, name).tolist() for name in MEASURED}
         rows = []
         for i, (frame, category, score) in enumerate(
@@ -71,6 +71,7 @@ class Detections:
                 x0, y0, x1, y1 = self.box[i].tolist()
                 row["bbox"] = [x0, y0, x1 - x0, y1 - y0]
             rows.append(row | {name: values[i] for name, values in columns.items() if np.isfinite(values[i])})
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
         Path(path).write_text("[" + ",\n".join(map(json.dumps, rows)) + "]\n", encoding="utf-8")
         return Path(path)
 

@@ -55,17 +55,29 @@ def odds(energy: Floats, beam_target: npt.NDArray[np.int16], clutter: Bools, snr
     """Of one frame: its image (elevation, azimuth), the target of each beam (-1: none), which targets are clutter
     (target,), their ratios (target,) dB (none where echoes are all that is heard: no odds), a beam width in beams.
     A peak is as bright as any beam so near to it."""
-    from scipy.ndimage import binary_dilation, maximum_filter
+    from scipy.ndimage import distance_transform_edt
 
     of = np.append(~clutter, False)[beam_target]  # beams on nothing: the last
     if snr is None or not of.any() or not np.isfinite(energy).any():
         return NO_ODDS
-    rows, columns = np.mgrid[-reach : reach + 1, -reach : reach + 1]
-    disc = rows**2 + columns**2 <= reach**2
     heard = np.where(np.isfinite(energy), energy, -np.inf)
-    peaks = np.where(maximum_filter(heard, footprint=disc) == heard, heard, -np.inf).ravel()
+    peaks = np.where(brightest_about(heard, reach) == heard, heard, -np.inf).ravel()
     best = np.argsort(-peaks, kind="stable")[:PEAKS]
-    near = binary_dilation(of, disc)
+    near = distance_transform_edt(~of) <= reach
     on_target = near.ravel()[best] & np.isfinite(peaks[best])
     ratios = snr[~clutter & np.isfinite(snr)]
     return Odds(1, int(on_target[0]), int(on_target.any()), float(near.mean()), tuple(ratios.tolist()))
+
+
+def brightest_about(energy: Floats, reach: int) -> Floats:
+    """The brightest beam within `reach` beams of each (elevation, azimuth), a row of the disc at a time: a beam of one
+    hydrophone fills the image, and takes a minute by all beams at once."""
+    from scipy.ndimage import maximum_filter1d
+
+    rows, highest = len(energy), energy.copy()
+    for off in range(min(reach, rows - 1) + 1):
+        width = 2 * int(np.sqrt(reach**2 - off**2)) + 1
+        along = maximum_filter1d(energy, width, axis=1, mode="constant", cval=-np.inf)
+        for to, of in ((slice(off, rows), slice(0, rows - off)), (slice(0, rows - off), slice(off, rows))):
+            highest[to] = np.maximum(highest[to], along[of])
+    return highest

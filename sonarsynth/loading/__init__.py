@@ -30,6 +30,7 @@ def open(path: Folder | Path | str) -> xr.DataTree:
 
     Raises
     ------
-    Mismatch where there is no store that xarray can open, or one of another format.
+    Mismatch where there is no store of ours, or one of another format. Reading a variable raises Damage where its file
+    is damaged or missing.
     """
     return open_store(path)

@@ -180,7 +180,7 @@ def _write_sheet(
     if missing:
         say(f"sheet: without {', '.join(missing)}, which the store does not hold")
     elif not loudest_of_beams:
-        say("sheet: without beam signals, for no beam of the frame points at a target")
+        say("sheet: without beam signals, for no beam of the frame points at a target, or no source sounds")
     errors = Errors(points=frame.points, error=frame.range_error)
     view = frame_view(tree, frame)
     fig = sheet(*beam_grid(tree), view, errors, loudest_of_beams, window([view]), "energy re the brightest beam (dB)")

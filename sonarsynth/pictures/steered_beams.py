@@ -24,10 +24,17 @@ EXTREME = 0.1
 
 
 def beams(tree: xr.DataTree, frame: StoredFrame) -> list[Beam]:
-    """A close hit, a far hit and a close miss on the far side; none without signals or a target in view."""
+    """A close hit, a far hit and a close miss on the far side; none without signals, a source to count time from or a
+    target in view."""
     pressure = read(tree, "signals/pressure", frame.index)
     start = read(tree, "signals/start", frame.index)
-    if pressure is None or start is None or not np.isfinite(start) or not np.isfinite(pressure).any():
+    if (
+        not len(frame.snap)
+        or pressure is None
+        or start is None
+        or not np.isfinite(start)
+        or not np.isfinite(pressure).any()
+    ):
         return []
     azimuth, elevation = beam_grid(tree)
     chosen = choose(frame, azimuth, elevation, float(np.rad2deg(beam_width(tree))))

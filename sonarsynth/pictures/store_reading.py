@@ -42,8 +42,6 @@ def opened(store: str | Folder) -> xr.DataTree:
         hold(tree, path)
     except Mismatch as problem:
         raise NothingToDraw(str(problem)) from None
-    if "truth" not in tree.children or "frame" not in tree["truth"].sizes:
-        raise NothingToDraw(f"{path}: a store has a group /truth with frames; this has none")
     return tree
 
 

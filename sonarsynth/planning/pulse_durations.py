@@ -112,6 +112,8 @@ def ranged_echo(stretch: float, shape: Waveform | None, sonar: Sonar) -> Stretch
         return StretchedEcho(0.0, 1.0, 0.0)
     (f, wave), (_, longer) = (whole_spectrum(shape, sonar, doppler) for doppler in (0.0, stretch))
     band = slice(*np.searchsorted(f, [sonar.band.low, sonar.band.high]))
+    if len(f[band]) < 2:  # too narrow for anything to be located, or ranged
+        return StretchedEcho(0.0, 1.0, 0.0)
     return stretched_echo(f[band], wave[band], longer[band], sonar.band)
 
 

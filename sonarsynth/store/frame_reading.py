@@ -25,7 +25,7 @@ from sonarsynth.store.files import within
 from sonarsynth.store.files.place import Folder, absolute, read
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import Mismatch
-from sonarsynth.store.marks import Damage
+from sonarsynth.store.marks import Damage, WrittenFiles
 from sonarsynth.store.opening import check_format, must_be_folder
 
 if TYPE_CHECKING:
@@ -216,10 +216,11 @@ class FrameReader:
 
     def _open(self) -> None:
         self._files: OrderedDict[str, _File | None] = OrderedDict()
+        self._written = WrittenFiles(self.root)
         self._arrays: dict[str, FrameArray] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("_files", "_arrays")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_files", "_written", "_arrays")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -241,13 +242,14 @@ class FrameReader:
         return self._arrays[name]
 
     def file(self, name: str) -> _File | None:
-        """A file that stays open for a while; None where there is none."""
+        """A file that stays open for a while; None where none was written. Raises Damage for one that is missing."""
         if name in self._files:
             self._files.move_to_end(name)
             return self._files[name]
         try:
             file: _File | None = _File(self.root, name)
         except FileNotFoundError:
+            self._written.must_not_be_missing(name)
             file = None
         self._files[name] = file
         while len(self._files) > MOST_FILES:

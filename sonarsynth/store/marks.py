@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Final
 
 import google_crc32c
@@ -148,10 +149,58 @@ def _marks_asked_for(store: Remote) -> list[int]:
     return [number for number, mark in load_marks(store, range(shards)) if mark is not None]
 
 
-def must_hold_files(store: Folder, arrays: Iterable[str]) -> None:
-    """Raise Damage where a file of an array is missing from a store, since readers take it for one of fill values.
+class WrittenFiles:
+    """What the marks of a store say was written, looked up where a file is not there: readers take one that is missing
+    for one of fill values. Each mark is read once; a shard without one was not built."""
 
-    arrays: paths in the store, the first axis of each `frame`. Files that no mark names were not built."""
+    def __init__(self, store: Folder) -> None:
+        self._store = store
+        self._fixed: frozenset[str] | None = None  # files that no frame changes
+        self._absent: dict[str, frozenset[str] | None] = {}  # those of a shard that were not written
+
+    def must_not_be_missing(self, file: str) -> None:
+        """Raise Damage where the file of a chunk, which was not there to be read, was written."""
+        if self._written(file) and not place.there(self._store, file):  # a build may have written it meanwhile
+            raise missing(file)
+
+    def _written(self, file: str) -> bool:
+        if self._fixed is None:
+            layout = load_layout(self._store)
+            self._fixed = frozenset() if layout is None else frozenset(layout.files)
+        if file in self._fixed:
+            return True
+        number = f"{file.rpartition('/')[2]}.".split(".")[1]
+        if number not in self._absent:
+            mark = load_mark(self._store, number)
+            self._absent[number] = None if mark is None else frozenset(f for f, r in mark.files.items() if r == ABSENT)
+        absent = self._absent[number]
+        return absent is not None and file not in absent
+
+
+def missing(file: str) -> Damage:
+    """What is wrong where a file of a store is gone."""
+    return Damage(f"{file}: the file is missing: 'sonarsynth repair' restores it")
+
+
+def file_missing_of(store: Folder) -> Callable[[Mark], str]:
+    """A function that names the first file of a mark, in a folder of the store, that is not there; "" where all are, or
+    nobody can list them. Each folder is listed once; no file is read."""
+
+    @cache
+    def names(folder: str) -> frozenset[str]:
+        return frozenset(entries(store, folder))
+
+    def first_missing(mark: Mark) -> str:
+        if isinstance(store, Remote) and not store.listed:
+            return ""
+        written = (file.rpartition("/") for file, record in mark.files.items() if "/" in file and record != ABSENT)
+        return next((f"{folder}/{name}" for folder, _, name in written if name not in names(folder)), "")
+
+    return first_missing
+
+
+def must_hold_files(store: Folder, arrays: Iterable[str]) -> None:
+    """Raise Damage where a file of an array (its path; the first axis `frame`) is missing from a store."""
     numbers = marked(store)
     for array in arrays:
         there = {name.split(".")[1] for name in entries(store, array) if name.startswith("c.")}
@@ -159,7 +208,16 @@ def must_hold_files(store: Folder, arrays: Iterable[str]) -> None:
             mark = load_mark(store, number)
             for file, record in mark.files.items() if mark else ():
                 if file.startswith(f"{array}/") and record != ABSENT:
-                    raise Damage(f"{file}: the file is missing: 'sonarsynth repair' restores it")
+                    raise missing(file)
+
+
+def must_hold_all(store: Folder | str) -> None:
+    """Raise Damage where any file that the marks of a store name is missing from it."""
+    folder = place.absolute(store)
+    first_missing = file_missing_of(folder)
+    for mark in (load_layout(folder), *(mark for _, mark in load_marks(folder, marked(folder)))):
+        if isinstance(mark, Mark) and (file := first_missing(mark)):
+            raise missing(file)
 
 
 def all_files(store: Folder) -> Iterator[str]:

@@ -10,8 +10,9 @@ import numpy as np
 from sonarsynth.conventions import FORMAT_VERSION
 from sonarsynth.description import FieldError
 from sonarsynth.products import SPLITS
-from sonarsynth.store.files.place import Folder, Opened, absolute, opens, read_json, there
+from sonarsynth.store.files.place import Folder, Opened, absolute, read_json, there
 from sonarsynth.store.files.within import Mismatch
+from sonarsynth.store.marks import Damage, load_layout
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,24 +49,28 @@ def open_store(path: Folder | str) -> xr.DataTree:
     """A store as a DataTree, read lazily: what `xarray.open_datatree(path, engine="zarr")` gives, but no link in the
     store is followed, and counts of the converter decode to float32 (plain xarray: float64).
 
-    path: a folder or a URL. Returns the tree. Raises Mismatch where there is no store that xarray can open, or one of
-    another format. Reading a variable of the tree raises DamagedFile where a file cannot be decoded.
+    path: a folder or a URL. Returns the tree. Raises Mismatch where there is no store of ours, or one of another
+    format. Reading a variable of the tree raises Damage where a file cannot be decoded, or is missing.
     """
     import xarray as xr
     import zarr
 
-    from sonarsynth.store.files.decoding import NAMING
+    from sonarsynth.store.files.decoding import NAMING, opens_whole
 
     folder = absolute(path)
     must_be_folder(folder)
     try:
         with zarr.config.set(NAMING):
-            stored = xr.open_datatree(opens(folder), engine="zarr", decode_cf=False)
+            stored = xr.open_datatree(opens_whole(folder), engine="zarr", decode_cf=False)
         check_format(folder, stored.attrs)
+        if "truth" not in stored.children or "frame" not in stored["truth"].sizes:
+            raise Mismatch(f"{folder}: a store has a group /truth with frames; this has none")
         tree = stored.map_over_datasets(_decoded)
-    except Mismatch:
+    except (Mismatch, Damage):
         raise
     except (OSError, ValueError, KeyError) as error:
+        if not read_json(folder, "zarr.json") and load_layout(folder) is not None:
+            raise Damage(f"{folder}: zarr.json is missing or damaged: 'sonarsynth repair' restores it") from None
         if type(error).__name__ == "GroupNotFoundError":
             raise Mismatch(f"{folder} is not a store of sonarsynth") from None
         first = (str(error).splitlines() or [type(error).__name__])[0]

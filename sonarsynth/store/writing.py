@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -15,7 +15,17 @@ from sonarsynth.store.files.place import Folder, Opened, absolute, folder_of, he
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import OpenedFolder
 from sonarsynth.store.layout import layout_of
-from sonarsynth.store.marks import ABSENT, ContentDigest, Damage, Mark, drop_mark, load_marks, marked, save_mark
+from sonarsynth.store.marks import (
+    ABSENT,
+    ContentDigest,
+    Damage,
+    Mark,
+    drop_mark,
+    file_missing_of,
+    load_marks,
+    marked,
+    save_mark,
+)
 from sonarsynth.store.opening import attributes_in
 from sonarsynth.store.provenance import other_versions
 
@@ -102,7 +112,8 @@ _seen: dict[tuple[object, ...] | None, dict[str, str]] = {}
 def missing(path: Folder | str, plan: Plan, frames: Iterable[int] | None = None) -> dict[int, tuple[int, ...]]:
     """Shards to do so that `frames` (left out: all) are in the store, and the frames to render for each.
 
-    A shard is written whole, so one that has some of its frames is rendered again with those and the wanted ones.
+    A shard is written whole, so one that has some of its frames is rendered again with those and the wanted ones; so is
+    one with a file that is gone, which readers would take for one of fill values.
     Raises IndexError for a frame outside the dataset.
     """
     path, layout = absolute(path), layout_of(plan)
@@ -111,11 +122,15 @@ def missing(path: Folder | str, plan: Plan, frames: Iterable[int] | None = None)
         if not 0 <= frame < layout.frames:
             raise IndexError(f"frame {frame} is outside 0..{layout.frames - 1}")
         wanted.setdefault(frame // layout.shard_frames, set()).add(frame)
-    stored = _have(path, wanted.keys() & set(marked(path)))
+    stored, broken, file_missing = dict[int, set[int]](), set[int](), file_missing_of(path)
+    for shard, mark in _whole_marks(path, wanted.keys() & set(marked(path))):
+        stored[shard] = set(mark.frames)
+        if file_missing(mark):
+            broken.add(shard)
     todo = {}
     for shard, needed in sorted(wanted.items()):
         have = stored.get(shard, set())
-        if not needed <= have:
+        if shard in broken or not needed <= have:
             todo[shard] = tuple(sorted(needed | have))
     return todo
 
@@ -123,9 +138,9 @@ def missing(path: Folder | str, plan: Plan, frames: Iterable[int] | None = None)
 def frames_there(path: Folder | str) -> list[int]:
     """Frames that are complete in the store, by their marks."""
     path = absolute(path)
-    return sorted(frame for have in _have(path, marked(path)).values() for frame in have)
+    return sorted(frame for _, mark in _whole_marks(path, marked(path)) for frame in mark.frames)
 
 
-def _have(path: Folder, shards: Iterable[int]) -> dict[int, set[int]]:
-    """The frames of shards whose marks are whole."""
-    return {n: set(mark.frames) for n, mark in load_marks(path, sorted(shards)) if isinstance(mark, Mark)}
+def _whole_marks(path: Folder, shards: Iterable[int]) -> Iterator[tuple[int, Mark]]:
+    """The marks of shards that are whole, with their numbers."""
+    return ((number, mark) for number, mark in load_marks(path, sorted(shards)) if isinstance(mark, Mark))

@@ -16,7 +16,7 @@ from sonarsynth.environment.sea import Environment, Isovelocity
 from sonarsynth.geometry.motion import Still
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.imaging.image_window import snapshots_of
-from sonarsynth.labels.odds import NO_ODDS, odds
+from sonarsynth.labels.odds import NO_ODDS, brightest_about, odds
 from sonarsynth.pipeline import synthesise, trace_frame
 from sonarsynth.planning import plan
 from sonarsynth.receiver import Band, BandPass, BeamGrid, PlanarLattice, Sonar
@@ -147,6 +147,18 @@ def test_odds_count_frames_whose_brightest_beam_is_on_a_target_that_is_no_clutte
     )
     assert odds(image, beams, clutter, None, 1) == NO_ODDS  # nothing but echoes
     assert odds(image, np.full((9, 12), -1, np.int16), clutter, snr, 1).line == ""
+
+
+@pytest.mark.parametrize("shape", [(9, 12), (1, 7), (7, 1), (20, 23)])
+def test_the_brightest_beam_about_each_is_that_of_a_disc(shape: tuple[int, int]) -> None:
+    """However far the disc reaches beyond the image, and where nothing is known of a beam."""
+    random = np.random.default_rng(4)
+    energy = np.where(random.random(shape) < 0.2, -np.inf, random.normal(size=shape))
+    place = np.stack(np.indices(shape), axis=-1).reshape(-1, 2)
+    apart = np.hypot(*(place[:, None] - place).transpose(2, 0, 1))
+    for reach in (1, 2, 5, 31):
+        about = np.where(apart <= reach, energy.ravel(), -np.inf).max(axis=1).reshape(shape)
+        assert np.array_equal(brightest_about(energy, reach), about)
 
 
 @pytest.mark.parametrize(("level", "far"), [(-10.0, 60.0), (115.0, -40.0)])

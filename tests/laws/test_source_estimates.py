@@ -14,6 +14,7 @@ from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, wavefront_delays
 from sonarsynth.evaluation import snap_located
+from sonarsynth.evaluation.source_estimates import as_predicted
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.labels.estimate_labels import Direct, emissions
 from sonarsynth.planning.notes.source_notes import locator, off_the_bottom, standing_off
@@ -346,6 +347,51 @@ def test_each_quantity_is_verified_by_its_own_errors() -> None:
         assert check.ok is False and check.frames == (0, 1)
     assert "farther from every snap" in snap_located(store(emission=-1), frames).got
     assert snap_located(store(spread=0.01), frames).ok is False
+
+
+@pytest.mark.parametrize("name", ["time", "azimuth", "elevation", "position"])
+def test_of_two_estimates_one_may_miss_by_chance(name: str) -> None:
+    """By 3.4 predicted errors, as normal errors do once in 1500; not by 10, not both, and none that is of no snap."""
+    frames = np.arange(2)
+
+    def check(*ratios: float) -> bool | None:
+        tree = store()
+        group = tree["source_estimates"]
+        right, width = {"time": (0.01, 1e-7), "azimuth": (20.0, 0.01), "elevation": (-10.0, 0.01)}.get(name, (0, 0))
+        if name == "position":
+            beyond = np.sqrt(14.16) / 3.0 * 0.05 * np.array(ratios)
+            group[name][:, 0, :] = np.array([14.0, 5.0, -2.0]) + beyond[:, None] * [1.0, 0.0, 0.0]
+        else:
+            group[name][:, 0] = right + width * np.array(ratios)
+        found = snap_located(tree, frames)
+        assert found.frames == tuple(np.flatnonzero(np.abs(ratios) > 3.0))
+        return found.ok
+
+    assert check(0.5, -3.4) and check(3.4, 0.5) and check(2.9, 2.9)
+    assert check(0.5, 10.0) is False and check(3.1, -3.1) is False
+    stray = store()
+    stray["source_estimates/emission"][1] = -1
+    stray["source_estimates/time"][1] += 1e-3
+    assert snap_located(stray, frames).ok is False
+
+
+def test_chance_passes_and_what_is_wrong_does_not() -> None:
+    """Normal errors as predicted are refused in fewer than one of 300 stores of any size; of twenty estimates or more
+    the rule is 95 %, or one more; predictions that are a fifth of the errors are found out from six estimates on."""
+    random = np.random.default_rng(1)
+    for count in (1, 2, 5, 10, 17, 20, 40, 60, 200):
+        errors = random.normal(size=(3000, count))
+        assert np.mean([not as_predicted(row) for row in np.abs(errors)]) < 1.0 / 300.0
+        if count >= 6:
+            assert np.mean([as_predicted(row) for row in np.abs(5.0 * errors)]) < 0.02
+        allowed = [n for n in range(count + 1) if as_predicted(np.repeat([3.1, 0.5], [n, count - n]))]
+        assert allowed == list(range(len(allowed))) and allowed[-1] == max(
+            count // 20, 1 if count < 18 else min(2, count)
+        )
+    for count, largest in ((1, 6.66), (2, 9.42), (10, 21.0)):
+        for ratio, good in ((0.99 * largest, True), (1.01 * largest, False), (np.inf, False), (np.nan, False)):
+            assert as_predicted(np.array([ratio] + [0.5] * (count - 1))) is good
+    assert as_predicted(np.array([1e9] + [0.5] * 19)) and not as_predicted(np.array([1e9] + [0.5] * 18))
 
 
 def test_the_mirror_image_of_a_snap_is_a_warning() -> None:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
 import sonarsynth
 from sonarsynth import cli, pipeline
@@ -185,3 +188,28 @@ def test_the_schema_takes_every_recipe_there_is_and_no_misspelt_one() -> None:
         assert not list(check.iter_errors(data)), file.name
         data["scene"]["sonar"]["beems"] = {}
         assert list(check.iter_errors(data)), file.name
+
+
+def test_a_store_of_somebody_else_or_without_its_root_is_said_in_one_line(
+    command: Command, reference: Path, tmp_path: Path
+) -> None:
+    other, rootless = tmp_path / "other.zarr", tmp_path / "rootless.zarr"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that Zarr 3 has no word on consolidated metadata
+        xr.Dataset({"a": ("x", [1.0])}).to_zarr(other, zarr_format=3, consolidated=True)
+    shutil.copytree(reference, rootless)
+    (rootless / "zarr.json").unlink()
+    for path, status, said in (
+        (other, 2, "a store has a group /truth with frames; this has none"),
+        (rootless, 4, "zarr.json is missing or damaged: 'sonarsynth repair' restores it"),
+    ):
+        for name, *options in (
+            ("show",),
+            ("export",),
+            ("export", "--to", "coco"),
+            ("export", "--to", "sonar-netcdf"),
+            ("detect",),
+            ("evaluate", "truth"),
+            ("report",),
+        ):
+            assert command(name, path, *options) == (status, "", f"sonarsynth: {path}: {said}\n")

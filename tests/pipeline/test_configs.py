@@ -1,5 +1,6 @@
 """The recipes in configs/, each as its users run it."""
 
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -218,6 +219,23 @@ def test_each_image_of_the_boat_shows_what_it_is_for() -> None:
     assert levels("sub_band")[1] < ghost - 10.0
     assert levels("clean")[1] < ghost - 6.0
     assert levels("order_statistic")[0] < echo - 15.0
+
+
+@pytest.mark.long
+def test_levels_of_the_images_of_the_boat_are_those_of_the_page() -> None:
+    """To the tenth of a dB that tools/docs/how-to/images.md has; with the chorus, whose draws are part of them."""
+    page = (CONFIGS.parent / "tools/docs/how-to/images.md").read_text().partition("```")[0]
+    rows = re.findall(r"^\| `(\w+)` \|.*\| (\S+) \| (\S+) \| (\S+) \|$", page, re.MULTILINE)
+    assert len(rows) == 6
+    for kind, *written in rows:
+        energy = render(_plan("boat.yaml", f"scene.processing.beamforming={{kind: {kind}}}"), 1)["image/energy"]
+        decibels = 10.0 * np.log10(np.maximum(energy / energy.max(), 1e-9))
+        ball, boat = (
+            decibels.where((abs(energy.azimuth - azimuth) < 5.0) & (abs(energy.elevation - elevation) < 5.0)).max()
+            for azimuth, elevation in ((8.1, 0.0), (-6.3, 9.4))
+        )
+        ghost = decibels.sel(elevation=slice(-20.0, -10.0)).max()
+        assert [float(level) for level in (ball, boat, ghost)] == pytest.approx([float(w) for w in written], abs=0.11)
 
 
 def test_the_target_crosses_20_m_ahead_9_m_to_the_right() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import sonarsynth as ss
 from sonarsynth import planning, schedule
@@ -201,10 +202,14 @@ def test_a_missing_file_is_no_data(store: Path, tmp_path: Path, name: str) -> No
     if name != "truth/sonar_position":
         assert len(Frames(copy, image="none", targets="points")) == 16
     if name == "image/energy":
-        for use in (lambda: ss.detect(copy), lambda: write_coco(ss.open(copy), tmp_path, np.arange(2, 18))):
-            with pytest.raises(
-                Damage, match="image/energy: that of frame 2 is missing: 'sonarsynth repair' restores it"
-            ):
+        plain = xr.open_datatree(copy, engine="zarr")
+        for use, said in (
+            (lambda: ss.detect(copy), "energy/c.0.0.0: the file"),
+            (lambda: write_coco(ss.open(copy), tmp_path, np.arange(2, 18)), "energy/c.0.0.0: the file"),
+            (lambda: ss.detect(plain), "energy: that of frame 2"),
+            (lambda: write_coco(plain, tmp_path, np.arange(2, 18)), "energy: that of frame 2"),
+        ):
+            with pytest.raises(Damage, match=f"^image/{said} is missing: 'sonarsynth repair' restores it"):
                 use()
 
 

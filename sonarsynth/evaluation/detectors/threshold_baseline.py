@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sonarsynth.conventions import counted
 from sonarsynth.detection import by_kind, detections_of, from_rows, views
 from sonarsynth.evaluation.detectors.detector_scores import DetectorReport
 from sonarsynth.evaluation.detectors.true_objects import category_names, true_objects
@@ -32,8 +33,8 @@ def threshold_lines(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     ]
     report = DetectorReport(len(used), tuple(category_names(tree)), from_rows(rows), objects)
     reached = float(report.as_json()["ap_2m"])
-    precision = f"a threshold reaches an average precision of {reached:.2f} (at 2 m, {len(objects)} objects"
+    precision = f"a threshold reaches an average precision of {reached:.2f} (at 2 m, {counted(len(objects), 'object')}"
     snr = objects.snr[np.isfinite(objects.snr)]
     ratios = f", snr {snr.min():.0f} to {snr.max():.0f} dB" if len(snr) else ""
-    lines = [f"{precision} in {len(used)} frames{ratios})"]
+    lines = [f"{precision} in {counted(len(used), 'frame')}{ratios})"]
     return [*lines, "warning: there is little to learn from this dataset"] if reached > TRIVIAL else lines

@@ -10,6 +10,7 @@ import numpy as np
 from sonarsynth.description import FieldError
 from sonarsynth.environment.absorption import absorption_notes
 from sonarsynth.environment.boundary_numbers import boundary_notes
+from sonarsynth.environment.down_cast import PLAUSIBLE
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.water.boundary_reflection import plane_wave_error
 from sonarsynth.planning.notes.noise_checks import noise_notes
@@ -24,7 +25,7 @@ def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
     Raises FieldError where the sound speed that the sonar believes in cannot be read.
     """
     environment, band = scene.world.environment, scene.sonar.band
-    field_notes = [("sound_speed", note) for note in profile.notes]
+    field_notes = [("sound_speed", note) for note in (*profile.notes, *_of_no_water(profile, environment.depth))]
     if scene.physics.tracing.layered:
         field_notes += [("sound_speed", note) for note in _steps(profile, band.low)]
     field_notes += [
@@ -36,6 +37,14 @@ def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
             field_notes += [(f"{name}.{field}", note) for field, note in boundary_notes(boundary, band.low, band.high)]
     lines = [f"scene.world.environment.{field}: {note}" for field, note in field_notes]
     return (*lines, *noise_notes(scene), *(f"{'.'.join(BELIEVED)}: {note}" for note in _believed(scene)))
+
+
+def _of_no_water(profile: Profile, depth: float) -> list[str]:
+    """Whether the sound speed above the bottom is one that no sea has, as where its unit is wrong."""
+    low, high, unit = PLAUSIBLE["sound speed"]
+    speeds = profile.at(np.append(profile.depth[profile.depth < depth], depth))
+    odd = speeds[(speeds < low) | (speeds > high)]
+    return [f"{odd[0]:.4g} {unit} is of no water: its sound speed is {low:g} to {high:g} {unit}"] if len(odd) else []
 
 
 STEP = 2.0

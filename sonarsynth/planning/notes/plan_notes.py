@@ -22,6 +22,7 @@ from sonarsynth.planning.notes.source_notes import (
     off_the_bottom,
     out_of_band,
     steering_notes,
+    unlit,
     unlocated,
 )
 from sonarsynth.planning.notes.target_notes import (
@@ -53,7 +54,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
             f"the windows are based on {plan.looked_at} of {recipe.frames} frames and the ends of the variations; "
             "every other frame is checked when it is rendered, and fails if it does not fit"
         )
-    lines += population_notes(recipe) + _shared(recipe, looks)
+    lines += population_notes(recipe) + _shared(recipe, looks) + unlit(plan)
     if plan.windows.disturbed:
         lines.append(
             f"{plan.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest snap"
@@ -154,7 +155,7 @@ def _accuracy(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
     if count > 1 and errors.uncut > 0.0:
         lines.append(
             f"accuracy.signal {allowed.signal:g} needs {count} subarrays, each traced by itself: with one the error is "
-            f"{errors.uncut:.2g}"
+            f"{errors.uncut:.3g}"
         )
     if plan.choices.occlusion == "sensors" and plan.scene.physics.occlusion == "auto":
         needs = f"accuracy.signal {allowed.signal:g} needs the targets' occlusion from each hydrophone"

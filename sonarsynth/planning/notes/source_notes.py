@@ -75,10 +75,19 @@ def off_the_bottom(scene: Scene) -> list[str]:
     return [f"{', '.join(names)}: not on the bottom; {note}"] if names and note else []
 
 
+def unlit(plan: Plan) -> list[str]:
+    """Whether nothing sounds whose echoes could be heard: noise and the chorus light nothing."""
+    if plan.sizes["emission"] or not plan.sizes["target"]:
+        return []
+    return ["no source sounds: no target sends an echo, and there are no points (scene.world.sources)"]
+
+
 def unlocated(scene: Scene) -> list[str]:
     """Why nothing is located, where that is known beforehand."""
     why = locator(scene).locates_nothing(elements(scene.sonar.array), scene.sonar.band)
-    return [f"no snap is located, so there are no images and no points: {why}"] if why else []
+    return (
+        [f"no snap is located, so there are no points, and images are of the end of the record: {why}"] if why else []
+    )
 
 
 def out_of_band(scene: Scene) -> list[str]:
