@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sonarsynth.conventions import azimuth_elevation
+from sonarsynth.conventions import azimuth_elevation, counted
 from sonarsynth.conventions import direction as towards
 from sonarsynth.detection import beam_width
 from sonarsynth.evaluation.checks import SmallVariables, Stored, blocks, every, has, numbered, other_sounds
@@ -216,9 +216,9 @@ def _warning(tally: _Tally) -> str:
     warnings = []
     if tally.unheard:
         why = ", ".join(f"{name} {count}" for name, count in tally.reasons.most_common(3))
-        warnings.append(f"{tally.unheard} snaps that reach the array were not located" + (f" ({why})" if why else ""))
+        warnings.append(f"{counted(tally.unheard, 'snap')} in reach not located" + (f" ({why})" if why else ""))
     if tally.mirrored:
-        warnings.append(f"{tally.mirrored} snaps were located at their mirror images on the other side of the array")
+        warnings.append(f"{counted(tally.mirrored, 'snap')} located at the mirror image on the other side of the array")
     if tally.useless:
         warnings.append(f"{tally.useless} of {tally.rows} estimates are useless: their predicted errors are too large")
     return "; ".join(warnings)
