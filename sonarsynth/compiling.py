@@ -32,14 +32,17 @@ F = TypeVar("F", bound=Callable[..., Any])
 def compiled(function: F, /) -> F: ...
 @overload
 def compiled(function: None = None, /, **options: Any) -> Callable[[F], F]: ...
-def compiled(function: Any = None, /, **options: Any) -> Any:
+def compiled(function: Any = None, /, *, borrows: bool = False, **options: Any) -> Any:
     """The decorator of kernels: numba's `njit` without the interpreter lock, with NumPy's division by zero, cached.
 
-    Parameters: function, of what numba can compile; options, of `numba.njit`, besides.
+    Parameters: function, of what numba can compile; borrows, it makes no arrays and returns none, so that references to
+    those that it is given need not be counted: where small functions hand many arrays on, that takes most of the time;
+    options, of `numba.njit`, besides.
     Returns: the compiled function.
     """
     if function is None:
-        return partial(compiled, **options)
+        return partial(compiled, borrows=borrows, **options)
+    options["_nrt"] = not borrows  # the runtime that counts references
     kernel = njit(nogil=True, error_model="numpy", **options)(function)
     if isinstance(kernel, Dispatcher):  # it is the function itself where NUMBA_DISABLE_JIT is set
         kernel._cache = _Cache(function)  # type: ignore[attr-defined, no-untyped-call]
@@ -93,8 +96,9 @@ def _digest(file: str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
-class _ByFastMath(dict[Any, Any]):
-    """What numba compiles for its own use within kernels, apart for those with fast mathematics and those without."""
+class _ByFlags(dict[Any, Any]):
+    """What numba compiles for its own use within kernels, apart for those with fast mathematics and those without, and
+    for those that count references and those that do not."""
 
     def __getitem__(self, key: Any) -> Any:
         return super().__getitem__(self._full(key))
@@ -105,8 +109,9 @@ class _ByFastMath(dict[Any, Any]):
     def get(self, key: Any, default: Any = None) -> Any:
         return super().get(self._full(key), default)
 
-    def _full(self, key: Any) -> tuple[Any, frozenset[str]]:
-        return key, frozenset(ConfigStack().top().fastmath.flags)
+    def _full(self, key: Any) -> tuple[Any, frozenset[str], bool]:
+        flags = ConfigStack().top()
+        return key, frozenset(flags.fastmath.flags), bool(flags.nrt)
 
 
 class _Library(JITCodeLibrary):
@@ -137,5 +142,5 @@ class _Library(JITCodeLibrary):
         return super()._get_module_for_linking()  # type: ignore[no-untyped-call]
 
 
-cpu_target.target_context.cached_internal_func = _ByFastMath()
+cpu_target.target_context.cached_internal_func = _ByFlags()
 cpu_target.target_context.codegen()._library_class = _Library

@@ -26,7 +26,7 @@ PATCH = 64
 """Facets of a surface that may be needed to close a cone."""
 
 
-@compiled
+@compiled(borrows=True)
 def _frame(axis: Floats, frame: Floats) -> None:
     """Write the axes x, y, t (xyz each) of a cone, and the inverse of what t is made of."""
     small = 0
@@ -44,7 +44,7 @@ def _frame(axis: Floats, frame: Floats) -> None:
         frame[3, j] = 1.0 / (axis[j] if abs(axis[j]) > 1e-12 else 1e-12)
 
 
-@compiled
+@compiled(borrows=True)
 def _corners(facet: int, apex: Floats, frame: Floats, vertices: Floats, faces: Int32s, corner: Floats) -> None:
     """Write the corners (3, xyt) of a facet in the frame of a cone."""
     for j in range(3):
@@ -54,7 +54,7 @@ def _corners(facet: int, apex: Floats, frame: Floats, vertices: Floats, faces: I
             corner[j, x] = frame[x, 0] * dx + frame[x, 1] * dy + frame[x, 2] * dz
 
 
-@compiled
+@compiled(borrows=True)
 def _misses_box(nodes: Floats, n: int, apex: Floats, axis: Floats, inverse: Floats, slope: float, reach: float) -> bool:
     """Whether a cone surely misses the box of a node: its axis misses the box enlarged by the width of the cone there.
     inverse: of the components of the axis."""
@@ -70,7 +70,7 @@ def _misses_box(nodes: Floats, n: int, apex: Floats, axis: Floats, inverse: Floa
     return bool(max(x - sx, y - sy, z - sz, 0.0) > min(x + sx, y + sy, z + sz, reach) * (1.0 + 1e-9) + 1e-12)
 
 
-@compiled
+@compiled(borrows=True)
 def _touches(a: Floats, b: Floats, square: float) -> bool:
     """Whether a segment from a to b meets a cone; square: of its slope."""
     ta, tb = a[2], b[2]
@@ -91,7 +91,7 @@ def _touches(a: Floats, b: Floats, square: float) -> bool:
     return bool(r + u * (2.0 * q + u * p) <= 0.0)
 
 
-@compiled
+@compiled(borrows=True)
 def _on_axis(corner: Floats) -> bool:
     """Whether the axis meets a triangle with these corners."""
     u = corner[1, 0] * corner[2, 1] - corner[1, 1] * corner[2, 0]
@@ -103,7 +103,7 @@ def _on_axis(corner: Floats) -> bool:
     return bool(total != 0.0 and (u * corner[0, 2] + v * corner[1, 2] + w * corner[2, 2]) / total >= 0.0)
 
 
-@compiled
+@compiled(borrows=True)
 def _beside(corner: Floats, slope: float, reach: float) -> bool:
     """Whether a triangle is surely beside a cone."""
     far = max(corner[0, 2], corner[1, 2], corner[2, 2])
@@ -119,7 +119,7 @@ def _beside(corner: Floats, slope: float, reach: float) -> bool:
     return False
 
 
-@compiled
+@compiled(borrows=True)
 def _across(facet: int, a: int, b: int, faces: Int32s, first: Int32s, around: Int32s) -> int:
     """The facet across the edge from vertex a to b of a facet; -1 unless there is one, with the same outer side."""
     neighbour = -1
@@ -136,7 +136,7 @@ def _across(facet: int, a: int, b: int, faces: Int32s, first: Int32s, around: In
     return neighbour
 
 
-@compiled
+@compiled(borrows=True)
 def _crosses(corner: Floats, slope: float, far: float, sense: float) -> float:
     """From which side, 1 or -1, all lines of a cone cross the plane of a triangle, nearer than `far`; 0 where not all
     do, or not from the side `sense` (0: either)."""
@@ -151,7 +151,7 @@ def _crosses(corner: Floats, slope: float, far: float, sense: float) -> float:
     return sign if height / (steep + lean) > 1e-5 and height / (steep - lean) < far else 0.0
 
 
-@compiled
+@compiled(borrows=True)
 def _closes(
     facet: int, apex: Floats, frame: Floats, slope: float, far: float, vertices: Floats, faces: Int32s, first: Int32s,
     around: Int32s, corner: Floats, patch: Ints,
@@ -185,7 +185,7 @@ def _closes(
     return True
 
 
-@compiled
+@compiled(borrows=True)
 def _look(
     apex: Floats, frame: Floats, slope: float, reach: float, far: float, nodes: Floats, order: Int32s,
     vertices: Floats, faces: Int32s, first: Int32s, around: Int32s, stack: Ints, patch: Ints, corner: Floats,

@@ -102,17 +102,20 @@ def shape_modes(
     loudness = np.abs(front.amplitude) / np.abs(front.amplitude).max()
     weight: Floats = np.ones((front.count, 1))
     factor: Floats | Complexes = np.ones((1, frequency.size))
-    if front.variance.any() or front.coherent_fraction.any():
-        weight, factor = _softened(front, frequency, tolerance)
-    if front.loss.any() and decay.any():
-        weight, factor = _times(weight, factor, *_absorbed(front.loss, decay, tolerance))
-    if len(factor) > FEW:
+
+    def fewest(weight: Floats, factor: Any) -> tuple[Floats, Any]:
+        if len(factor) <= FEW:
+            return weight, factor
         fewer = reduction(weight, factor * spectrum, loudness, tolerance)
-        weight, factor = weight @ fewer.onto, fewer.back @ factor
+        return weight @ fewer.onto, fewer.back @ factor
+
+    if front.variance.any() or front.coherent_fraction.any():
+        weight, factor = fewest(*_softened(front, frequency, tolerance))
+    if front.loss.any() and decay.any():
+        weight, factor = fewest(*_times(weight, factor, *_absorbed(front.loss, decay, tolerance)))
     if front.corner_delays.any():
-        powers, waves = _powers(front.corner_delays, frequency, spectrum, tolerance)
-        fewer = reduction(powers, waves * spectrum, loudness, tolerance)
-        weight, factor = _times(weight, factor, powers @ fewer.onto, fewer.back @ waves)
+        powers = _powers(front.corner_delays, frequency, spectrum, tolerance)
+        weight, factor = _times(weight, factor, *fewest(*powers))
     spectra = factor * spectrum
     if len(series):
         weight, spectra = _times(weight, factor, polynomials(front.doppler / widest, len(series)), series)

@@ -154,8 +154,8 @@ def rest(front: Wavefronts, paths: Ints, variation: PulseVariation, tolerance: f
     loud, weight = np.abs(front.amplitude[sampled]), front.modes[sampled]
     if not variation.kinds:
         return ResidualVariation(none, none, np.zeros(0, int), np.zeros((0, sampled.size)), sampled)
-    turn, turned = _shared(front.expansion.phase[paths], some)
-    spread, softer = _shared(front.expansion.delay_variance[paths], some)
+    turn, turned = _shared(front.expansion.phase, paths, some)
+    spread, softer = _shared(front.expansion.delay_variance, paths, some)
     share = np.array([np.minimum(turned, 1.0) ** a * (softer * variation.rate) ** p for p, a in variation.kinds])
     size = np.sqrt((np.tensordot(weight, variation.onto, (1, 1)) ** 2).sum(axis=2)).T * share * loud
     mean = np.sqrt((size**2).sum(axis=1) / (loud**2).sum())
@@ -172,12 +172,13 @@ def pulses(front: Wavefronts, paths: Ints, over: ResidualVariation, variation: P
     return np.concatenate(weight), np.concatenate(loud)
 
 
-def _shared(terms: Floats, some: slice) -> tuple[Floats, Floats]:
-    """What all paths share of their terms (path, term), and bounds (path,) on what some have beside it: their mean,
-    unless a path would then change by more than it does, which no modes are made for (`with_changes`)."""
-    mean, own = terms[some].mean(axis=0), np.abs(terms).sum(axis=1)
-    beside = np.asarray(np.abs(terms - mean).sum(axis=1))
-    return (np.zeros_like(mean), own[some]) if (beside > own).any() else (mean, beside[some])
+def _shared(terms: Floats, paths: Ints, some: slice) -> tuple[Floats, Floats]:
+    """What some paths share of their terms (path, term), and bounds on what one in some of them has beside it: their
+    mean, unless a path would then change by more than it does, which no modes are made for (`with_changes`)."""
+    from sonarsynth.signals.gridded.variation_kernels import moduli
+
+    mean, (own, beside) = terms[paths[some]].mean(axis=0), np.empty((2, paths.size))
+    return (np.zeros_like(mean), own[some]) if moduli(terms, paths, mean, own, beside) else (mean, beside[some])
 
 
 def shares(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from importlib import import_module
@@ -62,6 +63,15 @@ def test_what_a_kernel_calls_and_the_constants_it_takes_are_those_of_today(produ
 def test_kernels_are_compiled_in_this_one_way() -> None:
     apart = {PACKAGE / "compiling.py", *(PACKAGE / "validation" / "references").rglob("*.py")}
     assert [file.name for file in PACKAGE.rglob("*.py") if "njit" in file.read_text() and file not in apart] == []
+
+
+def test_kernels_that_count_no_references_return_no_arrays() -> None:
+    """What they returned would be freed while it is in use."""
+    borrowing = {name: kernel for name, kernel in kernels().items() if not kernel.targetoptions["_nrt"]}
+    returned = {name: kernel.py_func.__annotations__["return"] for name, kernel in borrowing.items()}
+    numbers = re.compile(r"(None|bool|int|float|tuple\[|\]|, )+")
+    assert len(borrowing) > 50
+    assert [f"{name} -> {what}" for name, what in returned.items() if not numbers.fullmatch(what)] == []
 
 
 ROUNDED_FREELY = {"sonarsynth.equations.kernels.lanes", "sonarsynth.equations.kernels.vectors"}

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays import ray_solutions
+from sonarsynth.propagation.path_model import KnownRays
+from sonarsynth.propagation.refracted import Refracted
 
 
 def linear(gradient: float, deep: float = 20e3, middle: float = 1500.0) -> ray_solutions.Water:
@@ -112,3 +115,27 @@ def test_hops_along_a_boundary_have_the_closed_form(gradient: float) -> None:
         np.testing.assert_allclose(vertex, deepest, rtol=1e-9)
         assert set(found.caustics[mine]) == {hops - 1}
         assert sorted(np.sign(found.start_sine[mine])) == [-1, -1, 1, 1]
+
+
+def test_rays_to_places_about_a_level_end_are_reached_from_the_ray_to_its_middle() -> None:
+    """None is given up and searched for, though that to the middle is fifty times as level as those to its ends;
+    all are those that the search finds."""
+    profile = Profile(np.array([0.0, 6.5, 8.0, 10.0]), np.array([1541.0, 1541.1, 1534.7, 1534.7]))
+    model, start = Refracted(bounces=2), np.array([[0.0, 0.0, -4.5]])
+    end = np.array([[20.0, 0.1 * n, -4.49 + 0.12 * n] for n in range(-5, 6)])
+    middle = model.connect(profile, 10.0, start, end[5:6])
+    known = KnownRays(
+        np.repeat(start, len(middle.pair), axis=0), middle.departure, middle.surface + middle.bottom + middle.turning
+    )
+    beside = model.beside(profile, 10.0, known, end)
+    every = model.connect(profile, 10.0, np.repeat(start, len(end), axis=0), end)
+    assert len(middle.pair) == 5
+    for ray, (surface, bottom, up) in enumerate(
+        zip(middle.surface, middle.bottom, middle.departure[:, 2] > 0.0, strict=True)
+    ):
+        same = (every.surface == surface) & (every.bottom == bottom)
+        same &= (surface + bottom == 0) | ((every.departure[:, 2] > 0.0) == up)
+        assert np.array_equal(every.pair[same], np.arange(len(end)))
+        np.testing.assert_allclose(beside.travel_time[ray], every.travel_time[same], rtol=1e-15)
+        np.testing.assert_allclose(beside.departure[ray], every.departure[same], atol=1e-13)
+        np.testing.assert_allclose(beside.spreading[ray], every.spreading[same], rtol=1e-6)

@@ -16,7 +16,7 @@ LEAST_SINE = 1e-6
 """rad: of a ray that turns."""
 
 
-@compiled
+@compiled(borrows=True)
 def at(x: float, xs: Floats, ys: Floats) -> float:
     """Linear interpolation, constant beyond the ends."""
     n = len(xs)
@@ -30,7 +30,7 @@ def at(x: float, xs: Floats, ys: Floats) -> float:
     return float(ys[i - 1] + (ys[i] - ys[i - 1]) * (x - xs[i - 1]) / (xs[i] - xs[i - 1]))
 
 
-@compiled
+@compiled(borrows=True)
 def up_to(x: float, table: tuple[Floats, Floats, Floats]) -> float:
     """Integral of a value over depth from the surface to x (m), by its integral up to each of the even nodes."""
     xs, ys, sums = table
@@ -39,7 +39,7 @@ def up_to(x: float, table: tuple[Floats, Floats, Floats]) -> float:
     return float(sums[i] + d * (ys[i] + 0.5 * d * (ys[i + 1] - ys[i]) / (xs[i + 1] - xs[i])))
 
 
-@compiled
+@compiled(borrows=True)
 def vertex(z: float, down: bool, fastest: float, bottom: float, depth: Floats, speed: Floats) -> float:
     """Depth (m) at which a ray that goes down, or up, from z meets its turning speed (m/s), or the boundary."""
     last_z, last_c = z, at(z, depth, speed)
@@ -58,27 +58,26 @@ def vertex(z: float, down: bool, fastest: float, bottom: float, depth: Floats, s
     return edge
 
 
-@compiled
-def leg(a: float, b: float, p: float, bent: bool, water: tuple[Floats, Floats], table: tuple[Floats, Floats, Floats],
-        times: float, sums: Floats) -> None:  # fmt: skip
-    """Add a monotone leg between two depths, so many times: its length, and the value along it, to sums (2,)."""
+@compiled(borrows=True)
+def leg(
+    a: float, b: float, p: float, bent: bool, water: tuple[Floats, Floats], table: tuple[Floats, Floats, Floats]
+) -> tuple[float, float]:
+    """A monotone leg between two depths: its length, or depth where it is straight, and the value along it."""
     if not bent:
         deep = abs(b - a)
-        within = (
-            deep * at(0.5 * (a + b), table[0], table[1]) if deep < LEVEL else abs(up_to(b, table) - up_to(a, table))
-        )
-        sums[0] += times * deep
-        sums[1] += times * within
-        return
+        within = deep * at(0.5 * (a + b), table[0], table[1])
+        return deep, within if deep < LEVEL else abs(up_to(b, table) - up_to(a, table))
+    total = along = 0.0
     for n in range(len(NODE)):
         z = a + (b - a) * NODE[n]
         c = at(z, water[0], water[1])
-        length = times * abs(b - a) * WEIGHT[n] / max(np.sqrt(max(1.0 - (p * c) ** 2, 0.0)), LEAST_SINE)
-        sums[0] += length
-        sums[1] += length * at(z, table[0], table[1])
+        length = abs(b - a) * WEIGHT[n] / max(np.sqrt(max(1.0 - (p * c) ** 2, 0.0)), LEAST_SINE)
+        total += length
+        along += length * at(z, table[0], table[1])
+    return total, along
 
 
-@compiled
+@compiled(borrows=True)
 def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: Bools, bottom: float,
           water: tuple[Floats, Floats], table: tuple[Floats, Floats, Floats], out: Floats) -> None:  # fmt: skip
     """Mean (ray,) along rays from depths start to end (ray,) m of a value of depth.
@@ -88,20 +87,20 @@ def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: Bools
     bottom (m); table: even depths, values there and their integrals from the surface (node,). A ray with vertices goes
     to and fro between two depths.
     """
-    sums = np.zeros(2)
     for r in range(len(start)):
         z, z_end, n = start[r], end[r], vertices[r]
-        sums[:] = 0.0
         p = np.sqrt(max(1.0 - climb[r] ** 2, 0.0)) / at(z, water[0], water[1]) if bent[r] else 0.0
         if n == 0:
-            leg(z, z_end, p, bent[r], water, table, 1.0, sums)
+            length, along = leg(z, z_end, p, bent[r], water, table)
         else:
             fastest = 1.0 / max(p, 1e-300) if bent[r] else np.inf
             upper = vertex(z, False, fastest, bottom, water[0], water[1])
             lower = vertex(z, True, fastest, bottom, water[0], water[1])
             first_down = climb[r] < 0.0
             last_down = first_down == (n % 2 == 1)
-            leg(z, lower if first_down else upper, p, bent[r], water, table, 1.0, sums)
-            leg(upper, lower, p, bent[r], water, table, n - 1.0, sums)
-            leg(lower if last_down else upper, z_end, p, bent[r], water, table, 1.0, sums)
-        out[r] = sums[1] / sums[0] if sums[0] > 0.0 else at(z, table[0], table[1])
+            first = leg(z, lower if first_down else upper, p, bent[r], water, table)
+            between = leg(upper, lower, p, bent[r], water, table)
+            last = leg(lower if last_down else upper, z_end, p, bent[r], water, table)
+            length = first[0] + (n - 1) * between[0] + last[0]
+            along = first[1] + (n - 1) * between[1] + last[1]
+        out[r] = along / length if length > 0.0 else at(z, table[0], table[1])

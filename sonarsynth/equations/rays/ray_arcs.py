@@ -18,7 +18,7 @@ ON, TURN, SURFACE, BOTTOM, OVER = range(5)
 """Why a step ended: step length or layer boundary, turning point, surface, bottom, time over."""
 
 
-@compiled
+@compiled(borrows=True)
 def arc(phi: float, bend: float, s: float) -> tuple[float, float, float]:
     """Horizontal and downward displacement (m) along an arc of length s, and the angle at its end; bend: p g (1/m)."""
     half = 0.5 * bend * s
@@ -26,7 +26,7 @@ def arc(phi: float, bend: float, s: float) -> tuple[float, float, float]:
     return chord * math.cos(phi - half), chord * math.sin(phi - half), phi - 2.0 * half
 
 
-@compiled
+@compiled(borrows=True)
 def heading(depth: Floats, speed: Floats, layer: int, z: float, phi: float) -> tuple[int, float]:
     """Layer and sense (1 down, -1 up, 0 level for good) of a ray about to leave z; a level ray goes where it bends."""
     if phi != 0.0:
@@ -43,7 +43,7 @@ def heading(depth: Floats, speed: Floats, layer: int, z: float, phi: float) -> t
     return layer, -1.0 if rise > 0.0 else (1.0 if rise < 0.0 else 0.0)
 
 
-@compiled
+@compiled(borrows=True)
 def across(depth: Floats, layer: int, sense: float) -> tuple[int, int]:
     """Next layer beyond the boundary reached, and what the boundary is."""
     if sense < 0.0:
@@ -51,7 +51,7 @@ def across(depth: Floats, layer: int, sense: float) -> tuple[int, int]:
     return (layer + 1, ON) if layer < len(depth) - 2 else (layer, BOTTOM)
 
 
-@compiled
+@compiled(borrows=True)
 def length_to_edge(sine: float, p: float, c: float, c_edge: float, dz: float) -> tuple[float, float]:
     """Arc length to the edge of the layer `dz` (m) away, and the sine there; NaN where the ray turns before it."""
     square = sine * sine - p * p * (c_edge - c) * (c_edge + c)
@@ -61,7 +61,7 @@ def length_to_edge(sine: float, p: float, c: float, c_edge: float, dz: float) ->
     return 2.0 * dz / total * atanc(p * (c_edge - c) / total) if dz > 0.0 else 0.0, math.sqrt(square)
 
 
-@compiled
+@compiled(borrows=True)
 def along_arc(phi: float, bend: float, s: float, c: float, gradient: float) -> tuple[float, float, float, float]:
     """Time (s), displacements and angle at the end of an arc that begins where the speed is c."""
     dx, dz, turned = arc(phi, bend, s)
@@ -69,7 +69,7 @@ def along_arc(phi: float, bend: float, s: float, c: float, gradient: float) -> t
     return chord_time(math.hypot(dx, dz), c, c_after, gradient), dx, dz, turned
 
 
-@compiled
+@compiled(borrows=True)
 def step(
     depth: Floats,
     speed: Floats,
@@ -123,7 +123,7 @@ def step(
     return why, after, dx, z_after, phi_after, s, time
 
 
-@compiled
+@compiled(borrows=True)
 def steps(
     depth: Floats,
     speed: Floats,
@@ -146,7 +146,7 @@ def steps(
         )
 
 
-@compiled
+@compiled(borrows=True)
 def chords(
     depth: Floats, speed: Floats, z: Floats, phi: Floats, p: Floats, length: Floats, sagitta: float, nodes: Floats
 ) -> int:

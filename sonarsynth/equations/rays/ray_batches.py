@@ -34,7 +34,7 @@ SAME_DEPTH = 1e-140  # m: depths that differ by less are equal
 MANY = 64  # layers
 
 
-@compiled
+@compiled(borrows=True)
 def level_speed(depth: Floats, speed: Floats, z: float) -> float:
     """Speed of the layer of one speed at z (below first, then above); NaN where there is none."""
     j = node_above(depth, z)
@@ -47,7 +47,7 @@ def level_speed(depth: Floats, speed: Floats, z: float) -> float:
     return math.nan
 
 
-@compiled
+@compiled(borrows=True)
 def straight_of_pair(
     depth: Floats, speed: Floats, start: float, end: float, distance: float, chain: Chain, out: Floats, row: int
 ) -> int:
@@ -80,7 +80,7 @@ def straight_of_pair(
     return 1
 
 
-@compiled
+@compiled(borrows=True)
 def level_of_pair(
     depth: Floats, speed: Floats, z: float, distance: float, reflections: int, known: int, out: Floats, row: int
 ) -> int:
@@ -154,7 +154,7 @@ def rays_of_pairs(
     return count, len(start)
 
 
-@compiled
+@compiled(borrows=True)
 def _down(c1: float, c2: float, dz: float) -> float:
     """Time (s) straight down a layer: dz over its logarithmic mean speed."""
     return 2.0 * dz / (c1 + c2) * float(atanhc((c2 - c1) / (c2 + c1)))

@@ -21,7 +21,7 @@ GRAZING = 1e-150
 """Least sine: keeps 0/0 out of the limit in which a ray becomes horizontal; nothing of size above 1e-140 notices."""
 
 
-@compiled
+@compiled(borrows=True)
 def node_above(depth: Floats, z: float) -> int:
     """Last node at or above z: on a jump the lower side."""
     low, high = 0, len(depth) - 1
@@ -34,7 +34,7 @@ def node_above(depth: Floats, z: float) -> int:
     return low
 
 
-@compiled
+@compiled(borrows=True)
 def speed_at(depth: Floats, speed: Floats, node: int, z: float) -> float:
     """Sound speed at z in the layer below a node (the node's own speed at the last one)."""
     if node >= len(depth) - 1 or z <= depth[node]:
@@ -43,7 +43,7 @@ def speed_at(depth: Floats, speed: Floats, node: int, z: float) -> float:
     return float(speed[node] + fraction * (speed[node + 1] - speed[node]))
 
 
-@compiled
+@compiled(borrows=True)
 def lay(depth: Floats, speed: Floats, top: float, bottom: float, c: Floats, dz: Floats, first: int) -> tuple[int, int]:
     """Lay the chain straight down from top to bottom, from c[first] on.
 
@@ -69,14 +69,14 @@ def lay(depth: Floats, speed: Floats, top: float, bottom: float, c: Floats, dz: 
     return n, j + 1 if depth[j] == bottom else j
 
 
-@compiled
+@compiled(borrows=True)
 def offsets(c: Floats, first: int, last: int, fastest: float, d: Floats) -> None:
     """d = (c_m - c)(c_m + c) at the nodes of a chain, for c_m the fastest speed in it."""
     for i in range(first, last + 1):
         d[i] = (fastest - c[i]) * (fastest + c[i])
 
 
-@compiled
+@compiled(borrows=True)
 def sweep(
     s_m: float, p: float, d: Floats, k: Floats, first: int, last: int, turn_up: float, turn_down: float
 ) -> tuple[float, float]:
@@ -102,7 +102,7 @@ def sweep(
     return x, slope
 
 
-@compiled
+@compiled(borrows=True)
 def leg(
     v1: float, v2: float, c: Floats, dz: Floats, d: Floats, first: int, last: int
 ) -> tuple[float, float, float, float]:
@@ -126,7 +126,7 @@ def leg(
     return x1, x2, least, largest
 
 
-@compiled
+@compiled(borrows=True)
 def turn(v1: float, v2: float, d: float, inverse_gradient: float) -> tuple[float, float, float, float]:
     """Range 2 h/g of two half layers up to a turning point: X(v1), X(v2), which bound it, and bounds of its rise."""
     twice = 2.0 * inverse_gradient
@@ -134,7 +134,7 @@ def turn(v1: float, v2: float, d: float, inverse_gradient: float) -> tuple[float
     return twice * h1, twice * h2, twice * v1 / h1, twice * v2 / h2
 
 
-@compiled
+@compiled(borrows=True)
 def bounds(
     v1: float, v2: float, d: Floats, k: Floats, first: int, last: int, turn_up: float, turn_down: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -161,7 +161,7 @@ def bounds(
     return full1 + turn1, full2 + turn2, full2 + turn1, full1 + turn2, slopes[0], slopes[1]
 
 
-@compiled
+@compiled(borrows=True)
 def time_of(
     s_m: float, p: float, c: Floats, d: Floats, dz: Floats, crossings: Floats, first: int, last: int,
     turn_up: float, turn_down: float,
@@ -178,7 +178,7 @@ def time_of(
     return time + (2.0 * turn_time(s1 / (p * c[last]), turn_down) if turn_down > 0.0 else 0.0)
 
 
-@compiled
+@compiled(borrows=True)
 def length_of(
     s_m: float, p: float, c: Floats, d: Floats, dz: Floats, crossings: Floats, first: int, last: int,
     turn_up: float, turn_down: float,

@@ -45,7 +45,7 @@ range at the end of the last interval was shorter than asked for; whether it may
 COLUMNS = 7
 
 
-@compiled
+@compiled(borrows=True)
 def family_of(up: int, vertices: int, descends: bool, family: Ints, row: int) -> None:
     """Fill a row of family (row, COLUMNS): launched up or down, with so many vertices, towards a deeper end or not."""
     towards = (up == 0) == descends  # launched towards the depth of the other end
@@ -57,7 +57,7 @@ def family_of(up: int, vertices: int, descends: bool, family: Ints, row: int) ->
     family[row, SHORT], family[row, ALIVE] = 0, 1
 
 
-@compiled
+@compiled(borrows=True)
 def families_of_pair(
     depth: Floats, speed: Floats, start: float, end: float, distance: float, reflections: int, steepest: float,
     family: Ints, chain: Chain, out: Floats, row: int,
@@ -88,7 +88,7 @@ def families_of_pair(
         reals[FASTEST], fresh = reals[AFTER], False
 
 
-@compiled
+@compiled(borrows=True)
 def possible(distance: float, reflections: int, steepest: float, family: Ints, chain: Chain) -> bool:
     """Whether any family may have a ray with vertices where the chain now ends; others are marked."""
     ints, reals = chain.ints, chain.reals
@@ -111,7 +111,7 @@ def possible(distance: float, reflections: int, steepest: float, family: Ints, c
     return any_possible
 
 
-@compiled
+@compiled(borrows=True)
 def sum_legs(chain: Chain, extent: float) -> None:
     """Sum the legs of the chain for rays with v = c_m tan(grazing angle) up to `extent`."""
     ints, reals, d, sums = chain.ints, chain.reals, chain.d, chain.sums
@@ -123,20 +123,20 @@ def sum_legs(chain: Chain, extent: float) -> None:
     sums[4] = turn(GRAZING, extent, d[ints[LAST]], reals[GRADIENT_DOWN])
 
 
-@compiled
+@compiled(borrows=True)
 def full(family: Ints, f: int, sums: Floats, column: int) -> float:
     """A sum over the full layers that a family crosses."""
     row = family[f]
     return float(2 * row[ABOVE] * sums[0, column] + row[BETWEEN] * sums[1, column] + 2 * row[BELOW] * sums[2, column])
 
 
-@compiled
+@compiled(borrows=True)
 def turned(family: Ints, f: int, sums: Floats, column: int) -> float:
     """A sum over the layers that a family turns in."""
     return float(family[f, ABOVE] * sums[3, column] + family[f, BELOW] * sums[4, column])
 
 
-@compiled
+@compiled(borrows=True)
 def search(
     distance: float, joined_up: bool, joined_down: bool, fresh: bool, family: Ints, chain: Chain, out: Floats, row: int
 ) -> int:
@@ -170,7 +170,7 @@ def search(
     return count
 
 
-@compiled
+@compiled(borrows=True)
 def weigh(above: int, between: int, below: int, first: int, last: int, chain: Chain) -> None:
     """How often a family crosses each layer from node first to last, and its weighted chain."""
     ints = chain.ints
@@ -180,7 +180,7 @@ def weigh(above: int, between: int, below: int, first: int, last: int, chain: Ch
         chain.k[i] = times * chain.dz[i] * (chain.c[i] + chain.c[i + 1])
 
 
-@compiled
+@compiled(borrows=True)
 def roots_of(
     f: int,
     distance: float,
@@ -215,7 +215,7 @@ def roots_of(
     return root_count
 
 
-@compiled
+@compiled(borrows=True)
 def beyond(s_m: float, p: float, c: float, d: float, inverse_gradient: float) -> float:
     """How far (m) beyond a node of speed c a ray turns: (1/p - c)/g, with 1/p - c = h^2/(1/p + c)."""
     if inverse_gradient == 0.0:
@@ -223,7 +223,7 @@ def beyond(s_m: float, p: float, c: float, d: float, inverse_gradient: float) ->
     return float((s_m * s_m + p * p * d) / (p * (1.0 + p * c)) * inverse_gradient)
 
 
-@compiled
+@compiled(borrows=True)
 def keep(
     family: Ints,
     f: int,

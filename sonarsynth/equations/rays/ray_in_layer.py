@@ -14,7 +14,7 @@ import math
 from sonarsynth.compiling import compiled
 
 
-@compiled
+@compiled(borrows=True)
 def atanhc(x: float) -> float:
     """artanh(x)/x, 1 at 0."""
     if abs(x) < 0.02:
@@ -23,7 +23,7 @@ def atanhc(x: float) -> float:
     return math.atanh(x) / x
 
 
-@compiled
+@compiled(borrows=True)
 def atanc(x: float) -> float:
     """arctan(x)/x, 1 at 0."""
     if abs(x) < 0.02:
@@ -32,7 +32,7 @@ def atanc(x: float) -> float:
     return math.atan(x) / x
 
 
-@compiled
+@compiled(borrows=True)
 def asinhc(x: float) -> float:
     """arsinh(x)/x, 1 at 0."""
     if abs(x) < 0.02:
@@ -41,32 +41,32 @@ def asinhc(x: float) -> float:
     return math.asinh(x) / x
 
 
-@compiled
+@compiled(borrows=True)
 def layer_time(p: float, c1: float, c2: float, s1: float, s2: float, thickness: float) -> float:
     """Travel time (s) through a layer with end speeds c1, c2 and sines s1, s2 (artanh((s1-s2)/(1-s1 s2))/g)."""
     k = (c1 + c2) * (1.0 + s1 * s2) / ((s1 + s2) * (c1 * c1 + c2 * c2 - (p * c1 * c2) ** 2))
     return thickness * k * atanhc((c2 - c1) * k)
 
 
-@compiled
+@compiled(borrows=True)
 def layer_length(p: float, c1: float, c2: float, s1: float, s2: float, thickness: float) -> float:
     """Arc length (m) through a layer: radius 1/(p g) times the turn, whose half has the tangent p (c2-c1)/(s1+s2)."""
     return 2.0 * thickness / (s1 + s2) * atanc(p * (c2 - c1) / (s1 + s2))
 
 
-@compiled
+@compiled(borrows=True)
 def turn_time(tangent: float, inverse_gradient: float) -> float:
     """Travel time (s) from where the grazing angle has this tangent down to the turning point: artanh(sin)/g."""
     return math.asinh(tangent) * inverse_gradient
 
 
-@compiled
+@compiled(borrows=True)
 def turn_length(p: float, tangent: float, inverse_gradient: float) -> float:
     """Arc length (m) from where the grazing angle has this tangent to the turning point: angle/(p g)."""
     return math.atan(tangent) * inverse_gradient / p
 
 
-@compiled
+@compiled(borrows=True)
 def chord_time(chord: float, c1: float, c2: float, gradient: float) -> float:
     """Travel time (s) along the arc over a chord (m) in one layer, from the end speeds; it may hold a turning point.
 

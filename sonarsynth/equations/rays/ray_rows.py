@@ -17,7 +17,7 @@ COINCIDENT, CAUSTIC, PASSED = 1.0, 2.0, 3.0
 FOCUSED = 10.0  # times spherical spreading (20 dB): from here on the amplitude of ray theory is not to be trusted
 
 
-@compiled
+@compiled(borrows=True)
 def emit(
     out: Floats, row: int, s_m: float, p: float, distance: float,
     c: Floats, d: Floats, k: Floats, dz: Floats, crossings: Floats, first: int, last: int,
@@ -52,7 +52,7 @@ def emit(
     out[row, FLAG] = CAUSTIC if amplitude * length > FOCUSED else (PASSED if caustics > 0.0 else 0.0)
 
 
-@compiled
+@compiled(borrows=True)
 def emit_level(out: Floats, row: int, distance: float, c: float) -> None:
     """A horizontal ray in a layer of one speed, or coincident ends."""
     out[row, TIME], out[row, LENGTH], out[row, SLOWNESS] = distance / c, distance, 1.0 / c
@@ -64,7 +64,7 @@ def emit_level(out: Floats, row: int, distance: float, c: float) -> None:
     out[row, FLAG] = 0.0 if distance > 0.0 else COINCIDENT
 
 
-@compiled
+@compiled(borrows=True)
 def sort_by_time(out: Floats, first: int, count: int) -> None:
     """Sort rows by travel time, rays of one time by their launch: by insertion, a handful of rays."""
     for i in range(first + 1, first + count):

@@ -18,13 +18,13 @@ CLOSE = 1e-8  # relative miss of the range that one more Newton step removes
 ENOUGH = 2e-17  # relative error of the travel time at which Newton stops: it is second order in what is left of X - R
 
 
-@compiled
+@compiled(borrows=True)
 def settled(misfit: float, distance: float, slope: float) -> bool:
     """Whether one more Newton step ends the search: X - R is small for the travel time, and for angle and amplitude."""
     return misfit * misfit <= ENOUGH * distance * slope and abs(misfit) <= CLOSE * distance
 
 
-@compiled
+@compiled(borrows=True)
 def refine(
     low: float,
     high: float,
@@ -62,13 +62,13 @@ def refine(
     return max(v * p, GRAZING), p
 
 
-@compiled
+@compiled(borrows=True)
 def flattest(d: Floats, k: Floats, first: int, last: int) -> float:
     """Range of the flattest ray through a chain: horizontal at its fastest depth."""
     return float(bounds(GRAZING, GRAZING, d, k, first, last, 0.0, 0.0)[0])
 
 
-@compiled
+@compiled(borrows=True)
 def straight(
     distance: float, fastest: float, d: Floats, k: Floats, first: int, last: int, reached: bool
 ) -> tuple[bool, float, float]:
@@ -103,7 +103,7 @@ def straight(
     return True, s_m, q * s_m
 
 
-@compiled
+@compiled(borrows=True)
 def first_guess(
     low: float, high: float, x_low: float, x_high: float, distance: float,
     d: Floats, first: int, last: int, turn_up: float, turn_down: float,
@@ -118,7 +118,7 @@ def first_guess(
     return float(low + (high - low) * (distance - x_low) / (x_high - x_low))
 
 
-@compiled
+@compiled(borrows=True)
 def turns(
     below_start: bool,
     fastest: float,

@@ -45,7 +45,7 @@ def new_chain(nodes: int) -> Chain:
     return Chain(work[0], work[1], work[2], work[3], work[4], ints, reals, sums, np.empty(64), roots)
 
 
-@compiled
+@compiled(borrows=True)
 def begin(depth: Floats, speed: Floats, start: float, end: float, chain: Chain) -> None:
     """Lay the chain between the two ends."""
     ints, reals = chain.ints, chain.reals
@@ -65,7 +65,7 @@ def begin(depth: Floats, speed: Floats, start: float, end: float, chain: Chain) 
         reals[FASTEST], reals[SLOWEST] = max(reals[FASTEST], chain.c[i]), min(reals[SLOWEST], chain.c[i])
 
 
-@compiled
+@compiled(borrows=True)
 def extend_up(depth: Floats, speed: Floats, chain: Chain) -> int:
     """Lay the chain on upwards through all that is no faster than its fastest depth: how many layers."""
     ints, reals = chain.ints, chain.reals
@@ -83,7 +83,7 @@ def extend_up(depth: Floats, speed: Floats, chain: Chain) -> int:
     return int(last_first - ints[FIRST])
 
 
-@compiled
+@compiled(borrows=True)
 def extend_down(depth: Floats, speed: Floats, chain: Chain) -> int:
     """Lay the chain on downwards through all that is no faster than its fastest depth: how many layers."""
     ints, reals = chain.ints, chain.reals

@@ -8,7 +8,7 @@ from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats
 
 
-@compiled
+@compiled(borrows=True)
 def slope_lobe(incident: Floats, scattered: Floats, normal: Floats, slope: float) -> float:
     """Barrick's lobe sigma0 of three unit vectors (xyz); what is across the normal is taken without cancellation."""
     hx, hy, hz = scattered[0] - incident[0], scattered[1] - incident[1], scattered[2] - incident[2]
@@ -20,7 +20,7 @@ def slope_lobe(incident: Floats, scattered: Floats, normal: Floats, slope: float
     return float(math.exp(square * (-0.5 / slope**2)) * ((1.0 + square) ** 2 / (8.0 * math.pi * slope**2)))
 
 
-@compiled
+@compiled(borrows=True)
 def slope_lobes(incident: Floats, scattered: Floats, normal: Floats, slope: float, out: Floats) -> None:
     """`slope_lobe` of vectors (row, column, xyz) into out (row, column)."""
     for i in range(out.shape[0]):
@@ -28,7 +28,7 @@ def slope_lobes(incident: Floats, scattered: Floats, normal: Floats, slope: floa
             out[i, j] = slope_lobe(incident[i, j], scattered[i, j], normal[i, j], slope)
 
 
-@compiled
+@compiled(borrows=True)
 def amplitudes(
     incident: Floats, scattered: Floats, normal: Floats, area: Floats, slope: float, share: float, albedo: float,
     beyond: bool, out: Floats,

@@ -187,7 +187,7 @@ def _deposits(
     table: Floats, paths: Wavefronts, tile: Tile, steering: Steering, occluded: Bools, stage: Stage
 ) -> npt.NDArray[Any]:
     """The grid (node, term, sample) of a tile at some of its nodes; occluded (node, path) from those, or (0, path)."""
-    from sonarsynth.signals.gridded.deposit_kernels import deposit
+    from sonarsynth.signals.gridded.deposit_kernels import BLOCK, deposit
 
     points, grid = steering.points, stage.grid
     rate = grid.circle * stage.bins.step
@@ -224,6 +224,9 @@ def _deposits(
         rate / paths.sound_speed,
         grid.circle,
         out.ravel(),
+        np.zeros((2, BLOCK)),
+        np.zeros((2, BLOCK), np.int64),
+        np.zeros((5 + len(tile.terms) + table.shape[1]) * BLOCK, stage.dtype),
     )
     return out
 

@@ -22,7 +22,7 @@ ROWS = 7
 deviation). Weights of the modes may follow, then those of what they change by."""
 
 
-@compiled(fastmath=True, forceinline=True)
+@compiled(fastmath=True, forceinline=True, borrows=True)
 def _wavefront(
     block: Any, node: Any, middle: Any, scale: Any, absorbed: Any, rate: float, steer: float, level: float, late: Any,
     position: Any, value: Any,
@@ -48,37 +48,37 @@ def _wavefront(
         value[4 * BLOCK + i] = block[5 * BLOCK + i] * near * gain
 
 
-@compiled(fastmath=True, forceinline=True)
+@compiled(fastmath=True, forceinline=True, borrows=True)
 def _multiply(a: Any, b: Any, out: Any) -> None:
     for i in range(BLOCK):
         out[i] = a[i] * b[i]
 
 
-@compiled(fastmath=True, forceinline=True)
+@compiled(fastmath=True, forceinline=True, borrows=True)
 def _copy(row: Any, out: Any) -> None:
     for i in range(row.size):
         out[i] = row[i]
 
 
-@compiled(fastmath=True, forceinline=True)
+@compiled(fastmath=True, forceinline=True, borrows=True)
 def _amplify(out: Any, more: Any) -> None:
     for i in range(more.size):
         out[i] *= 1.0 + more[i]
 
 
-@compiled(fastmath=True, forceinline=True)
+@compiled(fastmath=True, forceinline=True, borrows=True)
 def _lean(out: Any, more: Any, scale: float) -> None:
     for i in range(more.size):
         out[i] += scale * more[i]
 
 
-@compiled(fastmath=True, forceinline=True)
+@compiled(fastmath=True, forceinline=True, borrows=True)
 def _recur(out: Any, earlier: Any) -> None:
     for i in range(BLOCK):
         out[i] = 2.0 * out[i] - earlier[i]
 
 
-@compiled(fastmath=True, forceinline=True)
+@compiled(fastmath=True, forceinline=True, borrows=True)
 def _mix(weight: Any, share: Any, node: int, first: int, size: int, modes: int, out: Any) -> None:
     """Weights of modes (mode * BLOCK,) at a node: of the pulses, and of what they change by, (change * mode * BLOCK,),
     in shares (change, node, path)."""
@@ -95,11 +95,11 @@ def _mix(weight: Any, share: Any, node: int, first: int, size: int, modes: int, 
                     mixed[i] += factor[i] * row[i]
 
 
-@compiled(fastmath=True, forceinline=True)
+@compiled(fastmath=True, forceinline=True, borrows=True)
 def _expand(value: Any, weight: Any, term_products: Any, modes: bool) -> None:
     """Terms of a block of paths, from row 4 of value on; there is the amplitude, which with modes moves to row 3."""
     if modes:
-        value[3 * BLOCK : 4 * BLOCK] = value[4 * BLOCK : 5 * BLOCK]
+        _copy(value[4 * BLOCK : 5 * BLOCK], value[3 * BLOCK : 4 * BLOCK])
     for t in range(0 if modes else 1, term_products.shape[0]):
         a, b, c = (4 + term_products[t, 0]) * BLOCK, term_products[t, 1] * BLOCK, (4 + t) * BLOCK
         if term_products[t, 1] < 3:
@@ -111,7 +111,7 @@ def _expand(value: Any, weight: Any, term_products: Any, modes: bool) -> None:
             _recur(value[c : c + BLOCK], value[d : d + BLOCK])
 
 
-@compiled(fastmath=True, forceinline=True)
+@compiled(fastmath=True, forceinline=True, borrows=True)
 def _split(position: Any, half: float, rows: int, length: int, begin: Any, row: Any, fraction: Any) -> None:
     """First sample of the kernel on the circle, row of its table, and place in the row, from -1/2 to 1/2."""
     for i in range(BLOCK):
@@ -124,7 +124,7 @@ def _split(position: Any, half: float, rows: int, length: int, begin: Any, row: 
         fraction[i] = x - r - 0.5
 
 
-@compiled(fastmath=True)
+@compiled(fastmath=True, borrows=True)
 def deposit(
     table: Any,
     rows: int,
@@ -146,6 +146,9 @@ def deposit(
     rate: float,
     length: int,
     grid: Any,
+    place: Any,
+    index: Any,
+    work: Any,
 ) -> None:
     """Add the kernel of every path at every node, times every term, to grid (node * term * (length + lanes),).
 
@@ -155,15 +158,14 @@ def deposit(
     deviations of absorption. late (samples) and louder (node, path) and lean (node, y or z, path) are the wavefront's
     terms, or empty; share (change, node, path) is how much the modes are of each change, or empty. term_products (term,
     3) makes terms. taps (row * 4 * lane,) is the kernel, a cubic a row, and half its half width in samples. rate is in
-    samples/m; the grid is a circle of `length` samples.
+    samples/m; the grid is a circle of `length` samples. place and index (2, BLOCK) and work ((5 + terms
+    + rows) * BLOCK,), of the type of the grid, are zeros to work in.
     """
     terms, stride = term_products.shape[0], length + lanes
     cubes = taps.size // (4 * lanes)
-    position, more, fraction = np.empty(BLOCK), np.zeros(BLOCK), np.empty(BLOCK, grid.dtype)
-    begin, row = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
-    value = np.empty((4 + terms) * BLOCK, grid.dtype)
+    position, more, begin, row = place[0], place[1], index[0], index[1]
+    fraction, value, mixed = work[:BLOCK], work[BLOCK : (5 + terms) * BLOCK], work[(5 + terms) * BLOCK :]
     modes = (rows - ROWS) // max(share.shape[0], 1)
-    mixed = np.zeros(modes * BLOCK, grid.dtype)
     for m in range(nodes.shape[0]):
         for first in range(0, count, BLOCK):
             size = min(BLOCK, count - first)
@@ -216,7 +218,7 @@ def combine(spectra: Any, first: int, factors: Any, pair: Any, power: Any, respo
                 out[m, first + b] += complex(re[b], im[b]) * response[k, b]
 
 
-@compiled(fastmath=True, forceinline=True)
+@compiled(fastmath=True, forceinline=True, borrows=True)
 def _sum_three(weight: Any, nodes: Any, first: int, parity: int, out: Any) -> None:
     """Put weight (node,), of zeros beyond the last, times three nodes (node, parity, sample) in out, or add it there
     from the second three on."""
@@ -231,7 +233,7 @@ def _sum_three(weight: Any, nodes: Any, first: int, parity: int, out: Any) -> No
             out[i] += u * one[i] + v * two[i] + w * three[i]
 
 
-@compiled(fastmath=True, forceinline=True)
+@compiled(fastmath=True, forceinline=True, borrows=True)
 def _add_filtered(one: Any, two: Any, taps: Any, factor: Any, out: Any) -> None:
     """Add to out waves that take turns to be its samples, filtered by eight taps."""
     a, b, c, d = factor * taps[0], factor * taps[2], factor * taps[4], factor * taps[6]
