@@ -40,8 +40,8 @@ def local_maxima(
     be outside.
     """
     (rows, columns), stop = index.shape, power.shape[1] - end
-    peaks, count = np.empty((2, power.size), np.int64), 0
     least, top = least[end:stop], np.empty(max(stop - end, 0), np.bool_)
+    peaks, count = np.empty((2, len(power) * (len(top) // (about + 1) + 1)), np.int32), 0  # more than `about` apart
     for b in range(len(power)):
         i, j = row[b], column[b]
         if (edge[0] and (i == 0 or i == rows - 1)) or (edge[1] and (j == 0 or j == columns - 1)):
@@ -57,7 +57,7 @@ def local_maxima(
             if top[t] and not exceeded(power, index, i, j, end + t, about):
                 peaks[0, count], peaks[1, count] = b, end + t
                 count += 1
-    return peaks[0, :count].copy(), peaks[1, :count].copy()
+    return peaks[0, :count].astype(np.int64), peaks[1, :count].astype(np.int64)
 
 
 @compiled
