@@ -23,7 +23,7 @@ QUIETEST = 1e-7
 """Bins of less noise power than this, relative to the loudest, are left empty."""
 
 
-AT_ONCE = 8
+AT_ONCE = 16
 """Hydrophones whose noise is drawn at once: so few that the numbers stay in the cache."""
 MATRIX_ELEMENTS = 1 << 22
 """Matrix elements of cross spectral densities that are computed at once."""
@@ -90,7 +90,8 @@ def add_noise(
         rows = slice(first, min(first + AT_ONCE, sensors))
         some = spectrum[: rows.stop - first]
         some[:, low:high] = complex_normals(power[: len(some)], fast) if together is None else together[rows]
-        some *= elements.gain[rows, None].astype(np.float32)
+        if not np.all(elements.gain[rows] == 1.0):
+            some *= elements.gain[rows, None].astype(np.float32)
         np.add(signals.pressure[rows], irfft(some, length, axis=1)[:, :samples], out=pressure[rows])
     return replace(signals, pressure=pressure)
 
