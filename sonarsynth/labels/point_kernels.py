@@ -100,7 +100,7 @@ def louder(power: Floats, code: Ints, order: Ints, faint: Floats, loud: Bools) -
         loud[e] = up_to[code[e]] > faint[code[e]]
 
 
-@compiled(fastmath={"contract"})
+@compiled(fastmath={"contract"}, forceinline=True)
 def _tabulated(
     response: Complexes, apart: Floats, curvature: float, focus: float, frequency: Floats, pattern: Pattern
 ) -> None:
@@ -154,7 +154,7 @@ def _summed(
             phasor *= turned
 
 
-@compiled(fastmath=True)
+@compiled(fastmath=True, forceinline=True)
 def _heard(spectrum: Complexes, response: Complexes, weight: Complexes, sums: Complexes) -> complex:
     """Add a spectrum times a response (bin,) to sums (bin,): and the sum of what is added, weighted (bin,)."""
     total = 0j
