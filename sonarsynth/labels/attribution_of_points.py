@@ -232,8 +232,8 @@ def _stretches(arrivals: Arrivals, doppler: float, band: Band) -> tuple[Floats, 
 
 
 def _spectra(arrivals: Arrivals, rows: Ints, stretch: Floats, elements: Elements, band: Band) -> Complexes:
-    """Spectra (path, bin) that elements hear of some paths (path,), over that of the snap at 1 m, without delay;
-    stretch (path of all,): by what part pulses last longer.
+    """Spectra (path, bin) that elements hear of some paths (path,), over that of the snap at 1 m; stretch (path of
+    all,): by what part pulses last longer.
 
     P(f (1 + s)) = P(f) exp(-2 pi i s f tau), tau the group delay of the pulse: where frequencies come one after the
     other a shift of frequency is one of time. Source: Woodward (1953), Probability and Information Theory, with
@@ -250,7 +250,9 @@ def _spectra(arrivals: Arrivals, rows: Ints, stretch: Floats, elements: Elements
     decay = np.outer(np.log(10.0) / 20.0 * loss, -band.relative)
     if delay_std.any():
         decay -= np.outer(0.5 * (2.0 * np.pi * delay_std) ** 2, frequency**2)
-    spectra = kernels.path_spectra(amplitude, arrivals.phase[rows], np.exp(decay), sine, frequency)
+    spectra = kernels.path_spectra(
+        amplitude, arrivals.phase[rows], arrivals.delay[rows], np.exp(decay), sine, frequency
+    )
     if stretch.any():
         spectra *= np.exp(-2j * np.pi * stretch[rows, None] * (frequency * band.late)[arrivals.snap[rows]])
     wide = arrivals.corner_delays.any(axis=1)

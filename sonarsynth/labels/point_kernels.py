@@ -30,11 +30,22 @@ class Pattern(NamedTuple):
 
 
 @compiled
-def path_spectra(amplitude: Floats, phase: Floats, lost: Floats, sine: Floats, frequency: Floats) -> Complexes:
-    """Spectra (path, bin) of paths as an element of the array hears them, over that of the snap at 1 m; no delay.
+def turn(angle: float, step: float, phasors: Complexes) -> None:
+    """Fill phasors (bin,) of an angle (rad) and a step more each."""
+    phasor, turned = complex(math.cos(angle), math.sin(angle)), complex(math.cos(step), math.sin(step))
+    for k in range(len(phasors)):
+        phasors[k] = phasor
+        phasor *= turned
 
-    phase rad; lost (path, bin): factor on the amplitude; sine (path, 2): those of the direction along y and z times the
-    side of the square face over the sound speed (s).
+
+@compiled
+def path_spectra(
+    amplitude: Floats, phase: Floats, delay: Floats, lost: Floats, sine: Floats, frequency: Floats
+) -> Complexes:
+    """Spectra (path, bin) of paths as an element of the array hears them, over that of the snap at 1 m.
+
+    phase rad; delay s; lost (path, bin): factor on the amplitude; sine (path, 2): those of the direction along y and z
+    times the side of the square face over the sound speed (s).
     """
     bins, spacing = len(frequency), frequency[1] - frequency[0] if len(frequency) > 1 else 0.0
     spectrum, gain = np.empty((len(amplitude), bins), np.complex128), np.empty(bins)
@@ -48,9 +59,10 @@ def path_spectra(amplitude: Floats, phase: Floats, lost: Floats, sine: Floats, f
                 if abs(x) > 1e-6:
                     gain[k] *= phasor.imag / x
                 x, phasor = x + step, phasor * turned
-        cosine, sine_of_phase = math.cos(phase[e]), math.sin(phase[e])
+        late = -2.0 * math.pi * delay[e]
+        turn(phase[e] + frequency[0] * late, spacing * late, spectrum[e])
         for k in range(bins):
-            spectrum[e, k] = complex(cosine * gain[k], sine_of_phase * gain[k])
+            spectrum[e, k] *= gain[k]
     return spectrum
 
 
@@ -88,7 +100,7 @@ def louder(power: Floats, code: Ints, order: Ints, faint: Floats, loud: Bools) -
         loud[e] = up_to[code[e]] > faint[code[e]]
 
 
-@compiled
+@compiled(fastmath={"contract"}, forceinline=True)
 def _tabulated(
     response: Complexes, apart: Floats, curvature: float, focus: float, frequency: Floats, pattern: Pattern
 ) -> None:
@@ -96,15 +108,16 @@ def _tabulated(
     table, levels, size = pattern.table, pattern.table.shape[0], pattern.table.shape[1] - 2
     bulge, y, z = (curvature - focus) / pattern.step, 0.5 * pattern.pitch * apart[1], 0.5 * pattern.pitch * apart[2]
     for k in range(len(frequency)):
-        level = min(max(round(frequency[k] * bulge) - pattern.first, 0), levels - 1) if levels > 1 else 0
+        level = np.uint32(min(max(np.rint(frequency[k] * bulge) - pattern.first, 0.0), levels - 1.0))
         across, up = frequency[k] * y, frequency[k] * z
         across, up = (across - np.floor(across)) * size, (up - np.floor(up)) * size
         i, j = np.uint32(up), np.uint32(across)  # without signs no index counts from the end
-        v, u = up - i, across - j
+        v, u = np.float32(up - i), np.float32(across - j)
         a, b, c, d = table[level, i, j], table[level, i, j + 1], table[level, i + 1, j], table[level, i + 1, j + 1]
-        real = (1.0 - v) * ((1.0 - u) * a.real + u * b.real) + v * ((1.0 - u) * c.real + u * d.real)
-        imag = (1.0 - v) * ((1.0 - u) * a.imag + u * b.imag) + v * ((1.0 - u) * c.imag + u * d.imag)
-        response[k] = complex(real, imag)
+        upper, lower = a.real + u * (b.real - a.real), c.real + u * (d.real - c.real)
+        real = upper + v * (lower - upper)
+        upper, lower = a.imag + u * (b.imag - a.imag), c.imag + u * (d.imag - c.imag)
+        response[k] = complex(real, upper + v * (lower - upper))
 
 
 @compiled
@@ -141,6 +154,17 @@ def _summed(
             phasor *= turned
 
 
+@compiled(fastmath=True, forceinline=True)
+def _heard(spectrum: Complexes, response: Complexes, weight: Complexes, sums: Complexes) -> complex:
+    """Add a spectrum times a response (bin,) to sums (bin,): and the sum of what is added, weighted (bin,)."""
+    total = 0j
+    for k in range(len(sums)):
+        value = spectrum[k] * response[k]
+        sums[k] += value
+        total += weight[k] * value
+    return total
+
+
 @compiled
 def attribute(
     beam: Floats,
@@ -175,37 +199,35 @@ def attribute(
     the beam; first, last (point,): the paths that may be heard then, ascending in delay (path,) s. A path counts within
     `gate` (s), longer by `longer` (path,) s and by reach (s) times how far its direction is from the beam's: a pulse is
     heard through side lobes as long as it takes to cross the array. slowness: of the water over that of the beams.
-    spectrum (path, bin), of the pulse at 1 m; matched (group, bin): amplitude of the group's pulse in what ranges it;
-    coherent (path,): its phase counts; energy (group, bin): of the pulse; pulse (group,): of no target, which brings no
-    more energy than echoes leave of `beam_energy`, for the sonar may have taken it out; focus, curvature: 1/m.
+    spectrum (path, bin), over the pulse at 1 m, with its delay; matched (group, bin): amplitude of the group's pulse in
+    what ranges it; coherent (path,): its phase counts; energy (group, bin): of the pulse; pulse (group,): of no target,
+    which brings no more energy than echoes leave of `beam_energy`, for the sonar may have taken it out; focus,
+    curvature: 1/m.
     """
     bins, groups = len(frequency), len(pulse)
     power, total = np.zeros((len(beam), groups)), np.zeros((len(beam), groups))
     owner, share = np.full(len(beam), -1), np.zeros((len(beam), max(1, (last - first).max())))
     sums, peaks = np.empty((groups, bins), np.complex128), np.empty(groups, np.complex128)
     response, apart, brought = np.empty(bins, np.complex128), np.empty(3), np.empty(share.shape[1], np.complex128)
+    sooner, weight = np.empty(bins, np.complex128), np.empty((groups, bins), np.complex128)
     spacing = frequency[1] - frequency[0] if bins > 1 else 0.0
     for p in range(len(beam)):
         sums[:], peaks[:], brought[:] = 0.0, 0.0, 0.0
+        turn(2.0 * math.pi * frequency[0] * moment[p], 2.0 * math.pi * spacing * moment[p], sooner)
+        for g in range(groups):
+            weight[g] = matched[g] * sooner
         for e in range(first[p], last[p]):
-            late, away = moment[p] - delay[e], 0.0
+            away = 0.0
             for x in range(3):
                 apart[x] = slowness * direction[e, x] - beam[p, x]
                 away += apart[x] ** 2
-            if abs(late) > gate + longer[e] + reach * math.sqrt(away):
+            if abs(moment[p] - delay[e]) > gate + longer[e] + reach * math.sqrt(away):
                 continue
             if pattern.table.shape[0]:
                 _tabulated(response, apart, curvature[e], focus, frequency, pattern)
             else:
                 _summed(response, direction[e], curvature[e], slowness, beam[p], focus, speed, frequency, pattern)
-            angle, turn = 2.0 * math.pi * frequency[0] * late, 2.0 * math.pi * spacing * late
-            phasor, turned = complex(math.cos(angle), math.sin(angle)), complex(math.cos(turn), math.sin(turn))
-            peak = 0j
-            for k in range(bins):
-                value = spectrum[e, k] * response[k] * phasor
-                sums[group[e], k] += value
-                peak += matched[group[e], k] * value
-                phasor *= turned
+            peak = _heard(spectrum[e], response, weight[group[e]], sums[group[e]])
             brought[e - first[p]] = peak
             peaks[group[e]] += peak
         _compare(power[p], total[p], sums, peaks, energy, pulse, beam_energy[p])

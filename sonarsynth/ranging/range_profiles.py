@@ -26,7 +26,9 @@ from sonarsynth.receiver import Band, Elements, Sonar
 
 MAX_BEAMS = 16384
 """No more beams are ranged, the loudest of them: a bound on memory where a whole image is loud."""
-BEAMS_AT_ONCE = 512
+BEAMS_AT_ONCE, TRANSFORMED_AT_ONCE = 512, 32
+"""Beams that share the sums over rows of a lattice; and those that are transformed together: more at once would need
+memory that is given back, and taken again, in every frame."""
 OVERSAMPLING = 4
 """Delays of a profile for each that its bandwidth needs: two of a transform, and one more after each."""
 HALFWAY = np.array([0.605571, -0.133738, 0.032692, -0.004536], np.float32)
@@ -78,12 +80,17 @@ class EchoFilter:
         sine = u * (self.received.elements.face / sonar.assumed_sound_speed)
         spectra = np.empty((len(u), len(self.matched)), np.complex64)
         power = np.empty((len(u), self.count), np.float32)
+        padded = np.zeros((TRANSFORMED_AT_ONCE, self.length), np.complex64)
         for first in range(0, len(u), BEAMS_AT_ONCE):
             block = slice(first, first + BEAMS_AT_ONCE)
             steered, bins = self.received.beams.spectra(u[block]), (window.frequency[0], window.spacing)
             across, up = sine[block, 1], sine[block, 2]
             ranging_kernels.match(steered, across, up, *bins, self.share, self.matched, spectra[block])
-            ranging_kernels.powers(ifft(spectra[block], self.length, axis=1), HALFWAY, power[block])
+            for few in range(first, min(first + BEAMS_AT_ONCE, len(u)), TRANSFORMED_AT_ONCE):
+                some = spectra[few : few + TRANSFORMED_AT_ONCE]
+                padded[: len(some), : some.shape[1]] = some
+                waves = ifft(padded[: len(some)], axis=1)
+                ranging_kernels.powers(waves, HALFWAY, power[few : few + len(some)])
         return spectra, power
 
 

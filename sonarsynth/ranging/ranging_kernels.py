@@ -128,19 +128,22 @@ def _face_response(across: float, up: float, first: float, spacing: float, turns
     """Fill response (bin,) of one direction, as of `face_responses`; turns (4, bin): room for some bins at a time."""
     y, z = np.pi * across, np.pi * up
     y, z = y if abs(y) > TINY else 0.0, z if abs(z) > TINY else 0.0
-    for axis, angle in ((0, spacing * y), (2, spacing * z)):
-        sine, cosine, turn_sine, turn_cosine = 0.0, 1.0, np.sin(angle), np.cos(angle)
-        for k in range(turns.shape[1]):
-            turns[axis, k], turns[axis + 1, k] = sine, cosine
-            sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
-    for low in range(0, len(response), turns.shape[1]):
+    many, (sa, ca, sb, cb) = min(turns.shape[1], len(response)), (0.0, 1.0, 0.0, 1.0)
+    sine_y, cosine_y = np.sin(spacing * y), np.cos(spacing * y)
+    sine_z, cosine_z = np.sin(spacing * z), np.cos(spacing * z)
+    for k in range(many):
+        turns[0, k], turns[1, k], turns[2, k], turns[3, k] = sa, ca, sb, cb
+        sa, ca = sa * cosine_y + ca * sine_y, ca * cosine_y - sa * sine_y
+        sb, cb = sb * cosine_z + cb * sine_z, cb * cosine_z - sb * sine_z
+    sy, cy, sz, cz = np.sin(first * y), np.cos(first * y), np.sin(first * z), np.cos(first * z)
+    for low in range(0, len(response), many):
         f = first + low * spacing
-        sy, cy, sz, cz = np.sin(f * y), np.cos(f * y), np.sin(f * z), np.cos(f * z)
-        for k in range(min(turns.shape[1], len(response) - low)):
+        for k in range(min(many, len(response) - low)):
             x, w = (f + k * spacing) * y, (f + k * spacing) * z
             over_y = sy * turns[1, k] + cy * turns[0, k] if x != 0.0 else 1.0
             over_z = sz * turns[3, k] + cz * turns[2, k] if w != 0.0 else 1.0
             response[low + k] = over_y * over_z / ((x if x != 0.0 else 1.0) * (w if w != 0.0 else 1.0))
+        sy, cy, sz, cz = sy * ca + cy * sa, cy * ca - sy * sa, sz * cb + cz * sb, cz * cb - sz * sb
 
 
 @compiled(forceinline=True)

@@ -23,7 +23,7 @@ QUIETEST = 1e-7
 """Bins of less noise power than this, relative to the loudest, are left empty."""
 
 
-AT_ONCE = 8
+AT_ONCE = 16
 """Hydrophones whose noise is drawn at once: so few that the numbers stay in the cache."""
 MATRIX_ELEMENTS = 1 << 22
 """Matrix elements of cross spectral densities that are computed at once."""
@@ -70,26 +70,30 @@ def add_noise(
     length = fast_length(samples + int(np.ceil(duration(fir(sonar.antialias)) * fs)))
     low, size, gain = _noise_size(noise, sonar.antialias, fs, length)
     high = low + size.size
-    spectrum = np.zeros((sensors, length // 2 + 1), np.complex64)
     fast = np.random.Generator(np.random.SFC64(rng.integers(0, 1 << 32, 4, np.uint32)))  # half the time of Philox
     frequency = _frequencies(low, high, fs, length)
+    together: npt.NDArray[np.complex64] | None = None  # (sensor, bin) of noise that hydrophones hear together
     if noise.directions is not None:
         from sonarsynth.signals.noise.drawing import draw  # compiled, and seldom needed
 
         array_pose = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])) if pose is None else pose
-        spectrum[:, low:high] = size * draw(noise.directions, elements, array_pose, sonar, frequency, sound_speed, fast)
+        together = size * draw(noise.directions, elements, array_pose, sonar, frequency, sound_speed, fast)
     elif noise.correlated:
         position = elements.position if pose is None else pose.to_world(elements.position)
-        _draw_correlated(spectrum[:, low:high], noise, frequency, gain, position, fast)
-    else:
-        from sonarsynth.equations.noise.complex_normals import complex_normals  # compiled: read where it is needed
+        together = np.empty((sensors, size.size), np.complex64)
+        _draw_correlated(together, noise, frequency, gain, position, fast)
+    from sonarsynth.equations.noise.complex_normals import complex_normals  # compiled: read where it is needed
 
-        for first in range(0, sensors, AT_ONCE):
-            some = spectrum[first : first + AT_ONCE, low:high]
-            some[...] = complex_normals(np.broadcast_to(size**2, some.shape), fast)
-    if not np.all(elements.gain == 1.0):
-        spectrum *= elements.gain[:, None].astype(np.float32)
-    return replace(signals, pressure=signals.pressure + irfft(spectrum, length, axis=1, overwrite_x=True)[:, :samples])
+    spectrum, power = np.zeros((AT_ONCE, length // 2 + 1), np.complex64), np.broadcast_to(size**2, (AT_ONCE, size.size))
+    pressure = np.empty(signals.pressure.shape, np.result_type(signals.pressure, np.float32))
+    for first in range(0, sensors, AT_ONCE):
+        rows = slice(first, min(first + AT_ONCE, sensors))
+        some = spectrum[: rows.stop - first]
+        some[:, low:high] = complex_normals(power[: len(some)], fast) if together is None else together[rows]
+        if not np.all(elements.gain[rows] == 1.0):
+            some *= elements.gain[rows, None].astype(np.float32)
+        np.add(signals.pressure[rows], irfft(some, length, axis=1)[:, :samples], out=pressure[rows])
+    return replace(signals, pressure=pressure)
 
 
 def _draw_correlated(

@@ -8,9 +8,6 @@ import numpy as np
 
 from sonarsynth.compiling import compiled
 
-AT_ONCE = 64
-"""Delays that are first looked over for one of interest: few are."""
-
 
 @compiled
 def exceeded(power: Any, index: Any, i: int, j: int, t: int, about: int) -> Any:
@@ -32,34 +29,35 @@ def exceeded(power: Any, index: Any, i: int, j: int, t: int, about: int) -> Any:
 
 
 @compiled
-def local_maxima(power: Any, index: Any, row: Any, column: Any, floor: Any, edge: Any, about: int, end: int) -> Any:
-    """Beams and delays (peak,) of values over `floor` (beam,) that no neighbour exceeds.
+def local_maxima(
+    power: Any, index: Any, row: Any, column: Any, floor: Any, least: Any, edge: Any, about: int, end: int
+) -> Any:
+    """Beams and delays (peak,) of values over `floor` (beam,), of `least` (delay,) at least, that no neighbour exceeds.
 
     power (beam, delay); index (elevation, azimuth) the beam there, -1 for none; row, column (beam,) of each beam. None
     within `end` delays of an end, which is more than `about`, none in a beam that lacks a neighbour, where a slope
     would pass for a peak, and none at the edge of an axis of which edge (2,) says that peaks are resolved: theirs may
     be outside.
     """
-    rows, columns = index.shape
-    peaks, count = np.empty((2, power.size), np.int64), 0
+    (rows, columns), stop = index.shape, power.shape[1] - end
+    least, top = least[end:stop], np.empty(max(stop - end, 0), np.bool_)
+    peaks, count = np.empty((2, len(power) * (len(top) // (about + 1) + 1)), np.int32), 0  # more than `about` apart
     for b in range(len(power)):
         i, j = row[b], column[b]
         if (edge[0] and (i == 0 or i == rows - 1)) or (edge[1] and (j == 0 or j == columns - 1)):
             continue
         if index[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2].min() < 0:
             continue
-        for first in range(end, power.shape[1] - end, AT_ONCE):
-            last, over = min(first + AT_ONCE, power.shape[1] - end), 0
-            for t in range(first, last):
-                over += power[b, t] > floor[b]
-            if over == 0:
-                continue
-            for t in range(first, last):
-                top = power[b, t] > floor[b] and power[b, t] >= power[b, t + 1] and power[b, t] > power[b, t - 1]
-                if top and not exceeded(power, index, i, j, t, about):
-                    peaks[0, count], peaks[1, count] = b, t
-                    count += 1
-    return peaks[0, :count].copy(), peaks[1, :count].copy()
+        before, own, after = power[b, end - 1 : stop - 1], power[b, end:stop], power[b, end + 1 : stop + 1]
+        left, right = power[index[i, max(j - 1, 0)], end:stop], power[index[i, min(j + 1, columns - 1)], end:stop]
+        for t in range(len(top)):  # many at once: slices, and no branch
+            loud = (own[t] > floor[b]) & (own[t] >= least[t])
+            top[t] = loud & (own[t] > before[t]) & (own[t] >= max(after[t], left[t], right[t]))
+        for t in range(len(top)):
+            if top[t] and not exceeded(power, index, i, j, end + t, about):
+                peaks[0, count], peaks[1, count] = b, end + t
+                count += 1
+    return peaks[0, :count].astype(np.int64), peaks[1, :count].astype(np.int64)
 
 
 @compiled
@@ -203,18 +201,16 @@ def loudest_lines(spectra: Any, b: Any, turn: Any, width: int) -> Any:
     return line, power / width**2
 
 
-@compiled(fastmath=True, forceinline=True)
-def _faded(power: Any, first: int, last: int, least: Any, fade: Any, late: Any) -> Any:
-    """Sums of `fade` times power (delay,) from first to last where it is `least` or more, and of that times `late`."""
-    faded = later = np.float32(0.0)
-    for s in range(first, last):
-        loud = fade[s] * (power[s] if power[s] >= least else np.float32(0.0))
-        faded += loud
-        later += loud * late[s]
-    return faded, later
+@compiled(fastmath={"contract"}, forceinline=True)
+def _add(power: Any, least: Any, share: Any, moment: Any, sums: Any, moments: Any) -> None:
+    """Add power (delay,) where it is `least` or more, times share to sums (delay,) and times moment to moments."""
+    for s in range(len(power)):
+        loud = power[s] if power[s] >= least else np.float32(0.0)
+        sums[s] += share * loud
+        moments[s] += moment * loud
 
 
-@compiled
+@compiled(fastmath={"contract"})
 def power_centres(
     power: Any, index: Any, row: Any, column: Any, b: Any, t: Any, offset: Any, width: Any, about: float, least: Any
 ) -> Any:
@@ -222,30 +218,40 @@ def power_centres(
 
     power, index, row, column: as for `local_maxima`; b, t (peak,) the cells of peaks, offset (peak, 3) their tops
     beside these in cells; width (3,): a cell in widths; about: standard deviation of the window in widths, cut at twice
-    that; least (beam,): power below that is noise.
+    that; least (beam,): power below that is noise. Fast where peaks come by their delays: what is next is in the cache.
     """
     rows, columns = index.shape
-    centre = np.zeros((len(b), 3))
+    centre, share = np.zeros((len(b), 3)), np.empty((2, columns), np.float32)
     reach = [int(min(np.ceil(2.0 * about / max(width[x], 1e-9)), power.size)) for x in range(3)]
-    late, fade = np.empty(power.shape[1], np.float32), np.empty(power.shape[1], np.float32)
+    steps = min(2 * reach[2] + 1, power.shape[1])
+    line, sums = np.empty((2, steps), np.float32), np.empty((3, steps))
     for p in range(len(b)):
-        i0, j0, total = row[b[p]], column[b[p]], 0.0
+        (i0, j0), sums[:], total = (row[b[p]], column[b[p]]), 0.0, 0.0
         first, last = max(t[p] - reach[2], 0), min(t[p] + reach[2] + 1, power.shape[1])
-        for s in range(first, last):
-            late[s] = (s - t[p] - offset[p, 2]) * width[2]
-            fade[s] = np.exp(-0.5 * (late[s] / about) ** 2)
+        left, right = max(j0 - reach[1], 0), min(j0 + reach[1] + 1, columns)
+        for j in range(left, right):
+            aside = (j - j0 - offset[p, 1]) * width[1]
+            share[0, j] = np.exp(-0.5 * (aside / about) ** 2)
+            share[1, j] = share[0, j] * aside
         for i in range(max(i0 - reach[0], 0), min(i0 + reach[0] + 1, rows)):
-            up = (i - i0 - offset[p, 0]) * width[0]
-            for j in range(max(j0 - reach[1], 0), min(j0 + reach[1] + 1, columns)):
-                right = (j - j0 - offset[p, 1]) * width[1]
+            line[:] = 0.0
+            for j in range(left, right):
                 beam = index[i, j]
-                if beam < 0:
-                    continue
-                faded, later = _faded(power[beam], first, last, np.float32(least[beam]), fade, late)
-                aside = np.exp(-0.5 * (up**2 + right**2) / about**2)
-                total += aside * faded
-                centre[p, 0] += aside * faded * up
-                centre[p, 1] += aside * faded * right
-                centre[p, 2] += aside * later
+                if beam >= 0:
+                    heard = power[beam, first:last]
+                    _add(heard, np.float32(least[beam]), share[0, j], share[1, j], line[0], line[1])
+            up = (i - i0 - offset[p, 0]) * width[0]
+            fade = np.exp(-0.5 * (up / about) ** 2)
+            for s in range(last - first):
+                sums[0, s] += fade * line[0, s]
+                sums[1, s] += fade * up * line[0, s]
+                sums[2, s] += fade * line[1, s]
+        for s in range(last - first):
+            late = (first + s - t[p] - offset[p, 2]) * width[2]
+            fade = np.exp(-0.5 * (late / about) ** 2)
+            total += fade * sums[0, s]
+            centre[p, 0] += fade * sums[1, s]
+            centre[p, 1] += fade * sums[2, s]
+            centre[p, 2] += fade * late * sums[0, s]
         centre[p] /= total
     return centre

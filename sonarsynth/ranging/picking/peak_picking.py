@@ -83,9 +83,9 @@ def peak_echoes(
     if not axes.resolved[:2].all():
         keep[keep] = _once(window, profiles, axes, b[keep], t[keep], height[keep])
     b, t, top_offset, height, energy = b[keep], t[keep], top_offset[keep], height[keep], energy[keep]
-    centre = power_centres(
-        power, index, *beams, b, t, top_offset, axes.step * axes.sharpness, CENTRE_WINDOW, NOISE_CLEAR * noise
-    )
+    centre, late = np.empty((len(b), 3)), np.argsort(t, kind="stable")
+    width, least = axes.step * axes.sharpness, NOISE_CLEAR * noise
+    centre[late] = power_centres(power, index, *beams, b[late], t[late], top_offset[late], width, CENTRE_WINDOW, least)
     snr = height / noise[b]
     error = axes.errors(snr, centre)
     offset = top_offset * axes.step
@@ -108,11 +108,12 @@ def _maxima(
 ) -> tuple[Ints, Ints]:
     """Beams and delays (peak,) of local maxima within both (dB), half of `least` (beam,) at least."""
     power, beams = profiles.power, (profiles.row, profiles.column)
-    floor = np.maximum(0.5 * least, power.max() * 10 ** (-dynamic_range / 10)).astype(np.float32)
+    loudest = power.max(axis=0)
+    floor = np.maximum(0.5 * least, loudest.max() * 10 ** (-dynamic_range / 10)).astype(np.float32)
+    over_lobes = maximum_filter1d(loudest, 2 * profiles.about + 1) * np.float32(10 ** (-side_lobes / 10))
     end = max(int(np.ceil(pulse_times.PULSE_HALF / profiles.step)), profiles.about) + 1
-    b, t = local_maxima(power, index, *beams, floor, axes.resolved, profiles.about, end)
-    anywhere = maximum_filter1d(power.max(axis=0), 2 * profiles.about + 1)
-    good = (power[b, t] * 10 ** (side_lobes / 10) >= anywhere[t]) & ~_cut(power, b, t, end)
+    b, t = local_maxima(power, index, *beams, floor, over_lobes, axes.resolved, profiles.about, end)
+    good = ~_cut(power, b, t, end)
     return b[good], t[good]
 
 
@@ -132,8 +133,9 @@ def _once(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, t: In
 
 def _energies(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, height: Floats) -> Floats:
     """Energies (peak,) in Pa2 s: of a peak h exp(-(sharpness t)^2), as a share of all that is in its beam."""
-    beam_energy = profiles.step * profiles.power[b].sum(axis=1, dtype=float)
-    share = height * np.sqrt(np.pi) / axes.sharpness[2] / beam_energy
+    beams, beam = np.unique(b, return_inverse=True)
+    beam_energy = profiles.step * profiles.power[beams].sum(axis=1, dtype=float)
+    share = height * np.sqrt(np.pi) / axes.sharpness[2] / beam_energy[beam]
     return np.asarray(np.minimum(share, 1.0) * window.image.energy[profiles.row[b], profiles.column[b]])
 
 

@@ -72,7 +72,7 @@ def add_arrivals(
     level = np.zeros(len(arrivals.delay), int)
     for number, (_, _, radius) in enumerate(levels[:-1]):
         level[turns * radius > TURN * arrivals.length] = number + 1
-    position = elements.position[order].T.ravel()
+    position = np.ascontiguousarray(elements.position[order].T)
     for number, (bounds, middle, _) in enumerate(levels):
         rows = np.flatnonzero(level == number)
         if not rows.size:

@@ -29,9 +29,9 @@ def add_pulses(
     The pulse is the sum of modes (mode * fraction * tap,) times weight (row, mode): at the fractions of a sample before
     each tap, linear in between, one fraction more than `fractions`. source (row, xyz) m is where its wave seems to
     come from, length (row,) m how far that is from the middle of the array, where the first tap is at start (row,) in
-    samples. position (xyz * sensor,) m; rate in samples/s, slowness in s/m; nearer than `cavity` (m) it is no louder.
+    samples. position (xyz, sensor) m; rate in samples/s, slowness in s/m; nearer than `cavity` (m) it is no louder.
     """
-    sensors, size, number = position.size // 3, (fractions + 1) * taps, modes.dtype.type
+    sensors, size, number = position.shape[1], (fractions + 1) * taps, modes.dtype.type
     table = np.zeros(size, modes.dtype)
     begin, fraction = np.empty(sensors, np.int32), np.empty(sensors, np.int32)
     v, w = np.empty(sensors, modes.dtype), np.empty(sensors, modes.dtype)
@@ -39,8 +39,10 @@ def add_pulses(
     for row in range(start.size):
         _mix(modes, weight[row], size, table)
         px, py, pz, r = source[row, 0], source[row, 1], source[row, 2], length[row]
-        for s in range(first[row], last[row]):
-            qx, qy, qz = position[s], position[sensors + s], position[2 * sensors + s]
+        own = slice(first[row], last[row])  # many at once: slices
+        ahead, across, up = position[0][own], position[1][own], position[2][own]
+        for s in range(len(ahead)):
+            qx, qy, qz = ahead[s], across[s], up[s]
             x, y, z = px - qx, py - qy, pz - qz
             away = np.sqrt(x * x + y * y + z * z)
             longer = (qx * (qx - 2.0 * px) + qy * (qy - 2.0 * py) + qz * (qz - 2.0 * pz)) / (away + r)
@@ -51,8 +53,8 @@ def add_pulses(
             begin[s], fraction[s] = np.int32(after), np.int32(n)
             w[s] = number((x - n) * gain)
             v[s] = number(gain) - w[s]
-        for s in range(first[row], last[row]):
+        for s in range(len(ahead)):
             if begin[s] >= 0 and begin[s] + taps <= samples:
-                line, value = s * pitch + begin[s], fraction[s] * taps
+                line, value = (first[row] + s) * pitch + begin[s], fraction[s] * taps
                 for j in range(0, taps, WIDTH):
                     add_two(out, line + j, table, value + j, v[s], value + taps + j, w[s])  # type: ignore[call-arg]

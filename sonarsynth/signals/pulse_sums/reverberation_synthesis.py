@@ -130,8 +130,9 @@ def reverberation_pressure(
             own = rfft(part[:, : times * count], axis=1)[:, heard]
             own *= response
             total[:, heard] += own
-        out[sensors] = irfft(total, count, axis=1)[:, early : early + samples]
-    return out * elements.gain[:, None].astype(np.float32)
+        gain = elements.gain[sensors, None].astype(np.float32)
+        out[sensors] = irfft(total, count, axis=1)[:, early : early + samples] * gain
+    return out
 
 
 def _blocks(parts: tuple[Ints, ...]) -> Iterator[tuple[int, Ints]]:
