@@ -110,9 +110,9 @@ def _maxima(
     power, beams = profiles.power, (profiles.row, profiles.column)
     loudest = power.max(axis=0)
     floor = np.maximum(0.5 * least, loudest.max() * 10 ** (-dynamic_range / 10)).astype(np.float32)
-    over_lobes = maximum_filter1d(loudest, 2 * profiles.about + 1) * np.float32(10 ** (-side_lobes / 10))
+    audible = maximum_filter1d(loudest, 2 * profiles.about + 1) * np.float32(10 ** (-side_lobes / 10))
     end = max(int(np.ceil(pulse_times.PULSE_HALF / profiles.step)), profiles.about) + 1
-    b, t = local_maxima(power, index, *beams, floor, over_lobes, axes.resolved, profiles.about, end)
+    b, t = local_maxima(power, index, *beams, floor, audible, axes.resolved, profiles.about, end)
     good = ~_cut(power, b, t, end)
     return b[good], t[good]
 
