@@ -72,7 +72,7 @@ def _explain(error: Exception, shown: bool) -> int:
 
     name = type(error).__name__
     if name == "Damage":
-        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # other files that were read are of no interest
+        logging.getLogger("asyncio").addFilter(_of_no_damage)  # other files that were read are of no interest
         warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)
     if name in STATUS or isinstance(error, (BadOption, FieldError)):
         lines = str(error).split("\n") if name == "RecipeError" else [str(error)]
@@ -82,6 +82,10 @@ def _explain(error: Exception, shown: bool) -> int:
         return _say(f"{file}{error.strerror}", INPUT if isinstance(error, BAD_PLACE) else OURS)
     line = f"{type(error).__name__}: {error}"
     return _say(line if shown else f"{line} (traceback in {_keep_traceback(error)})", OURS)
+
+
+def _of_no_damage(record: logging.LogRecord) -> bool:
+    return record.exc_info is None or type(record.exc_info[1]).__name__ != "Damage"
 
 
 def _keep_traceback(error: Exception) -> str:

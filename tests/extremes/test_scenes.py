@@ -176,11 +176,16 @@ def test_a_frame_whose_snap_is_not_found_is_whole_and_says_nothing_of_it(which: 
     assert np.isfinite(tree["truth/targets"].position).all()
 
 
-def test_a_strong_thermocline_across_the_array_is_said_to_be_beyond_the_expansion() -> None:
-    """Some sensors have no ray from the snap: no wavefront over the aperture holds, and its error is NaN."""
-    _, tree = frame_of(scene(environment=layered((0.0, 4.9, 5.1, 12.0), (1540.0, 1540.0, 1450.0, 1450.0))))
-    assert np.isnan(float(tree["link_budget"].wavefront_error))
-    assert int(tree["cloud"]["count"]) == 0
+def test_a_step_in_speed_or_a_shadow_across_the_array_is_said_to_be_beyond_the_expansion() -> None:
+    """Every sensor has one ray from the step's other side, and the wavefront errs by a tenth of a period or more. Where
+    some are in the shadow of a fast layer none holds over the aperture, and its error is NaN."""
+    step = (0.0, 4.9, 5.1, 12.0), (1540.0, 1540.0, 1450.0, 1450.0)
+    fast_layer = (0.0, 5.1, 5.15, 5.2, 12.0), (1450.0, 1450.0, 1540.0, 1450.0, 1450.0)
+    for profile, some_have_none in ((step, False), (fast_layer, True)):
+        made, tree = frame_of(scene(environment=layered(*profile)))
+        error = float(tree["link_budget"].wavefront_error)
+        assert np.isnan(error) if some_have_none else error * made.scene.sonar.band.centre > 0.1
+        assert int(tree["cloud"]["count"]) == 0
 
 
 def test_the_snap_that_is_heard_best_starts_the_clock() -> None:

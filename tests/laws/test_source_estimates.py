@@ -406,7 +406,7 @@ def test_the_mirror_image_of_a_snap_is_a_warning() -> None:
                 tree["signals"] = xr.DataTree(xr.Dataset(sensors))
             check = snap_located(tree, np.arange(2))
             assert check.ok is (None if heard else False)
-            assert ("2 snaps were located at their mirror images" in check.warning) == heard
+            assert ("2 snaps located at the mirror image" in check.warning) == heard
 
 
 @pytest.mark.parametrize("useless", [{"spread": 9.0}, {"azimuth_error": 20.0}, {"time_error": 1.0}])
