@@ -21,13 +21,12 @@ from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.pipeline.stored_values import Values, table
 from sonarsynth.pipeline.synthesis import SCATTERERS, Pressure, Recorder, known_elements
 from sonarsynth.planning import Plan
-from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE
+from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE, SNR_BEAMS
 from sonarsynth.products import Arrivals, EnergyImage, Signals, Truth
 from sonarsynth.recipe.scene import Frame
 
-MOST: Final = 1024
-"""Beams of a target that are looked at, spread evenly over all of its beams: of a ball that fills 1453 beams of ROMANIS
-its echoes err by 0.03 dB, and by 1.5 dB of 64, for it glints in few of them."""
+BEAMS_AT_ONCE: Final = 1024
+"""Beams that are steered at once: those of all targets may be all of the grid, too many to hold their spectra."""
 FINE: Final = 256
 """Bins of the band at least, so that little lies between its edges and the next bins."""
 FEW: Final = 16
@@ -102,11 +101,11 @@ def snr_values(
 
 
 def target_beams(truth: Truth, target: int) -> Ints:
-    """Indices (beam,) in the flat grid of at most `MOST` beams that point at a target: the nearest beam for a target
-    between beams, none for one that is not seen."""
+    """Indices (beam,) in the flat grid of at most `SNR_BEAMS` beams that point at a target: the nearest beam for a
+    target between beams, none for one that is not seen."""
     beams = np.flatnonzero(truth.beam_target.ravel() == target)
-    if len(beams) > MOST:
-        return np.asarray(beams[np.linspace(0, len(beams) - 1, MOST).round().astype(int)])
+    if len(beams) > SNR_BEAMS:
+        return np.asarray(beams[np.linspace(0, len(beams) - 1, SNR_BEAMS).round().astype(int)])
     box = truth.pixel_box[target]
     if len(beams) or not np.isfinite(box).all():
         return np.asarray(beams)
@@ -143,8 +142,12 @@ class _BeamEnergies:
             return np.zeros(len(beams))
         heard, (start, stop) = replace(self.signals, pressure=pressure), self._gate(pressure)
         snapshots = snapshots_of(heard, self.sonar, start, stop, lasting=stop - start)
-        steered = self.method.steer(snapshots, self.elements, self.sonar, self.grid[beams])
-        return np.asarray(snapshots.unit * np.sum(np.abs(steered).astype(float) ** 2, axis=1))
+        energy = np.empty(len(beams))
+        for low in range(0, len(beams), BEAMS_AT_ONCE):
+            some = slice(low, low + BEAMS_AT_ONCE)
+            steered = self.method.steer(snapshots, self.elements, self.sonar, self.grid[beams[some]])
+            energy[some] = snapshots.unit * np.sum(np.abs(steered).astype(float) ** 2, axis=1)
+        return energy
 
     def _gate(self, pressure: Pressure) -> tuple[float, float]:
         """Start and stop (s) of the part of the window that holds the energy of pressure (sensor, sample), widened by
