@@ -25,8 +25,6 @@ from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE, SNR_BEAMS
 from sonarsynth.products import Arrivals, EnergyImage, Signals, Truth
 from sonarsynth.recipe.scene import Frame
 
-BEAMS_AT_ONCE: Final = 1024
-"""Beams that are steered at once: those of all targets may be all of the grid, too many to hold their spectra."""
 FINE: Final = 256
 """Bins of the band at least, so that little lies between its edges and the next bins."""
 FEW: Final = 16
@@ -142,12 +140,7 @@ class _BeamEnergies:
             return np.zeros(len(beams))
         heard, (start, stop) = replace(self.signals, pressure=pressure), self._gate(pressure)
         snapshots = snapshots_of(heard, self.sonar, start, stop, lasting=stop - start)
-        energy = np.empty(len(beams))
-        for low in range(0, len(beams), BEAMS_AT_ONCE):
-            some = slice(low, low + BEAMS_AT_ONCE)
-            steered = self.method.steer(snapshots, self.elements, self.sonar, self.grid[beams[some]])
-            energy[some] = snapshots.unit * np.sum(np.abs(steered).astype(float) ** 2, axis=1)
-        return energy
+        return self.method.energies_in(snapshots, self.elements, self.sonar, self.grid[beams])
 
     def _gate(self, pressure: Pressure) -> tuple[float, float]:
         """Start and stop (s) of the part of the window that holds the energy of pressure (sensor, sample), widened by
