@@ -105,7 +105,7 @@ def _views(front: Wavefronts, aim: TileSettings, missed: bool) -> _Views:
     gradient = aperture_gradient(front, probes.points)
     columns = _columns(front, probes.points, gradient)
     bend = slopes(front, gradient, aim.weights[0] * aim.highest, aim.highest)
-    amplitude = (np.abs(front.amplitude)[:, None] * front.expansion.amplitude_degrees).T
+    amplitude = np.multiply(np.abs(front.amplitude), front.expansion.amplitude_degrees.T, order="C")
     return _Views(front, columns, amplitude, probes, gradient, bend, near or missed)
 
 
@@ -168,7 +168,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     if views.front.modes.shape[1]:
         modes, sizes = main_modes(*pulses(views.front, paths, over, aim.changes))
     farther = views.front.attenuation * float(slope @ np.abs(aim.elements.position).max(axis=0))  # dB
-    degrees = views.amplitude[:, paths].sum(axis=1)
+    degrees = np.take(views.amplitude, paths, axis=1).sum(axis=1)
     shares = tuple((degrees / max(float(degrees.sum()), 1e-300)).tolist())
     extent = _Extent(
         paths=paths.size,
