@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from sonarsynth.columns import picked
 from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
 from sonarsynth.equations.water import boundary_reflection, formula_ranges
@@ -38,18 +39,20 @@ def bounces(
     sound_speed (m/s) is the water's at the boundary; frequency (Hz) as for `coefficient`. The blur of several bounces
     adds up by squares: they meet different pieces of the boundary. A reflection at an angle that is NaN gives NaN.
     """
-    times, angle = np.broadcast_arrays(np.asarray(count), np.asarray(grazing, float))
-    modulus, (phase, spread) = np.ones(times.shape), np.zeros((2, *times.shape))
-    met = times > 0
+    both = np.broadcast_arrays(np.asarray(count), np.asarray(grazing, float))
+    shape, (times, angle) = both[0].shape, (column.reshape(-1) for column in both)
+    modulus, (phase, spread) = np.ones(times.size), np.zeros((2, times.size))
+    met = picked(times > 0)
     times, q = times[met], angle[met]
     once = coefficient(boundary, q, frequency) + 0.0  # no negative zeros: the phase of -1 is pi
     none = np.where(np.isnan(q), np.nan, 1.0)
     modulus[met], phase[met] = none * np.abs(once) ** times, none * np.angle(once) * times
     if rms_height(boundary) != 0.0:
-        speed = np.broadcast_to(sound_speed, met.shape)[met]
-        spread[met] = np.sqrt(times) * delay_std(boundary, q, speed)
-    spread[met] *= none
-    return Bounces(modulus, phase, spread)
+        speed = np.broadcast_to(sound_speed, shape).reshape(-1)[met]
+        spread[met] = none * (np.sqrt(times) * delay_std(boundary, q, speed))
+    else:
+        spread[met] = 0.0 * none
+    return Bounces(*(column.reshape(shape) for column in (modulus, phase, spread)))
 
 
 def coefficient(boundary: SeaSurface | SeaBottom, grazing: npt.ArrayLike, frequency: float | None = None) -> Complexes:

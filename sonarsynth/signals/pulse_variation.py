@@ -157,7 +157,8 @@ def rest(front: Wavefronts, paths: Ints, variation: PulseVariation, tolerance: f
     turn, turned = _shared(front.expansion.phase, paths, some)
     spread, softer = _shared(front.expansion.delay_variance, paths, some)
     share = np.array([np.minimum(turned, 1.0) ** a * (softer * variation.rate) ** p for p, a in variation.kinds])
-    size = np.sqrt((np.tensordot(weight, variation.onto, (1, 1)) ** 2).sum(axis=2)).T * share * loud
+    changed = weight @ variation.onto  # (change, path, mode)
+    size = np.sqrt(np.einsum("cpm,cpm->cp", changed, changed)) * share * loud
     mean = np.sqrt((size**2).sum(axis=1) / (loud**2).sum())
     which = np.flatnonzero(np.maximum(mean, size.max(axis=1) / loud.max()) > tolerance)
     return ResidualVariation(turn, spread, which, share[which], sampled)

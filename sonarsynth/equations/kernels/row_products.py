@@ -19,10 +19,17 @@ def row_products(rows: Floats, matrix: Floats) -> Floats:
 
 @compiled
 def _products(rows: Floats, matrix: Floats) -> Floats:
-    out = np.zeros((len(rows), matrix.shape[1]))
+    inner, out = len(matrix), np.zeros((len(rows), matrix.shape[1]))
+    fours = inner - inner % 4  # four at a time, in the order that they are written in: read and written once for all
     for i in range(len(rows)):
-        for k in range(len(matrix)):
-            factor = rows[i, k]
-            for j in range(matrix.shape[1]):
-                out[i, j] += factor * matrix[k, j]
+        row, factor = out[i], rows[i]
+        for k in range(0, fours, 4):
+            a, b, c, d = matrix[k], matrix[k + 1], matrix[k + 2], matrix[k + 3]
+            by_a, by_b, by_c, by_d = factor[k], factor[k + 1], factor[k + 2], factor[k + 3]
+            for j in range(len(row)):
+                row[j] = (((row[j] + by_a * a[j]) + by_b * b[j]) + by_c * c[j]) + by_d * d[j]
+        for k in range(fours, inner):
+            a, by_a = matrix[k], factor[k]
+            for j in range(len(row)):
+                row[j] += by_a * a[j]
     return out

@@ -23,12 +23,13 @@ from sonarsynth.equations.rays.ray_rows import (
     UPPER,
     emit,
     emit_level,
+    in_columns,
     sort_by_time,
 )
 from sonarsynth.equations.rays.ray_search import straight
 from sonarsynth.equations.rays.ray_vertices import Chain, new_chain
 
-__all__ = ["FIELDS", "SURFACE", "mean_slowness", "rays_of_pairs"]
+__all__ = ["FIELDS", "in_columns", "mean_slowness", "rays_of_pairs"]
 
 SAME_DEPTH = 1e-140  # m: depths that differ by less are equal
 MANY = 64  # layers

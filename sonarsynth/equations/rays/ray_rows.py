@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.rays.ray_chain import length_of, sweep, time_of
 
 FIELDS = 15
@@ -14,6 +16,7 @@ UPPER, LOWER, SURFACE, BOTTOM, TURNING, CAUSTICS, FLAG = range(8, FIELDS)
 """Columns of a found ray: s, m, s/m, sines (up positive), m/s, 1/m, depths of its vertices (m), counts, flag."""
 
 COINCIDENT, CAUSTIC, PASSED = 1.0, 2.0, 3.0
+BLOCK = 64  # rows that are near memory while they are read column by column
 FOCUSED = 10.0  # times spherical spreading (20 dB): from here on the amplitude of ray theory is not to be trusted
 
 
@@ -76,3 +79,18 @@ def sort_by_time(out: Floats, first: int, count: int) -> None:
             for f in range(FIELDS):
                 out[j, f], out[j - 1, f] = out[j - 1, f], out[j, f]
             j -= 1
+
+
+@compiled
+def in_columns(rows: Floats) -> tuple[Floats, Ints]:
+    """The columns of rows (ray, FIELDS), one after the other: numbers (SURFACE, ray), and counts (rest, ray)."""
+    values, counts = np.empty((SURFACE, len(rows))), np.empty((FIELDS - SURFACE, len(rows)), np.int64)
+    for first in range(0, len(rows), BLOCK):
+        last = min(first + BLOCK, len(rows))
+        for column in range(SURFACE):
+            for i in range(first, last):
+                values[column, i] = rows[i, column]
+        for column in range(SURFACE, FIELDS):
+            for i in range(first, last):
+                counts[column - SURFACE, i] = int(rows[i, column])
+    return values, counts

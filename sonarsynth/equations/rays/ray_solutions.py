@@ -137,8 +137,10 @@ def eigenrays(
         room = 2 * room if reached == first else max(64, 2 * (1 + vertices) * (len(r) - reached))
         first = reached
     pair = pairs[0] if len(pairs) == 1 else np.concatenate([np.empty(0, np.int64), *pairs])
-    columns = (rows[0] if len(rows) == 1 else np.concatenate([np.empty((0, kernels.FIELDS)), *rows])).T.copy()
-    return Eigenrays(pair, *columns[: kernels.SURFACE], *columns[kernels.SURFACE :].astype(np.int64))
+    values, counts = kernels.in_columns(
+        rows[0] if len(rows) == 1 else np.concatenate([np.empty((0, kernels.FIELDS)), *rows])
+    )
+    return Eigenrays(pair, *values, *counts)
 
 
 def mean_slowness(water: Water, start: Floats, end: Floats) -> Floats:

@@ -90,7 +90,7 @@ class _Views:
     """What every tile that is tried looks at, computed once: a tile is the smallest and the largest of each column."""
 
     front: Wavefronts
-    columns: Floats  # (column, path): direction, curvature, absorption, delay terms; slownesses at probes
+    columns: Floats  # (path, column): direction, curvature, absorption, delay terms; slownesses at probes
     amplitude: Floats  # (degree, path) Pa: terms of each degree that it has over the aperture
     probes: _Probes
     gradient: Floats  # (xyz, point, term) of the aperture terms; empty where there are none
@@ -103,10 +103,9 @@ def _views(front: Wavefronts, aim: TileSettings, missed: bool) -> _Views:
     near = bool(front.curvature.max() * np.linalg.norm(np.abs(elements.position).max(axis=0)) > 0.8)
     probes = _probes(elements, near)
     gradient = aperture_gradient(front, probes.points)
-    columns = _columns(front, probes.points, gradient)
     bend = slopes(front, gradient, aim.weights[0] * aim.highest, aim.highest)
-    amplitude = (np.abs(front.amplitude)[:, None] * front.expansion.amplitude_degrees).T
-    return _Views(front, columns, amplitude, probes, gradient, bend, near or missed)
+    amplitude = np.multiply(np.abs(front.amplitude), front.expansion.amplitude_degrees.T, order="C")
+    return _Views(front, _columns(front, probes.points, gradient), amplitude, probes, gradient, bend, near or missed)
 
 
 def _columns(front: Wavefronts, probes: Floats, gradient: Floats) -> Floats:
@@ -118,8 +117,8 @@ def _columns(front: Wavefronts, probes: Floats, gradient: Floats) -> Floats:
     terms = front.expansion.delay
     if terms.shape[1]:
         u -= front.sound_speed * np.einsum("et,ipt->pie", terms, gradient[:, :, : terms.shape[1]])
-    columns = [front.direction.T, front.curvature[None], front.loss[None], terms.T, u.reshape(-1, front.count)]
-    return np.concatenate(columns)
+    columns = [front.direction, front.curvature[:, None], front.loss[:, None], terms, u.reshape(-1, front.count).T]
+    return np.concatenate(columns, axis=1)
 
 
 class _Extent(NamedTuple):
@@ -146,17 +145,19 @@ class _Trial:
 
     tile: Tile
     extent: _Extent | None  # None for a path alone
+    ends: tuple[Floats, Floats]  # (column,) smallest and largest of the columns of its paths
 
 
 def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
+    from sonarsynth.signals.gridded.variation_kernels import extremes
+
+    low, high = extremes(views.columns, paths)
     if paths.size == 1:
-        return _Trial(_alone(paths, views.front, aim), None)
-    columns = np.take(views.columns, paths, axis=1)
-    low, high = columns.min(axis=1), columns.max(axis=1)
+        return _Trial(_alone(paths, views.front, aim), None, (low, high))
     over = rest(views.front, paths, aim.changes, 0.1 * aim.tolerance)
     reference = reference_of(views.front, 0.5 * (low + high), over.phase, over.delay_variance)
     probes = views.probes
-    own = _columns(reference, probes.points, views.gradient)[:, 0]
+    own = _columns(reference, probes.points, views.gradient)[0]
     far = np.maximum(high - own, own - low)
     slope = far[-3 * len(probes.points) :].reshape(-1, 3).max(axis=0)
     _, dy, dz = slope.tolist()
@@ -168,7 +169,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     if views.front.modes.shape[1]:
         modes, sizes = main_modes(*pulses(views.front, paths, over, aim.changes))
     farther = views.front.attenuation * float(slope @ np.abs(aim.elements.position).max(axis=0))  # dB
-    degrees = views.amplitude[:, paths].sum(axis=1)
+    degrees = np.take(views.amplitude, paths, axis=1).sum(axis=1)
     shares = tuple((degrees / max(float(degrees.sum()), 1e-300)).tolist())
     extent = _Extent(
         paths=paths.size,
@@ -180,7 +181,8 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
         modes=sizes,
     )
     axes, terms, cost = _cheapest(extent, aim)
-    return _Trial(Tile(paths, reference, axes, terms, (dy, dz, loss + farther), over.which, modes, cost), extent)
+    tile = Tile(paths, reference, axes, terms, (dy, dz, loss + farther), over.which, modes, cost)
+    return _Trial(tile, extent, (low, high))
 
 
 def _drift(front: Wavefronts, aim: TileSettings) -> Floats:
@@ -221,15 +223,13 @@ def _cheapest(extent: _Extent, aim: TileSettings) -> tuple[Axes | None, tuple[Te
     return ((x, y, z), terms, by_nodes * crowded) if by_nodes < own else (None, terms, own * crowded)
 
 
-def _halves(paths: Ints, views: _Views, aim: TileSettings) -> tuple[Ints, Ints] | None:
+def _halves(trial: _Trial, views: _Views, aim: TileSettings) -> tuple[Ints, Ints] | None:
     """Two halves of a tile, cut across its widest extent in phase; None where all paths are alike."""
-    front = views.front
-    size = np.append(views.probes.size + aim.elements.face, 0.5 * front.aperture**2)
-    weight = np.append(2.0 * np.pi * aim.highest / front.sound_speed * size, NEPER * aim.steepest)
-    values = np.take(views.columns[:5], paths, axis=1)
-    low, high = values.min(axis=1), values.max(axis=1)
-    axis = int(np.argmax((high - low) * weight))
-    right = values[axis] > 0.5 * (low[axis] + high[axis])
+    size = np.append(views.probes.size + aim.elements.face, 0.5 * views.front.aperture**2)
+    weight = np.append(2.0 * np.pi * aim.highest / views.front.sound_speed * size, NEPER * aim.steepest)
+    paths, (low, high) = trial.tile.paths, trial.ends
+    axis = int(np.argmax((high - low)[: weight.size] * weight))
+    right = views.columns[paths, axis] > 0.5 * (low[axis] + high[axis])
     if not right.any():
         return None
     return paths[~right], paths[right]
@@ -290,7 +290,7 @@ def _best(trial: _Trial, views: _Views, aim: TileSettings, patient: bool) -> lis
     if trial.extent is None:
         return [tile]
     possible = tile.cost == np.inf or 2.0 * _cheapest(trial.extent.half(), aim)[2] < tile.cost
-    halves = _halves(tile.paths, views, aim) if possible else None
+    halves = _halves(trial, views, aim) if possible else None
     if halves is None:
         return [tile]
     children = [_try(half, views, aim) for half in halves]

@@ -1,6 +1,9 @@
-"""How much the terms of paths over the aperture are, compiled: tiles that are tried look at all of their paths."""
+"""What tiles that are tried look at of all of their paths, compiled: extremes, and how much terms over the aperture
+are."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
@@ -19,3 +22,14 @@ def moduli(terms: Floats, paths: Ints, middle: Floats, own: Floats, beside: Floa
         own[i], beside[i] = total, left
         more = more or left > total
     return more
+
+
+@compiled
+def extremes(columns: Floats, paths: Ints) -> tuple[Floats, Floats]:
+    """The smallest and the largest (column,) of columns (path, column) of some paths."""
+    low, high = columns[paths[0]].copy(), columns[paths[0]].copy()
+    for i in range(1, len(paths)):
+        row = columns[paths[i]]
+        for c in range(len(row)):
+            low[c], high[c] = np.minimum(low[c], row[c]), np.maximum(high[c], row[c])
+    return low, high

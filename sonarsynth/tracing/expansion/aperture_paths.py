@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -160,13 +161,15 @@ class _FacetInterpolant:
 
     middle: Floats  # (xyz) m
     half: Floats  # (xyz) m
-    coefficients: dict[str, Floats]  # (cubic, value): of what varies
+    coefficients: Floats  # (cubic, value): of all that varies
+    columns: dict[str, slice]  # the values of each
     error: float  # s
 
     def at(self, point: Floats) -> dict[str, Floats]:
         """What is known of legs from points (point, xyz), some of the family."""
         cubics = aperture_terms((point - self.middle) / self.half, 1.0)
-        known = {name: row_products(cubics, solved) for name, solved in self.coefficients.items()}
+        values = row_products(cubics, self.coefficients)
+        known = {name: values[:, columns] for name, columns in self.columns.items()}
         if "departure" in known:
             known["departure"] = known["departure"].reshape(len(point), -1, 3)
         return known | {"error": np.full(len(point), self.error)}
@@ -195,4 +198,7 @@ def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: floa
     if not (smooth and wrong["gain"].max() <= SMOOTH_GAIN and wrong["departure"].max() <= SMOOTH_DIRECTION):
         return None
     error = late + turned / rate + 0.5 * rate * softer + float(exact.error.max())
-    return _FacetInterpolant(middle, half, coefficients, error)
+    last = np.cumsum([0, *(solved.shape[1] for solved in coefficients.values())]).tolist()
+    columns = {name: slice(*ends) for name, ends in zip(coefficients, pairwise(last), strict=True)}
+    every = np.concatenate([np.empty((at.shape[1], 0)), *coefficients.values()], axis=1)
+    return _FacetInterpolant(middle, half, every, columns, error)
