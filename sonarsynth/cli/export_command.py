@@ -108,7 +108,8 @@ def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
 
     tree = open_store(store)
     chosen = _built(tree, store, frames)
-    folder = _new(out or named_after(store).with_name(f"{named_after(store).name}.{to}"))
+    into = out or named_after(store).with_name(f"{named_after(store).name}.{to}")
+    there, folder = into.exists(), _new(into)
     write, lost = (
         (coco_files.write_coco, coco_files.LOST) if to == COCO else (sonar_netcdf.write_sonar_netcdf, sonar_netcdf.LOST)
     )
@@ -116,7 +117,9 @@ def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
         with printing.progress("reading") as progress:
             files = write(tree, folder, chosen, progress)
     except BaseException as error:
-        shutil.rmtree(folder, ignore_errors=True)  # it was empty, and a part of an export would be taken for all of it
+        shutil.rmtree(folder, ignore_errors=True)  # a part of an export would be taken for all of it
+        if there:
+            folder.mkdir(exist_ok=True)
         if isinstance(error, ImportError):
             raise BadOption(f"{error}: pip install 'sonarsynth[netcdf]'") from None
         raise

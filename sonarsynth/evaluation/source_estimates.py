@@ -17,7 +17,7 @@ from sonarsynth.products import REASONS
 from sonarsynth.receiver.mirror_images import mirror_image, plane_normal
 from sonarsynth.store.checking.check_rows import Check
 
-NAME, EXPECTED = "snap located", "within 3 predicted errors in 95 %, of a few but for chance"
+NAME, EXPECTED = "snap located", "95 % within 3 predicted errors; of a few, no more missed than by chance"
 COLUMNS = (
     *("emission", "reason", "time", "time_error", "azimuth", "azimuth_error", "elevation", "elevation_error"),
     *("position", "position_covariance"),

@@ -87,9 +87,7 @@ def _frame(tree: xr.DataTree, index: int, relative_to: str, names: list[str]) ->
     position = np.stack([cloud[axis].values[finite] for axis in "xyz"], axis=-1).astype(float)
     normal = _normals(tree, bodies, columns["target"], columns["facet"], columns["emission"], names)
     sonar = Pose(truth["sonar_position"].values, truth["sonar_orientation"].values)
-    clock = next(
-        iter(tree["source_estimates"].dataset["time"].values[index]), np.nan
-    )  # none of a scene without sources
+    clock = next(iter(tree["source_estimates"].dataset["time"].values[index]), np.nan)  # NaN: a scene without sources
     heard, spin = clock + cloud["delay"].values[finite].astype(float), truth["sonar_spin"].values
     if relative_to == "sonar":
         normal = sonar.turn_to_body(turned(normal, spin, -heard))

@@ -41,12 +41,16 @@ class Steering(Method):
         Raises ValueError when no element is live, or when the method cannot take the array.
         """
         grid = direction(sonar.beams.azimuth, sonar.beams.elevation[:, None])
-        u, energy = grid.reshape(-1, 3), np.empty(grid[..., 0].size)
-        for low in range(0, len(u), BEAMS_AT_ONCE):
+        return self.energies_in(snapshots, elements, sonar, grid.reshape(-1, 3)).reshape(grid.shape[:2])
+
+    def energies_in(self, snapshots: Snapshots, elements: Elements, sonar: Sonar, direction: Floats) -> Floats:
+        """Energy (beam,) in Pa2 s of beams in `direction` (beam, xyz). Raises ValueError as `energies`."""
+        energy = np.empty(len(direction))
+        for low in range(0, len(direction), BEAMS_AT_ONCE):
             block = slice(low, low + BEAMS_AT_ONCE)
-            beams = self.steer(snapshots, elements, sonar, u[block])
+            beams = self.steer(snapshots, elements, sonar, direction[block])
             energy[block] = np.sum(np.abs(beams).astype(float) ** 2, axis=1)
-        return np.asarray(snapshots.unit * energy.reshape(grid.shape[:2]))
+        return np.asarray(snapshots.unit * energy)
 
     def steered(
         self, snapshots: Snapshots, elements: Elements, sonar: Sonar

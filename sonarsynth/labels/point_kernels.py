@@ -146,9 +146,9 @@ def _summed(
         sensor = pattern.position[q]
         square = sensor[0] ** 2 + sensor[1] ** 2 + sensor[2] ** 2
         late = _delay(sensor, square, beam, focus * speed) - slowness * _delay(sensor, square, path, curvature * speed)
-        angle, turn = 2.0 * math.pi * frequency[0] * late, 2.0 * math.pi * spacing * late
+        angle, step = 2.0 * math.pi * frequency[0] * late, 2.0 * math.pi * spacing * late
         phasor = complex(math.cos(angle), math.sin(angle)) * pattern.weight[q]
-        turned = complex(math.cos(turn), math.sin(turn))
+        turned = complex(math.cos(step), math.sin(step))
         for k in range(len(frequency)):
             response[k] += phasor
             phasor *= turned

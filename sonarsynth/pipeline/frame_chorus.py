@@ -44,7 +44,9 @@ def frame_chorus(plan: Plan, frame: Frame) -> ChorusArrivals | None:
     start = frame_start(plan, frame)
     window = (start - spare, start + plan.windows.samples / sonar.sampling_frequency + spare)
     heights = image_heights(plan.profile, plan.medium.depth, float(depth(frame.sonar_pose.position)), reach.images)
-    now = (frame.time + window[0], frame.time + window[1])
+    moved = 0.0 if receiver.track is None else float(np.linalg.norm(receiver.track.velocity)) * max(map(abs, window))
+    sooner = moved * float(heights.slowness.max())  # s: snaps are drawn about where the array is now
+    now = (frame.time + window[0] - sooner, frame.time + window[1] + sooner)
     snaps = draw_snaps(chorus, number(frame.seed, "chorus", frame.key), listening(heights, receiver, now, reach.reach))
     return chorus_arrivals(snaps, reach, plan.medium, receiver, frame.time, window)
 

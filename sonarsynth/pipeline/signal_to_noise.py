@@ -21,13 +21,10 @@ from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.pipeline.stored_values import Values, table
 from sonarsynth.pipeline.synthesis import SCATTERERS, Pressure, Recorder, known_elements
 from sonarsynth.planning import Plan
-from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE
+from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE, SNR_BEAMS
 from sonarsynth.products import Arrivals, EnergyImage, Signals, Truth
 from sonarsynth.recipe.scene import Frame
 
-MOST: Final = 1024
-"""Beams of a target that are looked at, spread evenly over all of its beams: of a ball that fills 1453 beams of ROMANIS
-its echoes err by 0.03 dB, and by 1.5 dB of 64, for it glints in few of them."""
 FINE: Final = 256
 """Bins of the band at least, so that little lies between its edges and the next bins."""
 FEW: Final = 16
@@ -107,11 +104,11 @@ def snr_values(
 
 
 def target_beams(truth: Truth, target: int) -> Ints:
-    """Indices (beam,) in the flat grid of at most `MOST` beams that point at a target: the nearest beam for a target
-    between beams, none for one that is not seen."""
+    """Indices (beam,) in the flat grid of at most `SNR_BEAMS` beams that point at a target: the nearest beam for a
+    target between beams, none for one that is not seen."""
     beams = np.flatnonzero(truth.beam_target.ravel() == target)
-    if len(beams) > MOST:
-        return np.asarray(beams[np.linspace(0, len(beams) - 1, MOST).round().astype(int)])
+    if len(beams) > SNR_BEAMS:
+        return np.asarray(beams[np.linspace(0, len(beams) - 1, SNR_BEAMS).round().astype(int)])
     box = truth.pixel_box[target]
     if len(beams) or not np.isfinite(box).all():
         return np.asarray(beams)
@@ -155,8 +152,7 @@ class _BeamEnergies:
         start, stop = self._gate(inside, late)
         heard = part if inside.shape[1] == self.count else self._amid_silence(part, inside, late, start, stop)
         snapshots = snapshots_of(heard, self.sonar, start, stop, lasting=stop - start)
-        steered = self.method.steer(snapshots, self.elements, self.sonar, self.grid[beams])
-        return np.asarray(snapshots.unit * np.sum(np.abs(steered).astype(float) ** 2, axis=1))
+        return self.method.energies_in(snapshots, self.elements, self.sonar, self.grid[beams])
 
     def _amid_silence(self, part: Signals, inside: Pressure, late: int, start: float, stop: float) -> Signals:
         """A part of the sound from start to stop (s), with the silence before and after it; arrays as of `_gate`."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from sonarsynth.description.method import FrameSize
 from sonarsynth.planning.choices import OF_BEAMS
-from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE, noise_rows
+from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE, SNR_BEAMS, noise_rows
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.reverberation_rows import reverberation_rows
@@ -223,7 +223,8 @@ def _signal_to_noise(plan: Plan, size: FrameSize, parts: int) -> Row:
     spectra = size.sensors * gate * plan.scene.sonar.sampling_frequency * SECONDS["transform sensor sample"]
     seconds = (parts + max(targets, 1)) * spectra + (parts + 1) * targets * 30 * size.bins * SECONDS["steer beam bin"]
     seconds += plan.choices.synthesis.cost(size) if targets > 1 else 0.0
-    return (SIGNAL_TO_NOISE, "each part in the beams of each target", "always", "64 beams of a target", seconds, 0)
+    bound = f"{SNR_BEAMS} beams of a target"
+    return (SIGNAL_TO_NOISE, "each part in the beams of each target", "always", bound, seconds, 0)
 
 
 def _sonar_rows(plan: Plan, size: FrameSize) -> list[Row]:

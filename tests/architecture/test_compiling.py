@@ -74,6 +74,18 @@ def test_kernels_that_count_no_references_return_no_arrays() -> None:
     assert [f"{name} -> {what}" for name, what in returned.items() if not numbers.fullmatch(what)] == []
 
 
+def test_kernels_that_count_no_references_call_none_that_do() -> None:
+    """Arrays that those make would never be freed."""
+    calls = [
+        f"{name} calls {called}"
+        for name, kernel in kernels().items()
+        if not kernel.targetoptions["_nrt"]
+        for called in kernel.py_func.__code__.co_names
+        if isinstance(used := kernel.py_func.__globals__.get(called), Dispatcher) and used.targetoptions["_nrt"]
+    ]
+    assert calls == []
+
+
 ROUNDED_FREELY = {"sonarsynth.equations.kernels.lanes", "sonarsynth.equations.kernels.vectors"}
 """Their instructions may be fused or put in another order, as the compiler finds best where they stand."""
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -161,3 +163,25 @@ def test_a_sonar_that_moves_hears_snaps_when_they_reach_it() -> None:
     np.testing.assert_allclose(found.delay, late, rtol=0.0, atol=1e-8)
     towards = frame.sonar_pose.turn_to_world(found.direction)
     np.testing.assert_allclose(towards, away / length[:, None], rtol=0.0, atol=1e-7)
+
+
+def test_a_sonar_that_moves_hears_all_snaps_up_to_the_end_of_a_long_record(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those ahead of it come sooner than they would to where it is at the instant of the frame: of half a second at
+    8 m/s, the last 2 ms lacked those from afar."""
+    sonar = "{kind: course, start: [0, 0, -9], heading: 90 deg, speed: 8 m/s}"
+    heard = "scene.world.chorus={density: 0.5, reach: 60 m, images: 1, distant: false}"
+    long = "scene.processing.echo_window={start: 1 ms, stop: 500 ms}"
+    few = "scene.trajectory.frames=2"
+    made = plan(reading.load(str(REMUS), [*SMALL, few, long, f"scene.trajectory.sonar={sonar}", heard]), ("signals",))
+    frame = made.recipe.frame(0)[1]
+    found = frame_chorus(made, frame)
+    module = import_module("sonarsynth.pipeline.frame_chorus")
+    narrow: Callable[..., ListeningWindow] = module.listening
+
+    def wider(window: ListeningWindow) -> ListeningWindow:
+        return window._replace(start=window.start - 0.01, stop=window.stop + 0.01)
+
+    monkeypatch.setattr(module, "listening", lambda *of: wider(narrow(*of)))
+    every = frame_chorus(made, frame)
+    assert found is not None and every is not None and len(found.delay) > 1000
+    assert sorted(found.delay.tolist()) == sorted(every.delay.tolist())

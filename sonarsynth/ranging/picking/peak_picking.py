@@ -84,8 +84,8 @@ def peak_echoes(
         keep[keep] = _once(window, profiles, axes, b[keep], t[keep], height[keep])
     b, t, top_offset, height, energy = b[keep], t[keep], top_offset[keep], height[keep], energy[keep]
     centre, late = np.empty((len(b), 3)), np.argsort(t, kind="stable")
-    width, least = axes.step * axes.sharpness, NOISE_CLEAR * noise
-    centre[late] = power_centres(power, index, *beams, b[late], t[late], top_offset[late], width, CENTRE_WINDOW, least)
+    width, clear = axes.step * axes.sharpness, NOISE_CLEAR * noise
+    centre[late] = power_centres(power, index, *beams, b[late], t[late], top_offset[late], width, CENTRE_WINDOW, clear)
     snr = height / noise[b]
     error = axes.errors(snr, centre)
     offset = top_offset * axes.step
