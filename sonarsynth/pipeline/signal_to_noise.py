@@ -31,7 +31,7 @@ FEW: Final = 16
 """Of so many hydrophones one is asked first whether sound lasts as long as the window."""
 SILENCE: Final = 1e-32
 """Pa2 s, -200 dB: what stands for nothing at all, so that every ratio is a number."""
-Part = Pressure | None  # None: silence
+Part = Signals | None  # None: silence; else of the record, or of the stretch of it that there is sound in
 
 
 class SoundParts(Recorder):
@@ -40,7 +40,7 @@ class SoundParts(Recorder):
     def __init__(self, plan: Plan) -> None:
         self.names = plan.scene.sound_parts
         self.signals: Signals | None = None  # the last that was told: when samples are
-        self.pressure: dict[str, Part] = {}
+        self.sound: dict[str, Part] = {}
         self.echoes: dict[int, Part] = {}  # of targets, and of scatterers
 
     def __call__(self, part: str, signals: Signals) -> None:
@@ -48,14 +48,19 @@ class SoundParts(Recorder):
         if not self.names:
             return
         if part in self.names:
-            before = None if self.signals is None else self.signals.pressure
-            same = before is not None and before is signals.pressure
-            self.pressure[part] = None if same else signals.pressure if before is None else signals.pressure - before
+            self.sound[part] = _added(self.signals, signals)
         self.signals = signals
 
-    def echo(self, target: int, pressure: Pressure) -> None:
+    def echo(self, target: int, signals: Signals) -> None:
         """As `Recorder.echo`."""
-        self.echoes[target] = pressure
+        self.echoes[target] = signals
+
+
+def _added(before: Signals | None, after: Signals) -> Part:
+    """What a part added."""
+    if before is None:
+        return after
+    return None if before.pressure is after.pressure else replace(after, pressure=after.pressure - before.pressure)
 
 
 def snr_values(
@@ -82,11 +87,11 @@ def snr_values(
         weight = [max(int(np.count_nonzero(truth.beam_target == n)), 1) / len(beams[n]) for n in seen]
         every = np.concatenate([beams[n] for n in seen])
 
-        def heard(pressure: Part) -> Floats:
-            return np.asarray(weight * np.add.reduceat(beamformed.energies(pressure, every), first))
+        def heard(part: Part) -> Floats:
+            return np.asarray(weight * np.add.reduceat(beamformed.energies(part, every), first))
 
         for name in parts.names:
-            energy[name][seen] = heard(parts.pressure[name])
+            energy[name][seen] = heard(parts.sound[name])
         if SCATTERERS in parts.echoes:
             energy["reverberation"][seen] += heard(parts.echoes[SCATTERERS])
         for n, share in zip(seen, weight, strict=True):
@@ -132,24 +137,40 @@ class _BeamEnergies:
         method = plan.choices.beamforming
         self.method = FocusedDelayAndSum(focus=method.focus, shading=getattr(method, "shading", "uniform"))
         beams = self.sonar.beams
+        record, rate = signals.pressure.shape[1], signals.sampling_frequency
+        self.first, self.count = gate_samples(*window, signals.start, rate, record)  # of the window in the record
         self.grid = direction(beams.azimuth, beams.elevation[:, None]).reshape(-1, 3)
 
-    def energies(self, pressure: Part, beams: Ints) -> Floats:
-        """Energy (beam,) in Pa2 s of pressure in beams (beam,)."""
-        if pressure is None:
+    def energies(self, part: Part, beams: Ints) -> Floats:
+        """Energy (beam,) in Pa2 s of a part of the sound in beams (beam,)."""
+        if part is None:
             return np.zeros(len(beams))
-        heard, (start, stop) = replace(self.signals, pressure=pressure), self._gate(pressure)
+        late = round((part.start - self.signals.start) * part.sampling_frequency) - self.first
+        inside, late = part.pressure[:, max(-late, 0) : max(self.count - late, 0)], max(late, 0)
+        if not inside.shape[1]:
+            return np.zeros(len(beams))
+        start, stop = self._gate(inside, late)
+        heard = part if inside.shape[1] == self.count else self._amid_silence(part, inside, late, start, stop)
         snapshots = snapshots_of(heard, self.sonar, start, stop, lasting=stop - start)
         return self.method.energies_in(snapshots, self.elements, self.sonar, self.grid[beams])
 
-    def _gate(self, pressure: Pressure) -> tuple[float, float]:
-        """Start and stop (s) of the part of the window that holds the energy of pressure (sensor, sample), widened by
-        the largest steering delay. An echo is short: to transform the whole window takes three times as long."""
+    def _amid_silence(self, part: Signals, inside: Pressure, late: int, start: float, stop: float) -> Signals:
+        """A part of the sound from start to stop (s), with the silence before and after it; arrays as of `_gate`."""
+        rate = part.sampling_frequency
+        first, count = gate_samples(start, stop, self.signals.start, rate, self.signals.pressure.shape[1])
+        pressure, before = np.zeros((len(inside), count), np.float32), late - (first - self.first)
+        heard = inside[:, max(-before, 0) : max(count - before, 0)]
+        pressure[:, max(before, 0) :][:, : heard.shape[1]] = heard
+        return replace(part, pressure=pressure, start=self.signals.start + first / rate)
+
+    def _gate(self, inside: Pressure, late: int) -> tuple[float, float]:
+        """Start and stop (s) of the part of the window that holds the energy of pressure (sensor, sample), which begins
+        at its sample `late`, widened by the largest steering delay. An echo is short: to transform the whole window
+        takes three times as long."""
         (start, stop), rate, band = self.window, self.signals.sampling_frequency, self.sonar.band
-        first, count = gate_samples(start, stop, self.signals.start, rate, pressure.shape[1])
         for step in (FEW, 1):  # what lasts as long as the window does so at any hydrophone
-            inside = pressure[::step, first : first + count]
-            begins, ends = (n / rate for n in sounding(np.einsum("ij,ij->j", inside, inside).astype(float)))
+            power = np.einsum("ij,ij->j", inside[::step], inside[::step]).astype(float)
+            begins, ends = ((late + n) / rate for n in sounding(power))
             apart = GATE_TAPER + self.elements.aperture / self.sonar.assumed_sound_speed
             apart = max(apart, 0.5 * (FINE / (band.high - band.low) - ends + begins))
             gate = max(start, start + begins - apart), min(stop, start + ends + apart)

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import NO_TARGET, Floats, depth
+from sonarsynth.conventions import NO_TARGET, Floats, Ints, depth
 from sonarsynth.geometry.motion import pose, velocity
 from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.planning import Plan, arrivals_of, behind_baffle, context_of, frame_start
@@ -42,9 +42,9 @@ class Recorder:
     def __call__(self, part: str, signals: Signals) -> None:
         """signals: all parts so far, of which the one with this name was added last."""
 
-    def echo(self, target: int, pressure: Pressure) -> None:
-        """pressure: the echoes of one target, of `SCATTERERS`, or of all else (`NO_TARGET`). In a scene that has
-        nothing but echoes, `NO_TARGET` is all of them."""
+    def echo(self, target: int, signals: Signals) -> None:
+        """signals: the echoes of one target, of `SCATTERERS`, or of all else (`NO_TARGET`), from where they begin in
+        the record to where they end. In a scene that has nothing but echoes, `NO_TARGET` is all of them."""
 
 
 NO_RECORDER: Final = Recorder()
@@ -58,48 +58,61 @@ def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals, recorder: Record
     echoes of each target are made apart, which its signal to noise needs, and added. Raises ValueError for anything
     outside the water.
     """
-    sensors = true_elements(plan, frame)
+    sensors, start, rate = true_elements(plan, frame), frame_start(plan, frame), plan.scene.sonar.sampling_frequency
     if plan.choices.subarrays == 1:
         heard, outside = _by_target(plan, frame, arrivals, sensors)
     else:
-        heard, outside = dict[int, Pressure](), 0
+        heard, outside = dict[int, Signals](), 0
         for part in subarrays(sensors, plan.choices.subarrays):
             of_part, lost = subarray_signals(plan, frame, part)
-            for target, pressure in of_part.items():
-                silence = np.zeros((sensors.count, plan.windows.samples), np.float32)
-                heard.setdefault(target, silence)[part.sensor] = pressure
+            for target, signals in of_part.items():
+                if target not in heard:
+                    heard[target] = Signals(_silence(plan, sensors), start, rate, 0.0, 0, 0)
+                _add(heard[target], signals, part.sensor)
             outside = max(outside, lost)
-    for target, pressure in heard.items():
-        recorder.echo(target, pressure)
-    first, *others = heard.values()
-    total = first.copy() if others else first
-    for pressure in others:
-        total += pressure
-    return Signals(total, frame_start(plan, frame), plan.scene.sonar.sampling_frequency, 0.0, 0, outside)
+    for target, signals in heard.items():
+        recorder.echo(target, signals)
+    if not plan.scene.sound_parts:
+        return replace(heard[NO_TARGET], outside=outside)
+    total = Signals(_silence(plan, sensors), start, rate, 0.0, 0, outside)
+    for signals in heard.values():
+        _add(total, signals)
+    return total
 
 
-def _by_target(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> tuple[dict[int, Pressure], int]:
-    """Pressure by target, numbered as in `Recorder.echo` (one number in a scene that has nothing but echoes), and how
-    many arrivals the window cuts."""
+def _silence(plan: Plan, sensors: Elements) -> Pressure:
+    return np.zeros((sensors.count, plan.windows.samples), np.float32)
+
+
+def _add(total: Signals, signals: Signals, sensor: Ints | slice = slice(None)) -> None:
+    """Add signals of some sensors, which may be of a part of the window alone, to the pressure of a total."""
+    first = round((signals.start - total.start) * total.sampling_frequency)
+    total.pressure[sensor, first : first + signals.pressure.shape[1]] += signals.pressure
+
+
+def _by_target(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> tuple[dict[int, Signals], int]:
+    """Signals by target, numbered as in `Recorder.echo` (one number in a scene that has nothing but echoes, else each
+    of the stretch of the window that it sounds in), and how many arrivals the window cuts."""
     if not plan.scene.sound_parts:
         signals = array_signals(plan, frame, arrivals, sensors)
-        return {NO_TARGET: signals.pressure}, signals.outside
+        return {NO_TARGET: signals}, signals.outside
     owner = np.where(arrivals.kind == Kind.REVERBERATION, SCATTERERS, arrivals.target)
     heard = {
-        number: array_signals(plan, frame, arrivals.select(np.flatnonzero(owner == number)), sensors)
+        number: array_signals(plan, frame, arrivals.select(np.flatnonzero(owner == number)), sensors, whole=False)
         for number in np.union1d(owner, NO_TARGET).tolist()
     }
-    return {n: signals.pressure for n, signals in heard.items()}, sum(signals.outside for signals in heard.values())
+    return heard, sum(signals.outside for signals in heard.values())
 
 
-def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> tuple[dict[int, Pressure], int]:
+def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> tuple[dict[int, Signals], int]:
     """As `_by_target`, of one part of the array and of paths that are traced to it."""
     return _by_target(plan, frame, arrivals_of(plan, frame, part), part.elements)
 
 
-def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> Signals:
-    """Pressure at hydrophones, of arrivals that are expanded over all of them; the baffle weakens sound from behind."""
-    reception = reception_of(plan, frame)._replace(elements=sensors)
+def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements, *, whole: bool = True) -> Signals:
+    """Pressure at hydrophones, of arrivals that are expanded over all of them; the baffle weakens sound from behind.
+    whole: as of `Reception`."""
+    reception = reception_of(plan, frame)._replace(elements=sensors, whole=whole)
     return plan.choices.synthesis.signals(behind_baffle(arrivals, plan.scene.sonar), frame.moment.snaps, reception)
 
 

@@ -80,7 +80,7 @@ class EchoFilter:
         sine = u * (self.received.elements.face / sonar.assumed_sound_speed)
         spectra = np.empty((len(u), len(self.matched)), np.complex64)
         power = np.empty((len(u), self.count), np.float32)
-        padded = np.zeros((TRANSFORMED_AT_ONCE, self.length), np.complex64)
+        room = np.empty((TRANSFORMED_AT_ONCE, self.length), np.complex64)
         for first in range(0, len(u), BEAMS_AT_ONCE):
             block = slice(first, first + BEAMS_AT_ONCE)
             steered, bins = self.received.beams.spectra(u[block]), (window.frequency[0], window.spacing)
@@ -88,8 +88,9 @@ class EchoFilter:
             ranging_kernels.match(steered, across, up, *bins, self.share, self.matched, spectra[block])
             for few in range(first, min(first + BEAMS_AT_ONCE, len(u)), TRANSFORMED_AT_ONCE):
                 some = spectra[few : few + TRANSFORMED_AT_ONCE]
-                padded[: len(some), : some.shape[1]] = some
-                waves = ifft(padded[: len(some)], axis=1)
+                padded = room[: len(some)]
+                padded[:, : some.shape[1]], padded[:, some.shape[1] :] = some, 0.0
+                waves = ifft(padded, axis=1, overwrite_x=True)  # in the cache
                 ranging_kernels.powers(waves, HALFWAY, power[few : few + len(some)])
         return spectra, power
 

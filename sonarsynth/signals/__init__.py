@@ -31,7 +31,8 @@ class SignalSynthesis(Protocol):
     """A method of synthesis."""
 
     def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
-        """Pressure at each hydrophone, without noise and without a converter.
+        """Pressure at each hydrophone, without noise and without a converter, in the window of the reception; where
+        that is not asked for whole, a stretch of it that holds all of the sound will do.
 
         Absorption at the band centre is inside the amplitudes already. Zero paths are silence. Raises ValueError for
         arrivals that are not finite, have no amplitude or a negative blur, are stretched by a tenth or more, or come

@@ -3,6 +3,7 @@ domain."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
@@ -12,14 +13,14 @@ from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 from sonarsynth.conventions import Ints, Number
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize
-from sonarsynth.products import Arrivals
+from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import stop_frequency
-from sonarsynth.signals.array_paths import array_paths
+from sonarsynth.signals.array_paths import ArrayPaths, array_paths, reach
 from sonarsynth.signals.direct_sum import UnroundedSynthesis, attenuation
 from sonarsynth.signals.gridded.bins import bins_of
 from sonarsynth.signals.gridded.deposit import add_segment
 from sonarsynth.signals.pulse_variation import from_the_sharpest
-from sonarsynth.signals.segments import Reception, layout
+from sonarsynth.signals.segments import GUARD, Layout, Reception, layout
 from sonarsynth.state import Emission
 
 ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
@@ -59,6 +60,15 @@ def _neighbours_apart(paths: Ints) -> Ints:
     """The paths in an order that puts neighbours, which arrive at nearly one time, apart: a sum that was just written
     cannot be read at once, and deposits take a third more."""
     return paths[np.argsort(np.arange(paths.size) % max(-(-paths.size // 8), 1), kind="stable")]
+
+
+def _sounding(plan: Layout, front: ArrayPaths, sampling_frequency: float, samples: int) -> tuple[int, int]:
+    """First sample of a window, and the one after the last, between which its stretches are at all hydrophones."""
+    apart = int(np.ceil(reach(front).max(initial=0.0) * sampling_frequency)) + 2 * GUARD
+    low = min((span.first for span in plan.stretches), default=0) - apart
+    high = max((span.first + span.samples for span in plan.stretches), default=0) + apart
+    low = min(max(low, 0), samples)
+    return low, min(max(high, low), samples)
 
 
 @description
@@ -130,15 +140,32 @@ class GriddedSynthesis(UnroundedSynthesis):
         self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
     ) -> tuple[npt.NDArray[Any], int]:
         """As `UnroundedSynthesis.pressure`: silence, and stretches of it that hold whole pulses."""
-        elements, sonar, absorption, start, samples = reception
+        pressure, _, outside = self._heard(arrivals, snaps, reception._replace(whole=True))
+        return pressure, outside
+
+    def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
+        """As `SignalSynthesis.signals`."""
+        pressure, first, outside = self._heard(arrivals, snaps, reception)
+        rate = reception.sonar.sampling_frequency
+        start = reception.start + first / rate
+        return Signals(pressure.astype(np.float32, copy=False), start, rate, 0.0, 0, outside)
+
+    def _heard(
+        self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
+    ) -> tuple[npt.NDArray[Any], int, int]:
+        """Pressure (sensor, sample), the sample of the window where it begins, and the number of arrivals that the
+        window cuts."""
+        elements, sonar, absorption, start, samples, whole = reception
         fs = sonar.sampling_frequency
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
         front = from_the_sharpest(front, stop_frequency(sonar.antialias))
         plan = layout(arrivals, front, snaps, reception, tolerance=0.01 * self.tolerance)
-        out = np.zeros((elements.count, samples), self.precision)
+        low, high = (0, samples) if whole else _sounding(plan, front, fs, samples)
+        out = np.zeros((elements.count, high - low), self.precision)
         method = (self.width, self.oversampling, self.precision, self.tolerance)
         for span in plan.stretches:
             paths, bins = bins_of(span, front.select(_neighbours_apart(span.paths)), sonar, absorption, self.tolerance)
             origin, stop = start + span.first / fs, stop_frequency(sonar.antialias)
-            add_segment(out, span, paths, elements, bins, origin=origin, stop=stop, method=method)
-        return out, plan.outside
+            here = replace(span, first=span.first - low)
+            add_segment(out, here, paths, elements, bins, origin=origin, stop=stop, method=method)
+        return out, low, plan.outside

@@ -35,6 +35,7 @@ class Reception(NamedTuple):
     absorption: Callable[[Floats], Floats] | None  # dB/m at frequencies (Hz); none: no absorption
     start: float  # s: the first sample, by the clock of the arrivals
     samples: int
+    whole: bool = True  # False: signals may begin later and end sooner, where there is silence in all that is left out
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ def layout(
     coherent echoes apart, whose pulses are differentiated. tolerance: of its peak, what a pulse may still be at the
     ends of a segment.
     """
-    elements, sonar, _, start, samples = reception
+    elements, sonar, _, start, samples, _ = reception
     if samples < 1:
         raise ValueError("a window needs at least one sample")
     fs = sonar.sampling_frequency

@@ -321,6 +321,22 @@ def test_bodies_heard_one_after_the_other_are_each_where_they_belong() -> None:
     assert error(got, exact) < 1e-4
 
 
+@pytest.mark.parametrize(
+    ("sooner", "sounds"), [(0.03, False), (0.0199, True), (0.01, True), (0.0, True), (-0.01, False)]
+)
+def test_what_a_stretch_leaves_out_is_silence(sooner: float, sounds: bool) -> None:
+    """Echoes in the middle of the window, cut by either end of it, and outside."""
+    of, rate = target_at(20.0, 60, 3, direct=False), SONAR.sampling_frequency
+    window = Reception(FACES, SONAR, absorption, float(of.delay.mean()) - sooner, round(0.02 * rate))
+    whole, stretch = (GriddedSynthesis().signals(of, SNAPS, window._replace(whole=w)) for w in (True, False))
+    first, heard = round((stretch.start - whole.start) * rate), stretch.pressure
+    assert heard.shape[1] < 0.5 * window.samples and stretch.outside == whole.outside
+    silence = np.zeros_like(whole.pressure)
+    silence[:, first : first + heard.shape[1]] = heard
+    np.testing.assert_array_equal(silence, whole.pressure)
+    assert heard.any() == sounds
+
+
 @pytest.mark.parametrize("size", [0.1, 1.0, 10.0])
 def test_lobes_that_vary_over_the_aperture(size: float) -> None:
     """Amplitudes that are cubics of any size, each path its own: from broad lobes to those that miss half the array."""
@@ -425,7 +441,7 @@ def run(method: DirectSum | GriddedSynthesis, array: Elements) -> Run:
 def test_doubled_amplitude_doubles_the_pressure_and_sums_add(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 60)
     of = target_at(15.0, 24, 9, direct=False)
-    start, samples = hearing(of, SONAR, array)[3:]
+    start, samples = hearing(of, SONAR, array)[3:5]
     go = run(method, array)
     whole = go(of, start, samples)
     half = go(of.select(np.arange(24) < 12), start, samples) + go(of.select(np.arange(24) >= 12), start, samples)
@@ -438,7 +454,7 @@ def test_doubled_amplitude_doubles_the_pressure_and_sums_add(method: DirectSum |
 def test_a_delay_of_part_of_a_sample_is_a_ramp_of_phase(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 60)
     of = target_at(15.0, 24, 10, direct=False)
-    start, samples = hearing(of, SONAR, array)[3:]
+    start, samples = hearing(of, SONAR, array)[3:5]
     shift = 3.37 / SONAR.sampling_frequency
     later = arrivals(of.delay + shift, of.direction, of.radius, of.amplitude, loss=of.absorption)
     go = run(method, array)
@@ -470,7 +486,7 @@ def test_windows_that_adjoin_hold_what_one_window_holds(method: DirectSum | Grid
 def test_what_falls_outside_is_counted_and_never_wrapped(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 100)
     of = target_at(15.0, 8, 12, direct=False)
-    start, samples = hearing(of, SONAR, array)[3:]
+    start, samples = hearing(of, SONAR, array)[3:5]
     for far in (-1.0, -(samples + 300) / SONAR.sampling_frequency, samples / SONAR.sampling_frequency, 5.0):
         got = method.signals(of, SNAPS, Reception(array, SONAR, absorption, start + far, samples))
         assert got.outside == 8
@@ -497,7 +513,7 @@ def test_mirrored_paths_give_mirrored_signals(method: DirectSum | GriddedSynthes
     array = elements(PositionTable(positions=positions, face=0.05))
     of = target_at(15.0, 16, 14, direct=False)
     other = arrivals(of.delay, of.direction * [1, -1, 1], of.radius, of.amplitude, loss=of.absorption)
-    start, samples = hearing(of, SONAR, array)[3:]
+    start, samples = hearing(of, SONAR, array)[3:5]
     go = run(method, array)
     assert error(go(other, start, samples)[[1, 0, 3, 2]], go(of, start, samples)) < 1e-4
 

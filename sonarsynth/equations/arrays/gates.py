@@ -57,6 +57,47 @@ def frequency_spacing(count: int, sampling_frequency: float) -> float:
     return float(sampling_frequency / fast_length(count))
 
 
+def band_bins(count: int, sampling_frequency: float, band: tuple[float, float]) -> tuple[int, int]:
+    """First bin in a band (low, high) in Hz, and the one after the last, of the FFT of a gate of `count` samples.
+
+    Raises ValueError when no frequency in band is below half the sampling frequency.
+    """
+    length = fast_length(count)
+    low, high = (edge * length / sampling_frequency for edge in band)
+    # Nothing is known of the phase at half the sampling frequency, so that bin never counts.
+    lowest, highest = int(np.ceil(low - 1e-9)), min(int(np.floor(high + 1e-9)), (length - 1) // 2)
+    if highest < lowest:
+        raise ValueError(
+            f"a window of {count} samples resolves no frequency in {band[0]:g} to {band[1]:g} Hz: take a longer one"
+        )
+    return lowest, highest + 1
+
+
+def gated_energy(
+    pressure: npt.NDArray[np.floating],
+    sampling_frequency: float,
+    first_sample: int,
+    count: int,
+    band: tuple[float, float],
+) -> float:
+    """Sum of the squares of all `gated_spectra`, of sound that is short: by its autocorrelation, which has their powers
+    at all frequencies."""
+    from scipy.fft import irfft, rfft
+
+    gate = pressure[:, first_sample : first_sample + count]
+    sounds = np.flatnonzero(np.einsum("ij,ij->j", gate, gate))
+    if not len(sounds):
+        return 0.0
+    short, length = slice(sounds[0], sounds[-1] + 1), fast_length(count)
+    cut = gate[:, short] * gate_taper(count, sampling_frequency)[short].astype(float)
+    lags = np.arange(1 - cut.shape[1], cut.shape[1])
+    wide = fast_length(len(lags))
+    correlation = irfft(np.sum(np.abs(rfft(cut, wide, axis=1)) ** 2, axis=0), wide)
+    circle = np.zeros(length)
+    np.add.at(circle, lags % length, correlation[lags])
+    return float(np.sum(rfft(circle).real[slice(*band_bins(count, sampling_frequency, band))]))
+
+
 def gated_spectra(
     pressure: npt.NDArray[np.floating],
     sampling_frequency: float,
@@ -75,23 +116,16 @@ def gated_spectra(
 
     from sonarsynth.equations.kernels.tapers import taper_rows
 
-    length = fast_length(count)
-    low, high = (edge * length / sampling_frequency for edge in band)
-    # Nothing is known of the phase at half the sampling frequency, so that bin never counts.
-    lowest, highest = int(np.ceil(low - 1e-9)), min(int(np.floor(high + 1e-9)), (length - 1) // 2)
-    if highest < lowest:
-        raise ValueError(
-            f"a window of {count} samples resolves no frequency in {band[0]:g} to {band[1]:g} Hz: take a longer one"
-        )
+    length, (first, stop) = fast_length(count), band_bins(count, sampling_frequency, band)
     taper = gate_taper(count, sampling_frequency)
     power = np.zeros(count, pressure.dtype)
-    spectra = np.empty((len(pressure), highest + 1 - lowest), np.complex64)
+    spectra = np.empty((len(pressure), stop - first), np.complex64)
     cut = np.zeros((SENSORS_AT_ONCE, length), np.result_type(pressure, taper))
     for low in range(0, len(pressure), SENSORS_AT_ONCE):
         some = pressure[low : low + SENSORS_AT_ONCE]
         taper_rows(some, first_sample, taper, cut, power)
-        spectra[low : low + len(some)] = rfft(cut[: len(some)], axis=1)[:, lowest : highest + 1]
-    return np.arange(lowest, highest + 1, dtype=float) * (sampling_frequency / length), spectra, power
+        spectra[low : low + len(some)] = rfft(cut[: len(some)], axis=1)[:, first:stop]
+    return np.arange(first, stop, dtype=float) * (sampling_frequency / length), spectra, power
 
 
 def short_spectra(rows: Floats, first: int, stop: int) -> npt.NDArray[np.complex128]:

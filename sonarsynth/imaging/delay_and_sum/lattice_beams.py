@@ -47,7 +47,7 @@ class LatticeBeams:
         half = 0.5 * elements.pitch / c
         across = directions[order, 1]
         rise = np.broadcast_to(half * levels[:, None, None], (len(levels), 2, places.shape[1]))
-        beams = np.empty((len(order), bins), np.complex64)
+        beams = np.empty((len(order), len(self.frequencies)), np.complex64)
         lattice_beams(
             folded,
             bins,
@@ -60,11 +60,10 @@ class LatticeBeams:
             half * across,
             across * (-middle / c),
             *first_and_spacing(self.frequencies),
+            order,
             beams.view(np.float32).ravel(),
         )
-        sums = np.empty((len(order), len(self.frequencies)), np.complex64)
-        sums[order] = beams[:, : len(self.frequencies)]
-        return sums
+        return beams
 
     @cached_property
     def _focused(self) -> tuple[npt.NDArray[np.float32], int]:

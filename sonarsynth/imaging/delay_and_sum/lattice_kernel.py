@@ -185,19 +185,19 @@ def focused_halves(
 @compiled
 def lattice_beams(
     folded: Any, bins: int, rows: int, heights: Any, odd_rows: bool, odd_columns: bool, rise: Any, bounds: Any,
-    across: Any, middle: Any, frequency: float, spacing: float, spectra: Any,
+    across: Any, middle: Any, frequency: float, spacing: float, row: Any, spectra: Any,
 ) -> None:  # fmt: skip
-    """Spectra of beams of an array in two halves, `focused_halves`: (beam, bin) float32 pairs.
+    """Spectra of beams of an array in two halves, `focused_halves`: (row, bin) float32 pairs, of no more bins.
 
     As `lattice_energies`, with heights (column,) of the rows of a half; rise (level, side of y, column) of beams
     across[bounds[level] : bounds[level + 1]]; middle (beam,): what a wave is later in the middle of the half to port,
-    and sooner in the other.
+    and sooner in the other; row (beam,): where the spectrum of a beam is put.
     """
     columns, levels = len(heights), len(rise)
     size, lines = 2 * columns * rows * TERM, np.empty(2 * GROUPS * columns * TERM, np.float32)
-    beams = np.empty(np.max(np.diff(bounds)) * BEAM, np.float32)
+    beams, last = np.empty(np.max(np.diff(bounds)) * BEAM, np.float32), np.empty(2 * LANES, np.float32)
     up, port, later = group_turns(rise, spacing), group_turns(across, spacing), group_turns(middle, spacing)
-    rise = rise.ravel()
+    rise, count = rise.ravel(), spectra.size // (2 * len(row))
     for low in range(0, bins, CHUNK):
         groups, first = min(GROUPS, (bins - low) // LANES), frequency + low * spacing
         chunk = folded[low // LANES * size :]
@@ -218,4 +218,9 @@ def lattice_beams(
                             load(beams, i) + load(beams, i + 2 * LANES),
                             load(beams, i + LANES) + load(beams, i + 3 * LANES),
                         )
-                        store_complex(spectra, 2 * (beam * bins + low + group * LANES), x, y)
+                        into, left = 2 * (row[beam] * count + low + group * LANES), count - low - group * LANES
+                        if left >= LANES:
+                            store_complex(spectra, into, x, y)
+                        else:
+                            store_complex(last, 0, x, y)
+                            spectra[into : into + 2 * left] = last[: 2 * left]
