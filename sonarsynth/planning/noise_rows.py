@@ -23,8 +23,8 @@ ELECTRONICS, SENSORS, DISTANT_CHORUS = "electronics", "sensors", "distant chorus
 """Stages beside the parts of the noise."""
 SIGNAL_TO_NOISE = "signal to noise"
 SNR_BEAMS = 1024
-"""Beams of a target in which that is looked for, spread evenly over all of its beams: of a ball that fills 1453 beams
-of ROMANIS its echoes err by 0.03 dB, and by 1.5 dB of 64, for it glints in few of them."""
+"""Most beams of a target that its signal to noise is taken in, spread evenly over all of its beams. The energy of a
+ball that fills 1453 beams of ROMANIS errs by 0.03 dB; with 64 beams by 1.5 dB, for it glints in few."""
 PATH_SECONDS = 150e-9
 """Of one core for a sample of one hydrophone of a source of noise."""
 PLAYED_SECONDS = 70e-9

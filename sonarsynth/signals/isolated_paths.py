@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from sonarsynth.signals import SignalSynthesis
 
 FINER = 4.0
-"""Spectra are so much finer that energy in slices is told: where a rough sea leaves only the lower end of a sweep, the
-level of a path erred by 0.11 dB, and 0.02 dB now."""
+"""By how much spectra are finer of which energy in slices is taken: where a rough sea leaves only the lower end of a
+sweep, 60 dB down, the level of a path errs by 0.02 dB, and by 0.11 dB at 1."""
 STRETCH_TOLERANCE = 1e-6
 """Error of the spectra of pulses that Doppler stretches, relative to their size."""
 

@@ -80,8 +80,11 @@ def gated_energy(
     count: int,
     band: tuple[float, float],
 ) -> float:
-    """Sum of the squares of all `gated_spectra`, of sound that is short: by its autocorrelation, which has their powers
-    at all frequencies."""
+    """Sum of |spectrum|^2 in Pa2 over all sensors and bins of `gated_spectra`, whose arguments it has.
+
+    Fast where few samples of the gate are not 0: powers at all frequencies are the transform of the autocorrelation,
+    summed over sensors (Wiener and Khinchin). Raises ValueError as `band_bins`.
+    """
     from scipy.fft import irfft, rfft
 
     gate = pressure[:, first_sample : first_sample + count]
