@@ -11,6 +11,7 @@ from sonarsynth.conventions import Bools, Floats, Int32s, Ints
 
 EDGE = 1e-14  # of the square of the body's size: rays this close to an edge hit either facet, never neither
 SPHERE = 1.0 + 1e-5  # square of the radius of a sphere a little over the unit sphere
+CLEAR = 1e-6  # by how much the sine of a ray's elevation is more than its facet's horizon: more than rounding
 
 
 @compiled
@@ -139,14 +140,44 @@ def to_sphere(o: Floats, d: Floats) -> float:
     return float(length - enter)
 
 
+@compiled(borrows=True)
+def over_horizon(direction: Floats, facet: int, normal: Floats, horizon: Floats) -> bool:
+    """Whether a ray, of a direction of any length, leaves a facet above all of its mesh; horizon (facet,):
+    `horizons`."""
+    square = along = 0.0
+    for x in range(3):
+        square, along = square + direction[x] ** 2, along + direction[x] * normal[facet, x]
+    return along > (horizon[facet] + CLEAR) * math.sqrt(square)
+
+
+@compiled
+def off_facets(
+    facet: Ints, direction: Floats, distance: Floats, centroid: Floats, normal: Floats, horizon: Floats,
+    offset: float, centre: Floats, size: float, origin: Floats, far: Floats, ray: Ints,
+) -> int:  # fmt: skip
+    """Write those of rays (ray,) from the middles of facets, moved off them by `offset` (m), in directions of length
+    one, up to distances (m), that may meet the mesh again: where they begin, directions and lengths, in its unit; and
+    which they are. Returns how many. centre (xyz) and size (m): of its sphere."""
+    count = 0
+    for i in range(len(facet)):
+        if over_horizon(direction[i], facet[i], normal, horizon):
+            continue
+        for x in range(3):
+            origin[count, x] = (centroid[facet[i], x] + offset * normal[facet[i], x] - centre[x]) / size
+            direction[count, x] = direction[i, x]
+        far[count], ray[count] = distance[i] / size, i
+        count += 1
+    return count
+
+
 @compiled
 def into_mesh(
-    start: Floats, end: Floats, skip: Bools, rotation: Floats, position: Floats, centre: Floats, size: float,
-    origin: Floats, heading: Floats, far: Floats, segment: Ints,
+    start: Floats, end: Floats, skip: Bools, facet: Ints, normal: Floats, horizon: Floats, rotation: Floats,
+    position: Floats, centre: Floats, size: float, origin: Floats, heading: Floats, far: Floats, segment: Ints,
 ) -> int:  # fmt: skip
     """Write the parts of segments (segment, xyz), world, that are within a sphere about a mesh, in its frame and unit:
     where they begin, unit directions, and lengths; and which segment each is of. Returns how many: others miss it, or
-    are to be skipped.
+    are to be skipped, or leave a facet (segment,) of it above its horizon; -1: no facet of it.
 
     rotation (xyz, xyz), position (xyz) m: the pose of the mesh; centre (xyz) and size (m): of its sphere.
     """
@@ -160,6 +191,8 @@ def into_mesh(
                 o += rotation[y, x] * (start[i, y] - position[y])
                 d += rotation[y, x] * (end[i, y] - start[i, y])
             origin[count, x], heading[count, x] = (o - centre[x]) / size, d / size
+        if facet[i] >= 0 and over_horizon(heading[count], facet[i], normal, horizon):
+            continue
         far[count], segment[count] = to_sphere(origin[count], heading[count]), i
         count += far[count] > 0.0
     return count

@@ -71,10 +71,17 @@ class CastingMesh:
 
         return facet_tree.tree(self.vertices, self.faces)
 
+    @cached_property
+    def horizon(self) -> Floats:
+        """(facet,) how high the mesh stands over each facet; see `horizons`."""
+        from sonarsynth.casting.horizons import horizons
+
+        return horizons(self.vertices, self.faces, *self.tree)
+
     def times(self, factor: float) -> CastingMesh:
         """That of a copy so many times as large: what is known of the mesh in units of its size serves both."""
         copy = replace(self, centre=self.centre * factor, size=self.size * factor)
-        vars(copy).update(around=self.around, tree=self.tree)
+        vars(copy).update(around=self.around, tree=self.tree, horizon=self.horizon)
         return copy
 
     def cast(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
@@ -199,15 +206,24 @@ def first_hit(mesh: Mesh, origin: Floats, direction: Floats) -> tuple[Ints, Floa
 def met_again(mesh: Mesh, facet: Ints, offset: float, direction: Floats, distance: Floats) -> Bools:
     """Whether rays (ray,) from the middles of facets, moved off them by `offset` (m), in directions (ray, xyz), of
     length one, in the frame of the mesh, meet it again within distances (ray,) m."""
-    ready = casting_mesh(mesh)
-    start = (mesh.centroid[facet] + offset * mesh.normal[facet] - ready.centre) / ready.size
-    return ready.within(start, direction, distance / ready.size, any_hit=True)[0] >= 0
+    from sonarsynth.casting import intersections
+
+    ready, met = casting_mesh(mesh), np.zeros(len(facet), bool)
+    origin, heading, far, ray = np.empty_like(direction), direction.copy(), np.empty(len(facet)), np.empty_like(facet)
+    of_facets = mesh.centroid, mesh.normal, ready.horizon, offset, ready.centre, ready.size
+    count = intersections.off_facets(facet, heading, distance, *of_facets, origin, far, ray)
+    met[ray[:count]] = ready.within(origin[:count], heading[:count], far[:count], any_hit=True)[0] >= 0
+    return met
 
 
-def occluded(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats) -> Bools:
+def occluded(
+    bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, owner: Ints | None = None, facet: Ints | None = None
+) -> Bools:
     """Whether any body stands in each straight segment from start (segment, xyz) to end (segment, xyz) in the world.
 
-    A segment that starts on a facet must be moved off it (`OFFSET`). Raises ValueError for ends that are not finite.
+    A segment that starts on a facet must be moved off it (`OFFSET`); where it does so in the middle, the number of its
+    body, owner (segment,), and of the facet (segment,) spare rays that no part of that body can be in. Raises
+    ValueError for ends that are not finite.
     """
     a, b = np.asarray(start, float), np.asarray(end, float)
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
@@ -217,15 +233,17 @@ def occluded(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats) -> Bo
     hidden = np.zeros(len(a), bool)
     origin, heading = np.empty((2, *a.shape))
     far, segment = np.empty(len(a)), np.empty(len(a), np.int64)
-    for body in bodies:
+    for number, body in enumerate(bodies):
         if not len(body.mesh.faces):
             continue
         ready, pose = casting_mesh(body.mesh), body.pose
+        own = np.full(len(a), NO_TARGET) if facet is None else np.where(owner == number, facet, NO_TARGET)
+        horizon = np.empty(0) if facet is None else ready.horizon
         count = intersections.into_mesh(
-            a, b, hidden, pose.rotation, pose.position, ready.centre, ready.size, origin, heading, far, segment
-        )
+            a, b, hidden, own, body.mesh.normal, horizon, pose.rotation, pose.position, ready.centre, ready.size,
+            origin, heading, far, segment,
+        )  # fmt: skip
         if not count:
             continue
-        facet, _ = ready.within(origin[:count], heading[:count], far[:count], any_hit=True)
-        hidden[segment[:count]] = facet >= 0
+        hidden[segment[:count]] = ready.within(origin[:count], heading[:count], far[:count], any_hit=True)[0] >= 0
     return hidden

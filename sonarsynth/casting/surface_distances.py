@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from sonarsynth.casting.facet_distances import to_box, to_triangle
 from sonarsynth.casting.ray_casting import casting_mesh, first_hit
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Bools, Floats, Int32s
@@ -46,7 +47,7 @@ def _distances(points: Floats, vertices: Floats, faces: Int32s, nodes: Floats, o
     stack, near = np.empty(128, np.int64), np.empty(128)
     for p in range(len(points)):
         best, depth = np.inf, 1
-        stack[0], near[0] = 1, _to_box(points[p], nodes[1])
+        stack[0], near[0] = 1, to_box(points[p], nodes[1])
         while depth:
             depth -= 1
             node = stack[depth]
@@ -56,50 +57,11 @@ def _distances(points: Floats, vertices: Floats, faces: Int32s, nodes: Floats, o
                 for i in range((node - leaves) * count // leaves, (node - leaves + 1) * count // leaves):
                     f = order[i]
                     a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-                    best = min(best, _to_triangle(points[p], a, b, c))
+                    best = min(best, to_triangle(points[p], a, b, c))
                 continue
-            child, sibling = _to_box(points[p], nodes[2 * node]), _to_box(points[p], nodes[2 * node + 1])
+            child, sibling = to_box(points[p], nodes[2 * node]), to_box(points[p], nodes[2 * node + 1])
             far = 2 * node + (1 if sibling > child else 0)
             stack[depth], near[depth] = far, max(child, sibling)
             stack[depth + 1], near[depth + 1] = 4 * node + 1 - far, min(child, sibling)
             depth += 2
         distance[p] = math.sqrt(best)
-
-
-@compiled
-def _to_box(point: Floats, node: Floats) -> float:
-    """Square of the distance to a box; infinite to an empty one."""
-    square = 0.0
-    for x in range(3):
-        if node[3 + x] < 0.0:
-            return np.inf
-        square += max(abs(point[x] - node[x]) - node[3 + x], 0.0) ** 2
-    return square
-
-
-@compiled
-def _to_triangle(p: Floats, a: Floats, b: Floats, c: Floats) -> float:
-    """Square of the distance to a triangle: to its plane where the foot is inside all edges, else to the nearest edge.
-
-    Source: Ericson (2005), Real-Time Collision Detection, section 5.1.5.
-    """
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    square = nx * nx + ny * ny + nz * nz
-    beyond_v = (y * vz - z * vy) * nx + (z * vx - x * vz) * ny + (x * vy - y * vx) * nz
-    beyond_u = (uy * z - uz * y) * nx + (uz * x - ux * z) * ny + (ux * y - uy * x) * nz
-    if square > 0.0 and beyond_v >= 0.0 and beyond_u >= 0.0 and beyond_v + beyond_u <= square:
-        return float((x * nx + y * ny + z * nz) ** 2 / square)
-    return min(_to_edge(p, a, b), _to_edge(p, b, c), _to_edge(p, c, a))
-
-
-@compiled
-def _to_edge(p: Floats, a: Floats, b: Floats) -> float:
-    """Square of the distance to an edge."""
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
-    square = ux * ux + uy * uy + uz * uz
-    t = min(max((x * ux + y * uy + z * uz) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    return float((x - t * ux) ** 2 + (y - t * uy) ** 2 + (z - t * uz) ** 2)

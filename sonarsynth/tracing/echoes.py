@@ -256,7 +256,8 @@ def _ways_to_facets(array: FacetPaths, snap: Emission) -> TransmitPaths:
     out = out.select(picked(out.spreading != 0.0)).merged()
     if array.ways is not None:
         out = out.select(np.isin(out.family, [way for way, _ in array.ways]))
-    out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet))))
+    owner, facet = facets.owner[out.facet], facets.facet[out.facet]
+    out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet), (owner, facet))))
     for number, before in overlapping(bodies):
         owned = np.flatnonzero(facets.owner[out.facet] == number)
         of = out.facet[owned]
@@ -266,12 +267,14 @@ def _ways_to_facets(array: FacetPaths, snap: Emission) -> TransmitPaths:
 
 
 def _hides(
-    array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Emission, out: TransmitPaths, start: Floats
-) -> Bools:
-    """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz)."""
+    array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Emission, out: TransmitPaths, start: Floats,
+    facets: tuple[Ints | None, Ints | None] = (None, None),
+) -> Bools:  # fmt: skip
+    """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz); facets: as
+    of `hidden`."""
     end = alike(snap.position, len(start))  # backwards: bodies are where a ray begins
     ways = start, end, -out.arrival, out.length
-    return hidden(bodies, array.bending, *ways, bounces=out.bounces, turning=out.turning)
+    return hidden(bodies, array.bending, *ways, bounces=out.bounces, turning=out.turning, facets=facets)
 
 
 def _with_reflection_phases(block: _EchoBlock, strongest: float) -> ArrayExpansion:

@@ -99,7 +99,7 @@ class Facets(Columns):
         normal = rows_of(self.normal, row)
         sideless = self.sideless
         normal = np.where(sideless[row, None], departure, normal) if sideless.any() else normal
-        return Starts(rows_of(self.clear, row), normal)
+        return Starts(rows_of(self.clear, row), normal, rows_of(self.owner, row), rows_of(self.facet, row))
 
     def lit(self, row: Ints, arrival: Floats) -> Bools:
         """Whether paths that arrive along (path, xyz) light facets (row of each): from their side, if they have one."""
@@ -118,6 +118,8 @@ class Starts(Columns):
 
     point: Floats  # (leg, xyz) m, world: clear of the facet that it is on
     normal: Floats | None = None  # (leg, xyz) of the side of it that the leg leaves on
+    owner: Ints | None = None  # (leg,) of that facet, in whose middle it starts
+    facet: Ints | None = None  # (leg,)
 
 
 T = TypeVar("T", ReceivePaths, Facets)

@@ -15,7 +15,7 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import ConstantVelocity
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.targets.meshes import mesh_of
-from sonarsynth.targets.shapes import Box
+from sonarsynth.targets.shapes import Box, Remus100
 from sonarsynth.validation.references.frames.line_of_sight import Surface
 from sonarsynth.validation.references.frames.moving_points import Mover
 from sonarsynth.validation.references.frames.sound_paths import Solid, hidden
@@ -193,3 +193,47 @@ def test_a_moving_body_hides_where_it_is_when_the_ray_passes_it() -> None:
         ray = rays(water, start, end, families(0)[0])
         found = hidden([crossing], water, start, end, ray, np.zeros(399), ray.time)
         np.testing.assert_array_equal(found, (beside > front - 0.2) & (beside < back + 0.2))
+
+
+def off_facets(mesh: Mesh, count: int, seed: int) -> tuple[np.ndarray, Floats, Floats]:
+    """Rays from the middles of facets, moved off them, to all sides: facet, origin and direction."""
+    rng = np.random.default_rng(seed)
+    facet, direction = rng.integers(0, len(mesh.faces), count), unit(rng.normal(size=(count, 3)))
+    direction *= np.sign(np.sum(direction * mesh.normal[facet], axis=1))[:, None]
+    return facet, mesh.centroid[facet] + OFFSET * mesh.radius * mesh.normal[facet], direction
+
+
+@pytest.mark.parametrize("mesh", [RING, COPY, mesh_of(Remus100(edge=0.06))])
+def test_rays_above_the_horizon_of_their_facet_meet_nothing(mesh: Mesh) -> None:
+    facet, origin, direction = off_facets(mesh, 300, 7)
+    sine, horizon = np.sum(direction * mesh.normal[facet], axis=1), ray_casting.casting_mesh(mesh).horizon[facet]
+    above = sine > horizon
+    assert (search(mesh, origin[above], direction[above])[0] < 0).all()
+    assert 0.2 < above.mean() < 0.95
+
+
+def test_nothing_stands_over_the_facets_of_convex_bodies() -> None:
+    for mesh in (SPHERE, mesh_of(Box(size=(0.4, 0.3, 0.2)))):
+        assert not ray_casting.casting_mesh(mesh).horizon.any()
+
+
+def test_the_horizon_of_a_floor_is_the_edge_of_the_wall_on_it() -> None:
+    floor = [[-1.0, -1.0, 0.0], [2.0, -1.0, 0.0], [-1.0, 2.0, 0.0]]  # about the origin
+    wall = [[0.6, -0.1, 0.0], [0.6, 0.1, 0.0], [0.6, 0.0, 0.8]]
+    mesh = Mesh(np.array(floor + wall), np.arange(6, dtype=np.int32).reshape(2, 3))
+    assert ray_casting.casting_mesh(mesh).horizon[0] == pytest.approx(1.0)  # 0.8 m up at most, 0.6 m away at least
+    low = Mesh(mesh.vertices * [1.0, 1.0, 0.5], mesh.faces)
+    assert ray_casting.casting_mesh(low).horizon[0] == pytest.approx(0.4 / 0.6)
+
+
+def test_what_hides_a_facet_is_the_same_where_its_number_is_known() -> None:
+    bodies = place(RING, (0.0, 0.0, -10.0)), place(SPHERE, (0.9, 0.4, -9.8))
+    for number, body in enumerate(bodies):
+        facet, origin, direction = off_facets(body.mesh, 2000, 11)
+        start = body.pose.to_world(origin)
+        end = start + 5.0 * body.pose.turn_to_world(direction)
+        hidden = occluded(bodies, start, end)
+        np.testing.assert_array_equal(occluded(bodies, start, end, np.full(2000, number), facet), hidden)
+        again = ray_casting.met_again(body.mesh, facet, OFFSET * body.mesh.radius, direction, np.full(2000, 5.0))
+        np.testing.assert_array_equal(again, occluded((body,), start, end))
+        assert 0.02 < hidden.mean() < 0.6

@@ -27,10 +27,12 @@ def hidden(
     *,
     bounces: Ints | None = None,
     turning: Ints | None = None,
+    facets: tuple[Ints | None, Ints | None] = (None, None),
 ) -> Bools:
     """Whether a body stands in rays (ray, xyz) that leave start in direction departure and end after length (m) at end.
 
-    bounces, turning (ray,): their reflections from surface and bottom, and turning points. Straight rays and
+    bounces, turning (ray,): their reflections from surface and bottom, and turning points; facets: the body (ray,) and
+    the facet of it (ray,) in whose middle rays start, where they do (`ray_casting.occluded`). Straight rays and
     reflections in uniform water are exact; bent rays are followed by chords within `SAGITTA_TOLERANCE`, but only where
     they may pass a body: no ray is farther from the straight line between its ends, unfolded at its reflections, than
     its largest curvature allows.
@@ -39,7 +41,7 @@ def hidden(
     if not bodies or not len(start):
         return blocked
     if medium.profile.uniform and (bounces is None or not bounces.any()):
-        return occluded(bodies, start, end)
+        return occluded(bodies, start, end, *facets)
     times = np.zeros(len(start), np.int64) if bounces is None else bounces
     bow = _curvature(medium.profile) * length**2 / 8.0
     broken = (bow > SAGITTA_TOLERANCE) | (times > 0)

@@ -64,7 +64,8 @@ class Occlusion:
         if self.elements is None or self.elements.count == 1 or not self.bodies:
             end = alike(self.receiver.pose.position, len(starts.point))
             ray = starts.point, end, legs.departure, legs.length
-            hides = hidden(self.bodies, self.bending, *ray, bounces=legs.bounces, turning=legs.turning)
+            of = starts.owner, starts.facet
+            hides = hidden(self.bodies, self.bending, *ray, bounces=legs.bounces, turning=legs.turning, facets=of)
             return legs.select(picked(~hides))
         certain = self._certain(legs, starts)
         in_sight, mixed = certain != CLOSED, certain == UNKNOWN
