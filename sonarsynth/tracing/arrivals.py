@@ -17,6 +17,7 @@ from sonarsynth.tracing.doppler import Meeting, MotionTerms, apply_doppler, rece
 from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.expansion.amplitude_polynomials import fitted
 from sonarsynth.tracing.expansion.aperture_paths import aperture_paths
+from sonarsynth.tracing.expansion.coincident_paths import with_coincident_added
 from sonarsynth.tracing.facet_paths import FacetPaths, facet_paths, facet_paths_at_rest
 from sonarsynth.tracing.meetings import meetings, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
@@ -106,19 +107,22 @@ def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) 
     view = array.view(blocking_bodies(context, snap.position))
     legs = view.visible(legs, Starts(legs.point))
     legs = view.settled(legs, Starts(legs.point))
-    count = len(legs.row)
-    over = aperture_paths(legs, np.zeros(count, int), array.bending, receiver, array.propagation)
-    one, none, none_out = np.ones(count), np.full(count, NO_TARGET), TransmitPaths.none(count)
-    rows = np.arange(count)
-    gain, met = over.gain(rows), MotionTerms.direct(count, snap)
+    over = aperture_paths(legs, np.zeros(len(legs.row), int), array.bending, receiver, array.propagation)
+    rows = np.arange(len(legs.row))
+    gain, fronts = over.gain(rows), over.expansion
     if snap.directivity is not None:  # seen from the source, hydrophones are in other directions than the centre
         gain = gain * (snap.directivity(over.departure(rows)) / snap.directivity(legs.departure)[:, None])
-    amplitude, error = fitted(array, gain, legs.spreading)
+    elif not snap.velocity[2]:  # up and down from the bottom it sounds alike
+        legs, fronts, gain = with_coincident_added(legs, fronts, gain, receiver)
+    count = len(legs.row)
+    one, none, none_out = np.ones(count), np.full(count, NO_TARGET), TransmitPaths.none(count)
+    amplitude, error = fitted(array, gain, legs.spreading * legs.boundary)
+    met = MotionTerms.direct(count, snap)
     legs = legs if meeting is None else received(legs, met, meeting, medium, receiver.centre)
     loud, turned = directed(snap, legs.departure)
     legs = legs.but(spreading=legs.spreading * loud, phase=legs.phase + turned)
     direct = assemble(
-        legs, over.expansion.but(amplitude=amplitude), none_out, index, snap.time, path_loss(array, snap, legs),
+        legs, fronts.but(amplitude=amplitude), none_out, index, snap.time, path_loss(array, snap, legs),
         kind=Kind.DIRECT, target=none, facet=none, scattering=one, pulses=PulseResponse.plain(count),
         amplitude_error=error,
     )  # fmt: skip

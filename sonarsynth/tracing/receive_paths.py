@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
 
 
+COINCIDENCE_TIME = 1e-12
+"""s: rays from or to one point whose travel times differ by less, and that arrive alike, are one."""
+
 SEEN, DOUBTFUL = 1, 2
 """Legs of which it is not known which hydrophones bodies hide them from: by some they are seen, or maybe by none."""
 
@@ -137,6 +140,15 @@ def concatenate(blocks: list[T]) -> T:
 def usable(paths: Paths) -> Bools:
     """Paths with a direction and a finite amplitude: not between coincident ends, nor exactly on a caustic."""
     return np.asarray((paths.flag != COINCIDENT) & np.isfinite(paths.spreading))
+
+
+def apart(row: Ints, travel_time: Floats, arrival: Floats) -> Bools:
+    """Which rays (ray,) do not coincide with the one before, of the same row: one from a point on the bottom does with
+    the one from its image there."""
+    first = np.ones(len(row), bool)
+    same = (np.diff(row) == 0) & (np.abs(np.diff(travel_time)) < COINCIDENCE_TIME)
+    first[1:] = ~(same & (np.abs(np.diff(arrival, axis=0)) < 1e-9).all(axis=1))
+    return first
 
 
 def swerve(

@@ -15,10 +15,7 @@ from sonarsynth.propagation.images import family
 from sonarsynth.propagation.reflections import Reflections, as_sign
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Emission
-from sonarsynth.tracing.receive_paths import ReceivePaths
-
-COINCIDENCE_TIME = 1e-12
-"""s: ways to a facet whose travel times differ by less are one."""
+from sonarsynth.tracing.receive_paths import ReceivePaths, apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +97,7 @@ class TransmitPaths(Columns):
     @property
     def _apart(self) -> Bools:
         """Which ways (way,) do not coincide with the one before."""
-        first = np.ones(len(self.facet), bool)
-        same = (np.diff(self.facet) == 0) & (np.abs(np.diff(self.travel_time)) < COINCIDENCE_TIME)
-        first[1:] = ~(same & (np.abs(np.diff(self.arrival, axis=0)) < 1e-9).all(axis=1))
-        return first
+        return apart(self.facet, self.travel_time, self.arrival)
 
 
 def directed(snap: Emission, departure: Floats) -> tuple[Floats | float, Floats | float]:

@@ -211,6 +211,38 @@ def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
     np.testing.assert_allclose(direct[0], direct[1], rtol=1e-4, atol=1e-7)
 
 
+@pytest.mark.parametrize("profile", [UNIFORM, THERMOCLINE], ids=["uniform", "thermocline"])
+def test_the_sound_of_a_snap_on_the_bed_is_one_path_that_each_sensor_hears_as_both(profile: Profile) -> None:
+    """As it hears those of a snap a hair above the bottom, which come apart; its grazing angle is its own."""
+    fluid = FluidHalfSpace(density_ratio=1.8, speed_ratio=1.15, loss_tangent=0.02)
+    environment = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), bottom=SeaBottom(reflection=fluid))
+    heard, errors = [], []
+    for height in (0.0, 1e-7):
+        place = np.array([6.0, 5.0, height - BOTTOM_DEPTH])
+        found = run((), profile, environment, bounces=1, array=ROMANIS, source=place)
+        found = found.select(found.surface == 0)
+        assert found.bottom.tolist() == ([0, 1] if height else [0])
+        q, over = ROMANIS.position, found.expansion.over
+        far = np.linalg.norm(found.radius[:, None, None] * found.direction[:, None] - q, axis=-1)
+        size = (found.amplitude * found.radius)[:, None] / far * (1.0 + over("amplitude", q))
+        heard.append((size * np.exp(1j * (found.phase[:, None] + over("phase", q)))).sum(axis=0))
+        errors.append(2.0 * np.pi * 85e3 * found.wavefront_error + found.amplitude_error)
+    wrong = np.abs(heard[0] - heard[1]) / np.abs(heard[1])
+    assert wrong.max() < max(2.0 * sum(errors), 1e-5) and sum(errors) < 3e-3
+    if profile is UNIFORM:
+        ray = SONAR.to_world(q) - place
+        both = 1.0 + rayleigh(np.arcsin(ray[:, 2] / np.linalg.norm(ray, axis=1)), 1.8, 1.15, 0.02)
+        np.testing.assert_allclose(heard[0], both / np.linalg.norm(ray, axis=1), rtol=2e-3)
+
+
+def test_a_snap_on_the_surface_and_its_image_there_cancel() -> None:
+    """What is left is the path by the bottom, whose image has a reflection more than are followed."""
+    for down, families in ((0.0, {2}), (1e-6, {0, 1, 2})):
+        found = run(bounces=1, source=np.array([6.0, 5.0, -down]))
+        assert set(((found.surface > 0) + 2 * (found.bottom > 0))[found.direct]) == families
+        assert set(found.lit_by[~found.direct & (found.arrives_by == 0)]) == families
+
+
 def test_a_body_at_the_foot_of_a_ray_that_turns_and_then_meets_the_bed_hides_it_both_ways() -> None:
     """Launched upwards, it turns: the bottom is the first boundary that it meets."""
     falling = Profile(np.array([0.0, 20.0]), np.array([1520.0, 1500.0]))

@@ -139,7 +139,7 @@ _LEVELS = {
     "scattering": "scattering of all facets together: target strength",
     "transmission_loss_in": "spreading loss from target to array",
     "absorption_loss": "absorption along the whole path",
-    "boundary_loss": "loss at surface and bottom",
+    "boundary_loss": "loss at surface and bottom; less than 0 where a snap on the bottom and its image add up",
     "received_level": "level at the array centre re 1 uPa: peak of a snap of the energy in the band",
 }
 LEVELS = group_of(

@@ -1,0 +1,52 @@
+"""Legs that coincide at every sensor, of a snap on the bottom and of its image there, added up: they are heard as
+one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.products import ArrayExpansion
+from sonarsynth.state import Receiver
+from sonarsynth.tracing.expansion.probe_sensors import probes
+from sonarsynth.tracing.receive_paths import ReceivePaths, apart
+
+SILENCE = 1e-12
+"""Legs that cancel to less than this share of what they are apart are none: those of a snap on the surface do."""
+
+
+def with_coincident_added(
+    legs: ReceivePaths, over: ArrayExpansion, gain: Floats, receiver: Receiver
+) -> tuple[ReceivePaths, ArrayExpansion, Floats]:
+    """Legs of one snap that is alike in all directions, sorted by time; with their wavefronts but for amplitudes, and
+    gain (leg, probe) over the aperture. Those that coincide become the one of the fewest reflections, with the modulus
+    and phase of their sum. What comes blurred by a rough bottom stays apart from what does not.
+    """
+    first = apart(legs.row, legs.travel_time, legs.arrival)
+    first[1:] |= np.diff(legs.delay_std) != 0
+    if first.all():
+        return legs, over, gain
+    probe, begin, number = probes(receiver.elements), np.flatnonzero(first), np.cumsum(first) - 1
+    turn = legs.phase[:, None] + over.over("phase", probe.position)
+    modulus = legs.spreading * legs.boundary
+    centre = np.add.reduceat(modulus * np.exp(1j * legs.phase), begin)
+    at_probes = np.add.reduceat(modulus[:, None] * gain * np.exp(1j * turn), begin)
+    heard = np.abs(centre) > SILENCE * np.add.reduceat(modulus, begin)
+    best = np.lexsort((legs.bounces, number))[begin]
+    shared = heard & (np.diff(begin, append=len(first)) > 1)
+    ratio = at_probes[shared] / centre[shared, None]
+    phase, missed = probe.expand(np.angle(ratio))
+    error, gain, terms = (
+        np.maximum.reduceat(over.error, begin),
+        gain[best],
+        np.zeros((len(begin), probe.basis.shape[1])),
+    )
+    terms[:, : over.phase.shape[1]] = over.phase[best]
+    terms[shared], gain[shared] = phase, np.abs(ratio)
+    error[shared] += missed / (2.0 * np.pi * receiver.band[1])
+    boundary, turned = legs.boundary[best], legs.phase[best]
+    boundary[shared] = np.abs(centre[shared]) / legs.spreading[best][shared]
+    turned[shared] = np.angle(centre[shared])
+    legs, over = legs.select(best).but(boundary=boundary, phase=turned), over[best].but(phase=terms, error=error)
+    rows = np.flatnonzero(heard)
+    return legs.select(rows), over[rows], gain[rows]
