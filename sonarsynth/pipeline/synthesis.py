@@ -218,7 +218,7 @@ def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: f
             signals = channel_errors.overloaded(signals, errors.overload)
         if errors.stuck and sonar.converter is not None:
             stuck = (sonar.converter.full_scale * drawn.stuck_at)[:, None].astype(np.float32)
-            is_stuck = (drawn.state == SensorState.STUCK)[:, None]
+            is_stuck = ((drawn.state == SensorState.STUCK) & (plan.elements.gain > 0.0))[:, None]
             signals = replace(signals, pressure=np.where(is_stuck, stuck, signals.pressure))
         mark_stage(SENSORS)
     return signals

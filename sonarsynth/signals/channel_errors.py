@@ -90,12 +90,12 @@ def talk(signals: Signals, elements: Elements, level: float) -> Signals:
 
 
 def neighbours(elements: Elements, level: float) -> csr_array:
-    """K (sensor, sensor): the amplitude at neighbours, else 0."""
+    """K (sensor, sensor): the amplitude at neighbours, else 0; an element that gives nothing gets nothing either."""
     from scipy.sparse import csr_array  # here and below: few scenes need it, and it is slow to load
 
     count = elements.count
     position = np.stack([elements.column, elements.row], axis=1) if elements.on_lattice else np.arange(count)[:, None]
-    number = {tuple(at): n for n, at in enumerate(position.tolist())}
+    number = {tuple(at): n for n, at in enumerate(position.tolist()) if elements.gain[n] > 0.0}
     steps = np.concatenate([np.eye(position.shape[1], dtype=int), -np.eye(position.shape[1], dtype=int)])
     pairs = [
         (n, number[near]) for at, n in number.items() for near in map(tuple, (at + steps).tolist()) if near in number

@@ -219,6 +219,18 @@ def test_all_dead_is_silence_and_electronics() -> None:
     assert np.std(alone.pressure) == pytest.approx(np.std(heard.pressure), rel=0.05)
 
 
+def test_elements_that_give_nothing_give_nothing_whatever_is_wrong_beside_them() -> None:
+    """Cross-talk of their neighbours, and the number of a stuck channel, were in their records."""
+    ship = "noise_sources: [{name: ship, motion: {kind: still, position: [9, 2, -1]}, sound: {kind: flat, level: 120}}]"
+    text = RECIPE.replace("face: 0 m", "face: 0 m, dead: [1, 4]").replace("    sources", f"    {ship}\n    sources")
+    wrong = "gain: 1 dB, delay: 1 us, stuck: 0.5, noisy: 0.3, cross_talk: -20 dB, jitter: 0.1 us, overload: {level: 1}"
+    errors = f"electronics: {{level: 60 dB}}\n    sensor_errors: {{{wrong}}}"
+    for seed in (1, 2):
+        made = ss.loads(text.replace("    beams", f"    {errors}\n    beams") + f"seed: {seed}\n")
+        heard, _ = recorded(ss.plan(made, products=["signals"]))
+        assert heard.pressure.any(axis=1).tolist() == [True, False, True, True, False, True]
+
+
 def test_electronics_and_errors_change_no_draw_of_the_ambient_noise() -> None:
     before, _ = recorded(planned())
     with_both, _ = recorded(planned("electronics: {level: -100 dB}", "sensor_errors: {noisy: 0.5}"))

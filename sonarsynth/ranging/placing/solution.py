@@ -8,6 +8,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.bistatic_range import bistatic_range
+from sonarsynth.geometry import unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +24,7 @@ class Solution:
     def as_array_moves(self, source: Floats, shift: Floats) -> Solution:
         """Of an array that has moved between the direct arrival and the echo, so that the source (xyz) m, sonar frame,
         has shifted (echo, xyz) m there by then: to the first order, and the direct path is as long as it was."""
-        longer = np.linalg.norm(source + shift, axis=1) - np.linalg.norm(source)
+        longer = shift @ unit(source)  # as `by_source` has it: a transmitter may have shifted by more than it is away
         r = self.range + np.einsum("ex,ex->e", self.by_source, shift) - self.by_path * longer
         return replace(self, position=self.position * (r / self.range)[:, None], range=r)
 
