@@ -147,7 +147,7 @@ def over_horizon(direction: Floats, facet: int, normal: Floats, horizon: Floats)
     square = along = 0.0
     for x in range(3):
         square, along = square + direction[x] ** 2, along + direction[x] * normal[facet, x]
-    return along > (horizon[facet] + CLEAR) * math.sqrt(square)
+    return bool(along > (horizon[facet] + CLEAR) * math.sqrt(square))
 
 
 @compiled
