@@ -54,5 +54,8 @@ def weights(elements: Elements, shading: Shading) -> Floats:
 
 
 def energy_image(energy: Floats, sonar: Sonar, start: float, stop: float) -> EnergyImage:
-    """The image of energies (elevation, azimuth) in Pa2 s on the sonar's grid."""
+    """The image of energies (elevation, azimuth) in Pa2 s on the sonar's grid. Raises ValueError for another shape."""
+    grid = sonar.beams.elevations, sonar.beams.azimuths
+    if energy.shape != grid:
+        raise ValueError(f"energies of an image have the shape {energy.shape}, and its beams {grid}")
     return EnergyImage(energy.astype(np.float32), sonar.beams.azimuth, sonar.beams.elevation, start, stop)

@@ -93,10 +93,10 @@ def _shortest(band: Band, pulse: float) -> float:
     return max(SHORTEST, IN_BANDWIDTHS / (band.high - band.low), IN_PULSES * pulse)
 
 
-def _first(times: Floats, real: Ints, count: int = 2) -> Ints:
-    """Indices of the smallest of times (frame,) in frames of the dataset, at most so many; NaN counts as late."""
+def _first(times: Floats, real: Ints) -> Ints:
+    """Indices of the smallest two of times (frame,) in frames of the dataset; NaN counts as late."""
     order = np.argsort(times, kind="stable")
-    return np.asarray(order[(real[order] >= 0) & np.isfinite(times[order])][:count])
+    return np.asarray(order[(real[order] >= 0) & np.isfinite(times[order])][:2])
 
 
 def _opening(scene: Scene, first_echo: float, supports: PulseDurations, margin: float) -> tuple[bool, float]:

@@ -9,6 +9,7 @@ import pytest
 
 from sonarsynth.conventions import direction
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.imaging.image_window import energy_image
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
 from tests.lattice import lattice_energies
@@ -210,3 +211,8 @@ def test_an_array_off_any_lattice_needs_the_dense_kind():
 def test_a_window_that_was_not_recorded_is_refused(method, start, stop, message):
     with pytest.raises(ValueError, match=message):
         method.image(plane_wave(ARRAY, 0.0, 0.0), elements(ARRAY), SONAR, start, stop)
+
+
+def test_energies_of_another_shape_than_the_grid_are_refused():
+    with pytest.raises(ValueError, match=r"shape \(357,\), and its beams \(17, 21\)"):
+        energy_image(np.ones(357), SONAR, *WINDOW)

@@ -91,6 +91,13 @@ def test_a_scene_without_targets_has_none_in_view_and_is_drawn() -> None:
     overview_figure(overview(empty, 0)).draw_without_rendering()
 
 
+def test_of_one_range_the_axis_has_the_range_itself() -> None:
+    """Not parts of a millimetre, and an offset apart to add to them."""
+    figure = distribution_figure(sample_geometry(recipe(ball("one", -3.0, 12.0, -1.0), frames=1)))
+    figure.draw_without_rendering()
+    assert [axes.xaxis.get_offset_text().get_text() for axes in figure.axes] == [""] * len(figure.axes)
+
+
 def test_a_grid_is_counted_by_sequence_and_split() -> None:
     made = ss.load(GRID)
     value = sample_geometry(made).as_json()

@@ -168,24 +168,9 @@ def _solved(
 
 
 def _fastest(n: Numbers, steps: Floats, state: OdeSolution) -> float:
-    """Largest |R'|/U: where R'' vanishes between two of many places, or at one of them."""
-    from scipy.optimize import brentq
-
-    s = np.unique(np.linspace(steps[:-1], steps[1:], 9))
-    q, W, _ = state(s)
-    x, F, _ = force(q, W, n)
-    A, v = F - 1.5 * W * W, np.abs(W) * x**-1.5
-    best = int(np.argmax(v))
-    for i in (best - 1, best):
-        if 0 <= i < s.size - 1 and A[i] * A[i + 1] < 0:
-
-            def acceleration(u: float) -> float:
-                q, W, _ = state(u)
-                return float(force(q, W, n)[1] - 1.5 * W * W)
-
-            q, W, _ = state(brentq(acceleration, s[i], s[i + 1]))
-            return float(abs(W) * ratio(q, n) ** -1.5)
-    return float(v[best])
+    """Largest |R'|/U, at 64 places of each step: within 1e-4."""
+    q, W, _ = state(np.linspace(steps[:-1], steps[1:], 65).ravel())
+    return float((np.abs(W) * ratio(q, n) ** -1.5).max())
 
 
 def stretched(time: npt.ArrayLike, collapse: Collapse) -> Floats:
