@@ -34,10 +34,8 @@ def direct_paths(arrivals: Arrivals, envelope: Callable[[int, float, float], flo
     envelope: of the index of a snap, the absorption on its way (dB at the centre of the band) and its Doppler: when the
     envelope of its pulse peaks in the band, s after its collapse.
     """
-    chosen = arrivals.seen_from_centre
-    rows = np.flatnonzero(chosen.direct)
-    rows = rows[(chosen.surface[rows] == 0) & (chosen.bottom[rows] == 0)]
-    rows = rows[np.lexsort((chosen.delay[rows], chosen.snap[rows]))]
+    chosen = arrivals.select(arrivals.direct & (arrivals.surface == 0) & (arrivals.bottom == 0)).seen_from_centre
+    rows = np.lexsort((chosen.delay, chosen.snap))
     snap = chosen.snap[rows]
     heard = zip(snap.tolist(), chosen.absorption[rows].tolist(), chosen.doppler[rows].tolist(), strict=True)
     late = [envelope(*path) for path in heard]

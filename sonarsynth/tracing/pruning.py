@@ -38,8 +38,9 @@ def loud_ones(levels: EchoLevels, negligible: float) -> Bools:
         rows = np.flatnonzero((owner == number) & (coherent == (exponent == 1)))
         loudest = strength[rows].max(initial=0.0)
         size = (strength[rows] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared
-        order = np.argsort(size, kind="stable")
         most = size[heard[rows]]
         least = negligible * most.sum() if exponent == 2 else np.sqrt(negligible) * most.max(initial=0.0)
+        faint = np.flatnonzero(size <= least)  # of all others none can be left out
+        order = faint[np.argsort(size[faint], kind="stable")]
         keep[rows[order[np.cumsum(size[order]) <= least]]] = False
     return keep
