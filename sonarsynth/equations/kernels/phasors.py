@@ -155,8 +155,8 @@ def _steered_sums(pairs: Any, delay: Any, weight: Any, frequency: float, spacing
 def padded_bins(spectra: Spectra, rows: int, multiple: int) -> Spectra:
     """Spectra (sensor, bin) complex64 with zeros after them: `rows` sensors, bins a multiple of `multiple`."""
     sensors, bins = spectra.shape
-    padded = np.zeros((rows, bins + -bins % multiple), np.complex64)
-    padded[:sensors, :bins] = spectra
+    padded = np.empty((rows, bins + -bins % multiple), np.complex64)
+    padded[:sensors, :bins], padded[:sensors, bins:], padded[sensors:] = spectra, 0.0, 0.0
     return padded
 
 
