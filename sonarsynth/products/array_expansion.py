@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,6 +18,8 @@ QUANTITIES = ("delay", "amplitude", "phase", "delay_variance")
 """What varies over the aperture."""
 FIRST_OF_DEGREE = (0, 1, 4, 10, 20, 35)
 """Of `aperture_terms`, the first of each degree."""
+EVERY = tuple(range(56))
+"""Of `aperture_terms`, those up to the fifth degree."""
 
 
 def aperture_terms(position: npt.ArrayLike, aperture: float, terms: int = 20) -> Floats:
@@ -35,14 +38,16 @@ def aperture_terms(position: npt.ArrayLike, aperture: float, terms: int = 20) ->
     return np.stack(monomials[:terms], axis=-1)
 
 
-def _terms_at(position: Floats, aperture: float, terms: int) -> Floats:
-    """`aperture_terms` at positions (point, xyz) that are asked for in every frame: hydrophones, nodes between them."""
-    return _kept_terms(position.tobytes(), aperture, terms)
+def monomials_at(position: Floats, aperture: float, monomials: tuple[int, ...]) -> Floats:
+    """Some of `aperture_terms`, in order, at positions (point, xyz) that are asked for in every frame: hydrophones,
+    nodes between them."""
+    return _kept_terms(position.tobytes(), aperture, monomials)
 
 
 @lru_cache(maxsize=256)
-def _kept_terms(position: bytes, aperture: float, terms: int) -> Floats:
-    polynomials = aperture_terms(np.frombuffer(position).reshape(-1, 3), aperture, terms)
+def _kept_terms(position: bytes, aperture: float, monomials: tuple[int, ...]) -> Floats:
+    places = np.frombuffer(position).reshape(-1, 3)
+    polynomials = aperture_terms(places, aperture, monomials[-1] + 1)[:, list(monomials)]
     polynomials.setflags(write=False)
     return polynomials
 
@@ -51,9 +56,9 @@ def _kept_terms(position: bytes, aperture: float, terms: int) -> Floats:
 class ArrayExpansion(Columns):
     """Paths over an aperture: polynomials through values at probe sensors, and one matrix from there to all sensors.
 
-    Terms belong to the polynomials b(q) of a place q in the sonar frame (`aperture_terms`), the first to 1; a
-    quantity of which all sensors have what the middle has, has none. About a path with a delay tau and an amplitude A
-    at the middle, from the direction d and R away:
+    Terms belong to the polynomials b(q) of a place q in the sonar frame (`aperture_terms`) that do not vanish at every
+    sensor, the first to 1; a quantity of which all sensors have what the middle has, has none, and one of a low degree
+    only the first. About a path with a delay tau and an amplitude A at the middle, from the direction d and R away:
 
     delay           (path, term)  s    beside the sphere's: tau(q) = tau + (|R d - q| - R)/c + delay b(q)
     amplitude       (path, term)  1    beside the sphere's: A(q) = A R/|R d - q| (1 + amplitude b(q))
@@ -67,12 +72,13 @@ class ArrayExpansion(Columns):
     delay_variance: Floats
     error: Floats  # (path,) s: all that it misses at the probes, those held out among them, as a delay
     aperture: float  # m: scale of q
+    monomials: tuple[int, ...] = EVERY  # (term,) which of `aperture_terms` it belongs to
 
     @staticmethod
-    def none(count: int, aperture: float = 0.0) -> ArrayExpansion:
+    def none(count: int, aperture: float = 0.0, monomials: tuple[int, ...] = EVERY) -> ArrayExpansion:
         """Of spheres, all alike."""
         nothing = np.empty((count, 0))
-        return ArrayExpansion(nothing, nothing, nothing, nothing, np.zeros(count), aperture)
+        return ArrayExpansion(nothing, nothing, nothing, nothing, np.zeros(count), aperture, monomials)
 
     def __getitem__(self, rows: Bools | Ints | slice) -> ArrayExpansion:
         """The paths picked by a mask, by indices or by a slice."""
@@ -87,7 +93,7 @@ class ArrayExpansion(Columns):
         terms = getattr(self, name)
         if not terms.shape[1]:
             return np.zeros((len(terms), len(points)))
-        return np.asarray((_terms_at(points, self.aperture, terms.shape[1]) @ terms.T).T)  # points are read one by one
+        return np.asarray((self._terms_at(points, terms.shape[1]) @ terms.T).T)  # points are read one by one
 
     def largest(self, name: str) -> Floats:
         """Bound (path,) on the modulus of a quantity over the aperture."""
@@ -100,7 +106,7 @@ class ArrayExpansion(Columns):
         if not terms:
             return np.ones(len(self.amplitude))
         gain = self.amplitude + np.eye(1, terms)
-        basis = _terms_at(points, self.aperture, terms)
+        basis = self._terms_at(points, terms)
         return np.asarray(np.einsum("pt,pt->p", gain @ (basis.T @ basis / len(points)), gain))
 
     @property
@@ -108,29 +114,36 @@ class ArrayExpansion(Columns):
         """How much of each degree (path, degree) there is in 1 + amplitude b(q): the moduli of its terms, summed."""
         terms = self.amplitude.shape[1]
         gain = np.abs(self.amplitude + np.eye(1, terms)) if terms else np.ones((len(self.amplitude), 1))
-        starts = [n for n in FIRST_OF_DEGREE if n < gain.shape[1]]
-        return np.asarray(np.add.reduceat(gain, starts, axis=1))
+        starts = [self.first(n) for n in range(len(FIRST_OF_DEGREE))]
+        return np.asarray(np.add.reduceat(gain, [n for n in starts if n < gain.shape[1]], axis=1))
+
+    def first(self, degree: int) -> int:
+        """The first term of a degree."""
+        return bisect_left(self.monomials, FIRST_OF_DEGREE[degree])
 
     def gradient(self, points: Floats, *names: str) -> Floats:
         """Gradient (xyz, point, term) in 1/m of as many polynomials as some quantities have, at places (point, xyz)."""
         terms, step = max(getattr(self, name).shape[1] for name in names), 1e-4 * self.aperture
         if not terms:
             return np.zeros((3, 0, 0))
-        sides = [
-            [_terms_at(points + sign * axis, self.aperture, terms) for sign in (1, -1)] for axis in step * np.eye(3)
-        ]
+        sides = [[self._terms_at(points + sign * axis, terms) for sign in (1, -1)] for axis in step * np.eye(3)]
         return np.array([(ahead - behind) / (2.0 * step) for ahead, behind in sides])
+
+    def _terms_at(self, points: Floats, terms: int) -> Floats:
+        """The first polynomials at places (point, xyz): (point, term)."""
+        return monomials_at(points, self.aperture, self.monomials[:terms])
 
     @staticmethod
     def join(parts: Sequence[ArrayExpansion]) -> ArrayExpansion:
         """The paths of all parts over one aperture; terms that some of them lack are 0."""
         columns = {name: stacked([getattr(part, name) for part in parts]) for name in (*QUANTITIES, "error")}
-        return ArrayExpansion(**columns, aperture=max(part.aperture for part in parts))
+        widest = max(parts, key=lambda part: part.aperture)
+        return ArrayExpansion(**columns, aperture=widest.aperture, monomials=widest.monomials)
 
 
 def stacked(blocks: Sequence[Any]) -> Any:
     """Rows of all blocks, one after the other; columns that some of them lack are 0."""
     if blocks[0].ndim == 2:
         width = max(block.shape[1] for block in blocks)
-        blocks = [b if b.shape[1] == width else np.zeros((len(b), width), b.dtype) for b in blocks]
+        blocks = [b if b.shape[1] == width else np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in blocks]
     return np.concatenate(blocks)

@@ -205,15 +205,16 @@ def towards(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:
     return np.ascontiguousarray(u.transpose(2, 0, 1)), np.ascontiguousarray(n.T)
 
 
-BENT = 4
-"""The first delay term that turns the wavefront. Linear terms are the motion of the array, which turns no wave; what
-that motion adds to the curvature (u/c of it) turns waves too little to matter for a hydrophone's face."""
+BENT = 2
+"""The first degree of delay terms that turn the wavefront. Linear terms are the motion of the array, which turns no
+wave; what that motion adds to the curvature (u/c of it) turns waves too little to matter for a hydrophone's face."""
 
 
 def tilt(front: Wavefronts, gradient: Floats) -> Floats:
     """Change of the wavefront's direction (point, xyz, path) by delay terms: -c times their gradient (xyz, point,
     term)."""
-    slope = gradient[:, :, BENT:] @ front.expansion.delay[:, BENT:].T
+    bent = front.expansion.first(BENT)
+    slope = gradient[:, :, bent:] @ front.expansion.delay[:, bent:].T
     return np.asarray(-front.sound_speed * slope.swapaxes(0, 1))
 
 
@@ -288,7 +289,9 @@ def reference_of(front: Wavefronts, middle: Floats, phase: Floats, variance: Flo
         curvature=middle[3:4],
         amplitude=np.ones(1),
         loss=middle[4:5],
-        expansion=ArrayExpansion(delay, none, phase[None], variance[None], zero, front.expansion.aperture),
+        expansion=front.expansion.but(
+            delay=delay, amplitude=none, phase=phase[None], delay_variance=variance[None], error=zero
+        ),
         occluded=np.zeros((1, 0), np.uint8),
         modes=none,
         sound_speed=front.sound_speed,

@@ -219,4 +219,4 @@ def _over_aperture(
     terms, missed = probe.expand(late)
     if over.delay.shape[1]:
         terms += over.delay * longer[:, None]
-    return over.but(delay=terms, error=over.error + missed, aperture=elements.aperture)
+    return over.but(delay=terms, error=over.error + missed)

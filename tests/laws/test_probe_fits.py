@@ -1,34 +1,66 @@
 """Polynomials through values at probes, and where probes are seen from facets that move, against plain NumPy."""
 
 import numpy as np
+import pytest
 
 from sonarsynth.equations.kernels.unit_vectors import moved, to_images, to_moved_images
 from sonarsynth.geometry import rotation_matrix, unit
-from sonarsynth.receiver import PlanarLattice, elements
-from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, SECOND_DEGREE, probes
+from sonarsynth.products import ArrayExpansion
+from sonarsynth.products.array_expansion import aperture_terms
+from sonarsynth.receiver import PlanarLattice, PositionTable, elements
+from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
 
 PROBES = probes(elements(PlanarLattice(columns=9, rows=7, pitch=0.03)))
 RNG = np.random.default_rng(8)
 
 
 def test_polynomials_are_found_again_and_what_they_miss_is_the_largest_residual() -> None:
-    inside = np.flatnonzero(PROBES.basis.any(axis=0))[1:]
-    for count, terms in ((len(PROBES.sensor), inside), (QUADRATIC_PROBES, inside[inside < SECOND_DEGREE])):
-        wanted = np.zeros((5, PROBES.basis.shape[1]))
-        wanted[:, terms] = RNG.normal(size=(5, len(terms)))
-        values = wanted @ PROBES.basis[:count].T
+    for count, terms in ((len(PROBES.sensor), 10), (QUADRATIC_PROBES, 6)):  # of y and z, to the third or second degree
+        wanted = np.concatenate([np.zeros((5, 1)), RNG.normal(size=(5, terms - 1))], axis=1)
+        basis = PROBES.basis[:count, :terms]
+        values = wanted @ basis.T
         found, missed = PROBES.expand(values)
         np.testing.assert_allclose(found, wanted, atol=1e-10)
         assert missed.max() < 1e-12
         rough = values + RNG.normal(size=values.shape)
         found, missed = PROBES.expand(rough)
-        np.testing.assert_allclose(missed, np.abs(rough - found @ PROBES.basis[:count].T).max(axis=1), rtol=1e-12)
+        np.testing.assert_allclose(missed, np.abs(rough - found @ basis.T).max(axis=1), rtol=1e-12)
+
+
+@pytest.mark.parametrize("axes", [(1.0, 0.0, 0.0), (0.0, 1.0, 1.0), (1.0, 1.0, 1.0)], ids=["line", "plane", "box"])
+def test_terms_are_those_that_some_hydrophone_has(axes: tuple[float, float, float]) -> None:
+    array = elements(PositionTable(positions=(RNG.normal(0.0, 0.1, (60, 3)) * axes).tolist()))
+    every = aperture_terms(array.position, array.aperture)
+    assert probes(array).monomials == tuple(np.flatnonzero(every.any(axis=0)).tolist())
+
+
+def test_terms_that_no_hydrophone_has_change_nothing_when_they_are_left_out() -> None:
+    kept, points = list(PROBES.monomials), RNG.normal(0.0, 0.1, (7, 3)) * [0.0, 1.0, 1.0]
+    terms = np.zeros((4, 20))
+    terms[:, kept] = RNG.normal(size=(4, len(kept)))
+    every = ArrayExpansion.none(4, PROBES.aperture).but(delay=terms, amplitude=terms)
+    few = ArrayExpansion.none(4, PROBES.aperture, PROBES.monomials).but(delay=terms[:, kept], amplitude=terms[:, kept])
+    for name in ("over", "largest"):
+        own, others = (getattr(of, name)("delay", *([points] if name == "over" else [])) for of in (few, every))
+        np.testing.assert_allclose(own, others, rtol=1e-12)
+    np.testing.assert_allclose(few.mean_square(points), every.mean_square(points), rtol=1e-12)
+    np.testing.assert_allclose(few.amplitude_degrees, every.amplitude_degrees, rtol=1e-12)
+    bent, slope = few.first(2), few.gradient(points, "delay")
+    assert kept[bent:] == [n for n in kept if n >= every.first(2)]
+    np.testing.assert_allclose(slope @ few.delay.T, every.gradient(points, "delay") @ every.delay.T, atol=1e-9)
+
+
+def test_paths_of_different_degrees_keep_what_they_have_when_they_are_joined() -> None:
+    """None, squares and cubes: the terms that some lack are 0 of those, and not of the others."""
+    nothing = ArrayExpansion.none(2, PROBES.aperture, PROBES.monomials)
+    degrees = [ArrayExpansion.none(2), *(nothing.but(amplitude=RNG.normal(size=(2, terms))) for terms in (6, 10))]
+    for parts in (degrees, degrees[::-1]):
+        own = np.concatenate([part.over("amplitude", PROBES.position) for part in parts])
+        np.testing.assert_allclose(ArrayExpansion.join(parts).over("amplitude", PROBES.position), own, atol=1e-14)
 
 
 def test_a_probe_without_a_ray_is_left_out_and_said_to_be_missed() -> None:
-    inside = np.flatnonzero(PROBES.basis.any(axis=0))[1:]
-    wanted = np.zeros((2, PROBES.basis.shape[1]))
-    wanted[:, inside] = RNG.normal(size=(2, len(inside)))
+    wanted = np.concatenate([np.zeros((2, 1)), RNG.normal(size=(2, PROBES.basis.shape[1] - 1))], axis=1)
     values = wanted @ PROBES.basis.T
     values[1, 3] = np.nan
     found, missed = PROBES.expand(values)

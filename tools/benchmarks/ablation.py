@@ -43,7 +43,7 @@ HYDROPHONES, TIMES = 8, 3
 def without(arrivals: Arrivals, part: str) -> Arrivals:
     """Arrivals of which all sensors have what the centre has of a part; of the motion of an array, no delay is left."""
     terms = getattr(arrivals.expansion, part).copy()
-    kept = 4 if part == "delay" else 0
+    kept = arrivals.expansion.first(2) if part == "delay" else 0
     terms[:, kept:] = 0.0
     return replace(arrivals, expansion=replace(arrivals.expansion, **{part: terms}))
 

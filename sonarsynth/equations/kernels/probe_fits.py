@@ -7,24 +7,24 @@ import math
 import numpy as np
 
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Floats
 
 
 @compiled
-def fits(values: Floats, solve: Floats, basis: Floats, term: Ints, terms: int) -> tuple[Floats, Floats]:
-    """Coefficients (row, terms) of polynomials through values (row, probe), and the largest of what they miss these by
-    (row,), inf where a value is NaN. solve (fitted, some): values at the first probes to the coefficients of some terms
-    (some,), the others are 0; basis (some, probe)."""
-    out, missed = np.zeros((len(values), terms)), np.empty(len(values))
-    coefficient, fitted = np.empty(len(term)), np.empty(values.shape[1])
+def fits(values: Floats, solve: Floats, basis: Floats) -> tuple[Floats, Floats]:
+    """Coefficients (row, term) of polynomials through values (row, probe), and the largest of what they miss these by
+    (row,), inf where a value is NaN. solve (fitted, term): values at the first probes to coefficients; basis (term,
+    probe)."""
+    out, missed = np.zeros((len(values), len(basis))), np.empty(len(values))
+    fitted = np.empty(values.shape[1])
     for i in range(len(values)):
-        coefficient[:], fitted[:], missed[i] = 0.0, 0.0, 0.0
+        coefficient = out[i]
+        fitted[:], missed[i] = 0.0, 0.0
         for k in range(len(solve)):
             value = 0.0 if math.isnan(values[i, k]) else values[i, k]
-            for t in range(len(term)):
+            for t in range(len(coefficient)):
                 coefficient[t] += value * solve[k, t]
-        for t in range(len(term)):
-            out[i, term[t]] = coefficient[t]
+        for t in range(len(coefficient)):
             for j in range(len(fitted)):
                 fitted[j] += coefficient[t] * basis[t, j]
         for j in range(len(fitted)):

@@ -82,11 +82,12 @@ class ExpansionSource:
     def of(self, block: slice) -> AperturePaths:
         """The wavefronts of some legs."""
         legs = self.legs if block == slice(0, len(self.legs.row)) else self.legs.select(block)
-        count, aperture = len(legs.row), self.place.probe.aperture
+        count, probe = len(legs.row), self.place.probe
+        spheres = ArrayExpansion.none(count, probe.aperture, probe.monomials)
         if self.plain:
-            return AperturePaths(ArrayExpansion.none(count, aperture), legs, self.place, None, None)
+            return AperturePaths(spheres, legs, self.place, None, None)
         straight = self.place.propagation.straight(self.place.medium.profile)
-        samples = ApertureSamples.room(count, *self.place.probe.basis.shape, straight=straight)
+        samples = ApertureSamples.room(count, *probe.basis.shape, straight=straight)
         for members, model in self.families:
             first, last = np.searchsorted(members, (block.start, block.stop))
             rows = members[first:last] - block.start
@@ -96,10 +97,9 @@ class ExpansionSource:
                 samples.put(rows, model.at(legs.point[rows]))
             else:
                 samples.put(rows, {name: value[first:last] for name, value in model.known.items()})
-        alike = [name for name in ("phase", "delay_variance") if not getattr(samples, name).any()]
-        alike += ["delay"] if straight and not samples.delay.any() else []
-        columns = samples.delay, np.empty((count, 0)), samples.phase, samples.delay_variance, samples.error
-        over = ArrayExpansion(*columns, aperture).without(*alike)
+        varying = [name for name in ("phase", "delay_variance") if getattr(samples, name).any()]
+        varying += ["delay"] if not straight or samples.delay.any() else []
+        over = spheres.but(error=samples.error, **{name: getattr(samples, name) for name in varying})
         return AperturePaths(over, legs, self.place, samples.departure, samples.gain)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.products.array_expansion import aperture_terms
+from sonarsynth.products.array_expansion import monomials_at
 from sonarsynth.state import Medium, Receiver
 from sonarsynth.tracing.expansion.probe_paths import ReceiverGeometry, image, rays_to_probes
 from sonarsynth.tracing.expansion.probe_sensors import probes
@@ -34,6 +34,6 @@ def launch_deviation(
     probe, straight = geometry.probe, image(legs, geometry.probe.position, receiver.pose)
     residual, _, bent = rays_to_probes(legs, geometry)
     away = np.where(np.isnan(residual)[..., None], 0.0, bent - straight)
-    basis = aperture_terms(points, probe.aperture)
+    basis = monomials_at(points, probe.aperture, probe.monomials)
     coefficients = np.einsum("tp,lpx->ltx", probe.solve, away[:, : probe.fitted], optimize=True)
     return np.asarray(np.matmul(basis, coefficients))
