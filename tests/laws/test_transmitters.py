@@ -217,16 +217,18 @@ def test_the_echo_of_a_sweep_is_one_point_where_the_target_is(law: Any) -> None:
 @pytest.mark.parametrize("below", [0.25, 3.0])
 def test_points_out_of_focus_err_as_they_say(below: float) -> None:
     """A point 1 m off an array of 40 cm: focused at 20 m it is several, 3.5 degrees and up to 5 cm beside it, where 0.4
-    degrees and 0.6 cm were predicted; focused there one, within millimetres. The plan says which of them."""
+    degrees and 0.6 cm were predicted; focused there one, within millimetres. The plan says which of them, and the dB
+    that images lose by it."""
     ping = Transmitter(position=(0.05, 0.0, -below), pulse=replace(SWEEP, duration=0.2e-3), source_level=190.0)
     near = scene(ping, target=(1.0, 0.0, -50.0))
     sonar = replace(near.scene.sonar, array=PlanarLattice(columns=8, rows=8, pitch=0.05))
-    said = []
+    brightest, said = [], []
     for focus in (20.0, 1.0):
         processing = replace(near.scene.processing, beamforming=FocusedDelayAndSum(focus=focus))
         made = plan(replace(near, scene=replace(near.scene, sonar=sonar, processing=processing)), ["cloud", "image"])
         frame = render(made, 0)
         cloud = frame["cloud"]
+        brightest.append(10.0 * np.log10(float(frame["image/energy"].max())))
         said.append([line for line in made.warnings if line.startswith("point: out of focus in frame 0: 1 m off")])
         cloud = cloud.isel(point=slice(int(cloud["count"])))
         assert cloud.sizes["point"] == 1 if focus == 1.0 else cloud.sizes["point"] > 1
@@ -234,6 +236,8 @@ def test_points_out_of_focus_err_as_they_say(below: float) -> None:
             assert (np.abs(cloud[name] - true) < 3.0 * cloud[f"{name}_error"]).all(), name
     assert float(cloud["range_error"][0]) < 5e-3 and float(cloud["elevation_error"][0]) < 0.3
     assert len(said[0]) == 1 and said[1] == []
+    loss = float(said[0][0].split("an echo is ")[1].split(" dB")[0])
+    assert loss == pytest.approx(brightest[1] - brightest[0], abs=1.0)
 
 
 @pytest.mark.parametrize(("strength", "away"), [(1e-6, 20.0), (1e-12, 2.5)])

@@ -6,18 +6,20 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, evenly
-from sonarsynth.equations.arrays.apertures import defocus_spread
+from sonarsynth.conventions import Floats, direction, evenly
+from sonarsynth.equations.arrays.apertures import defocus_spread, focus_delay, live_gain
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.views import box_in_view
 from sonarsynth.planning.measured.sampled_frames import SampledScene
+from sonarsynth.planning.pulse_durations import extreme_waveforms
 from sonarsynth.products import View
 from sonarsynth.ranging.range_profiles import aperture_moments
 from sonarsynth.receiver import elements
 from sonarsynth.receiver.mirror_images import mirror_image, mirror_normal
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.scattering import Scatterer
+from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.overlaps import overlap, sphere_round
 from sonarsynth.targets.shapes import Box
@@ -25,6 +27,8 @@ from sonarsynth.targets.target import Target
 
 FRAMES = 64
 """Frames of a sequence that bodies are compared in, at most; first and last among them."""
+LOSS_BEAMS, LOSS_BINS = 11, 64
+"""Beams each way, and frequencies of the band, by which it is said what echoes lose out of focus."""
 BOX_FACES = mesh_of(Box(size=(1.0, 1.0, 1.0))).faces
 """Of the corners of `PlacedTarget.box`."""
 
@@ -198,11 +202,12 @@ def focus_notes(look: SampledScene) -> list[str]:
         if not spread.any():
             continue
         worst = int(np.argmax(spread))
+        loss = _loss(look, float(away[worst]), float(spread[worst]))
         when = said([frame.index for frame, wide in zip(seen, spread, strict=True) if wide > 0.0], len(frames))
         lines.append(
             f"{target.name}: out of focus {when}: {away[worst]:.2g} m off, where beams are focused "
-            f"{f'at {focus:.3g} m' if focus else 'for plane waves'}, an echo is fainter, and several points up "
-            f"to {np.rad2deg(spread[worst]):.2g} deg beside it, as their predicted errors say "
+            f"{f'at {focus:.3g} m' if focus else 'for plane waves'}, an echo is {loss:.0f} dB fainter and several "
+            f"points up to {np.rad2deg(spread[worst]):.2g} deg beside it, as their predicted errors say "
             "(scene.processing.beamforming.focus)"
         )
     return lines
@@ -212,3 +217,25 @@ def _away(body: PlacedTarget, place: Floats) -> float:
     """Distance (m) of a place (xyz) in the world from the box round a body."""
     own = body.pose.to_body(place)
     return max(float(np.linalg.norm(own - np.clip(own, *body.mesh.box))), 1e-3)
+
+
+def _loss(look: SampledScene, distance: float, spread: float) -> float:
+    """Energy (dB) that the brightest beam about the axis, within an angle `spread` (rad), loses of a pulse that comes
+    from there, so far away (m), by its focus."""
+    sonar, focus = look.scene.sonar, look.scene.processing.beamforming.focus
+    array, c = elements(sonar.array), sonar.assumed_sound_speed
+    across, up = np.meshgrid(*2 * [np.linspace(-spread, spread, LOSS_BEAMS)])
+    late = focus_delay(array.position, direction(0.0, 0.0), distance, c)
+    late = late - focus_delay(array.position, direction(across.ravel(), up.ravel()), focus, c)
+    samples = int(LOSS_BINS * sonar.sampling_frequency / (sonar.band.high - sonar.band.low))
+    losses = []
+    for waveform in extreme_waveforms(look.scene):
+        f, spectrum = pulse_spectrum(waveform, sonar.antialias, sonar.sampling_frequency, samples)
+        band = (f >= sonar.band.low) & (f <= sonar.band.high)
+        power = np.abs(spectrum[band]) ** 2 + 1e-300
+        brightness = sum(
+            p * np.abs(np.exp(2j * np.pi * frequency * late) @ live_gain(array.gain)) ** 2
+            for frequency, p in zip(f[band], power / power.sum(), strict=True)
+        )
+        losses.append(-10.0 * float(np.log10(np.max(brightness))))
+    return max(losses, default=0.0)
