@@ -52,23 +52,6 @@ def peak(pressure: Any) -> float:
 
 
 @compiled
-def tops(waves: Any) -> Any:
-    """Samples (row,) at which complex waves (row, sample) are loudest, beside the first and the last; and |.|^2 before,
-    at and after these (3, row)."""
-    rows, samples = waves.shape
-    top, power = np.empty(rows, np.int64), np.empty(samples, waves.real.dtype)
-    around = np.empty((3, rows), waves.real.dtype)
-    for q in range(rows):
-        for n in range(samples):
-            x, y = waves[q, n].real, waves[q, n].imag
-            power[n] = x * x + y * y
-        top[q] = min(max(np.argmax(power), 1), samples - 2)
-        for i in range(3):
-            around[i, q] = power[top[q] + i - 1]
-    return top, around
-
-
-@compiled
 def powers(waves: Any, taps: Any, power: Any) -> None:
     """Write |.|^2 of complex waves (beam, sample), and of what they are halfway between samples, into power (beam, two
     for a sample), as many as it has.

@@ -15,7 +15,6 @@ from sonarsynth.imaging.delay_and_sum.lattice_beams import LatticeBeams
 from sonarsynth.imaging.delay_and_sum.lattice_sums import TERM, sums_of_one, sums_of_two
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location.pulse_times import in_band
-from sonarsynth.ranging.picking.peak_kernels import loudest_within
 from sonarsynth.ranging.range_profiles import HALFWAY, template_spectrum
 from sonarsynth.receiver import Band, PlanarLattice, Romanis, elements
 
@@ -125,27 +124,6 @@ def test_powers_count_who_is_live(sensors):
     power, peak = ranging_kernels.power_and_peak(pressure, live)
     np.testing.assert_allclose(power, np.sum(pressure[live].astype(float) ** 2, axis=0), rtol=1e-14)
     assert peak == np.abs(pressure[live]).max()
-
-
-def test_tops_are_where_waves_are_loudest_and_never_at_an_end():
-    random = np.random.default_rng(5)
-    waves = (random.normal(size=(6, 9)) + 1j * random.normal(size=(6, 9))).astype(np.complex64)
-    waves[0, 0], waves[1, 8], waves[2, [3, 6]], waves[3] = 9.0, 9.0, 9.0, 0.0  # at the ends, two alike, silence
-    top, around = ranging_kernels.tops(waves)
-    power = waves.real**2 + waves.imag**2
-    np.testing.assert_array_equal(top, np.clip(power.argmax(axis=1), 1, 7))
-    np.testing.assert_array_equal(top[:4], [1, 7, 3, 1])
-    np.testing.assert_array_equal(around, [power[np.arange(6), top + i] for i in (-1, 0, 1)])
-
-
-def test_the_loudest_within_is_that_of_the_delays_asked_for():
-    power = np.random.default_rng(6).random((5, 40)).astype(np.float32)
-    power[:, 20] = 2.0  # beside what is asked for, but of the last
-    first, last = np.array([0, 0, 21, 39, 5]), np.array([20, 1, 40, 60, 30])
-    late, loudest = loudest_within(power, first, last)
-    exact = [(a + int(row[a:b].argmax()), row[a:b].max()) for row, a, b in zip(power, first, last, strict=True)]
-    np.testing.assert_array_equal(np.column_stack([late, loudest]), exact)
-    assert late[4] == 20
 
 
 def test_lags_and_templates_are_the_sums_of_their_formulas():

@@ -154,8 +154,11 @@ def envelope_peaks(cut: npt.NDArray[np.float32], rate: float, band: Band) -> tup
     count = next_fast_len(cut.shape[1], real=True)
     base = rfft(cut, count, axis=1)[:, in_band(_frequencies(count, rate), band)]
     short = next_fast_len(max(2 * base.shape[1], FINE))
-    top, power = ranging_kernels.tops(ifft(base, short, axis=1))
-    offset, height = parabola(*np.sqrt(power))
+    wave = ifft(base, short, axis=1)
+    power = wave.real**2 + wave.imag**2
+    top = np.clip(power.argmax(axis=1), 1, short - 2)
+    rows = np.arange(len(power))
+    offset, height = parabola(*(np.sqrt(power[rows, top + i]) for i in (-1, 0, 1)))
     return (top + offset) * (count / (short * rate)), height
 
 

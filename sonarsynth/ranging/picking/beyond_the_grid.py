@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, azimuth_elevation
-from sonarsynth.ranging.picking.peak_kernels import loudest_lines, loudest_within
+from sonarsynth.ranging.picking.peak_kernels import farthest, loudest_lines
 from sonarsynth.ranging.range_profiles import BEAMS_AT_ONCE, Profiles
 from sonarsynth.ranging.received_window import ReceivedWindow
 
@@ -37,7 +35,8 @@ def louder_beyond(
     line, brought = _lines(profiles, f, b, t, min(elements.rows, elements.columns))
     may_count = brought > FAINT * counts
     b, t, height, line = b[may_count], t[may_count], height[may_count], line[may_count]
-    orders = _orders(int(2.0 * elements.pitch * f[-1] / c))
+    most = int(2.0 * elements.pitch * f[-1] / c)
+    orders = np.stack(np.meshgrid(*2 * [np.arange(-most, most + 1)]), axis=-1).reshape(-1, 2)
     along = profiles.direction[b, None, 1:] + orders * (c / (elements.pitch * line))[:, None, None]
     square = np.sum(along**2, axis=2)
     peak, order = np.nonzero((square < 1.0) & orders.any(axis=1))
@@ -49,21 +48,15 @@ def louder_beyond(
     peak, u = peak[~inside], u[~inside]
     if not len(peak):
         return none
-    far = np.linalg.norm(u - profiles.direction[b[peak]], axis=1) * (elements.aperture / c / profiles.step)
+    far = np.linalg.norm(u - profiles.direction[b[peak]], axis=1) * (farthest(elements.position) / c / profiles.step)
     first, last = np.maximum(np.ceil(t[peak] - far), 0.0).astype(int), (t[peak] + far).astype(int) + 1
     late, loudest = np.empty(len(u), int), np.empty(len(u))
-    for low in range(0, len(u), BEAMS_AT_ONCE):
-        block = slice(low, low + BEAMS_AT_ONCE)
-        power = profiles.filter.profiles(u[block])[1]
-        late[block], loudest[block] = loudest_within(power, first[block], last[block])
+    for block in range(0, len(u), BEAMS_AT_ONCE):
+        for n, power in enumerate(profiles.filter.profiles(u[block : block + BEAMS_AT_ONCE])[1], block):
+            late[n] = first[n] + power[first[n] : last[n]].argmax()
+            loudest[n] = power[late[n]]
     louder = loudest > height[peak]
     return u[louder], late[louder], loudest[louder]
-
-
-@lru_cache(maxsize=16)
-def _orders(most: int) -> Ints:
-    """Orders (lobe, 2) of grating lobes along the two axes of a lattice, up to `most` either way."""
-    return np.stack(np.meshgrid(*2 * [np.arange(-most, most + 1)]), axis=-1).reshape(-1, 2)
 
 
 def _lines(profiles: Profiles, f: Floats, b: Ints, t: Ints, steps: int) -> tuple[Floats, Floats]:

@@ -177,16 +177,6 @@ def over_lobes(
 
 
 @compiled
-def loudest_within(power: Any, first: Any, last: Any) -> Any:
-    """Delays (beam,) at which power (beam, delay) is largest from `first` (beam,) on and before `last`, and this."""
-    late, loudest = np.empty(len(power), np.int64), np.empty(len(power))
-    for n in range(len(power)):
-        late[n] = first[n] + np.argmax(power[n, first[n] : last[n]])
-        loudest[n] = power[n, late[n]]
-    return late, loudest
-
-
-@compiled
 def loudest_lines(spectra: Any, b: Any, turn: Any, width: int) -> Any:
     """Bins (peak,) about which the means over `width` bins of spectra (beam, bin) are largest, and these, squared.
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter, maximum_filter1d, uniform_filter
+from scipy.special import diric
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.arrays.apertures import live_gain
@@ -15,9 +17,8 @@ from sonarsynth.equations.arrays.noise_peaks import peak_level
 from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.picking.array_lobes import LOBES, clear_of_lobes
 from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond
-from sonarsynth.ranging.picking.peak_kernels import beside, local_maxima, power_centres
+from sonarsynth.ranging.picking.peak_kernels import beside, farthest, local_maxima, over_lobes, power_centres
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
 from sonarsynth.ranging.range_profiles import (
     OVERSAMPLING,
@@ -32,10 +33,16 @@ from sonarsynth.ranging.received_window import ReceivedWindow
 
 BESIDE = 2
 """Cells beside the beams over threshold that are looked at too: a peak there has its neighbours."""
+LOBES = 8.0
+"""Times what lobes bring of louder peaks that a peak must exceed: echoes are of more than their peaks."""
 NOISE_WIDTHS = 3.0
 """Beam widths on either side of a beam whose noise is taken for its own."""
 NOISE_ADDED = 2.0
 """Amplitude of noise, in units of its root mean square, that may be in a peak."""
+LOBE_BINS = 48
+"""Frequencies that lobes are summed over."""
+LOBE_STEPS, LOBE_ERROR = 128, 4e-4
+"""Steps a period at the highest frequency that lobes are tabulated at; and what such a table errs by."""
 RESOLVED = 1.0
 """An axis of the grid as long as this, in units of the roughness of noise along it, has peaks along it."""
 SIXTH = 1.0 / 6.0
@@ -240,11 +247,52 @@ def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: F
     """Whether peaks (peak,) are more than what the lobes of the array bring of louder ones, in the grid and beyond."""
     least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
     u, delay = profiles.direction[b], profiles.step * t.astype(float)
-    own = clear_of_lobes(window, profiles.width, u, delay, height, least)
+    own = _over(window, profiles.width, u, delay, height, least)
     beyond, late, power = louder_beyond(window, profiles, b[own], t[own], height[own], least[own] / LOBES)
     if len(power):
         u, delay = np.concatenate([u[own], beyond]), np.concatenate([delay[own], profiles.step * late])
         unasked = np.full(len(power), np.inf)
         height, least = np.concatenate([height[own], power]), np.concatenate([least[own], unasked])
-        own[own] = clear_of_lobes(window, profiles.width, u, delay, height, least)[: np.count_nonzero(own)]
+        own[own] = _over(window, profiles.width, u, delay, height, least)[: np.count_nonzero(own)]
     return own
+
+
+def _over(
+    window: ReceivedWindow, width: float, direction: Floats, delay: Floats, height: Floats, least: Floats
+) -> Bools:
+    """Whether `least` (peak,) is more than what lobes bring of louder peaks from directions (peak, xyz), at delays
+    (peak,) in s, of heights (peak,)."""
+    loud = np.argsort(-height, kind="stable")
+    band, live = window.sonar.band, np.flatnonzero(window.elements.gain)
+    taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
+    c = window.sonar.assumed_sound_speed
+    position, rate = window.elements.position[live], LOBE_STEPS * band.high
+    steps = int(np.ceil((4.0 * farthest(position) / c + 2.0 / (band.high - band.low)) * rate)) + 2
+    own = np.empty(len(height), bool)
+    own[loud] = over_lobes(
+        direction[loud] / c,
+        delay[loud],
+        height[loud],
+        position,
+        live_gain(window.elements.gain)[live],
+        np.linspace(band.low, band.high, LOBE_BINS),
+        taper,
+        2.0 * width / c,
+        least[loud] / LOBES,
+        _lobe_table(band.low, band.high, rate, steps),
+        rate,
+        LOBE_ERROR,
+    )
+    return own
+
+
+@lru_cache(maxsize=8)
+def _lobe_table(low: float, high: float, rate: float, steps: int) -> Floats:
+    """Sum (2, delay) over the band low to high (Hz), tapered, at delays in steps of 1/rate (Hz), `steps` either way."""
+    delay = np.arange(-steps, steps + 1) / rate
+    bin_angle, taper_angle = 2.0 * np.pi * delay * (high - low) / (LOBE_BINS - 1), 2.0 * np.pi / LOBE_BINS
+    # sin^2 is a constant and a cosine: three sums of a geometric series
+    size = diric(bin_angle, LOBE_BINS)
+    size += 0.5 * (diric(bin_angle + taper_angle, LOBE_BINS) + diric(bin_angle - taper_angle, LOBE_BINS))
+    turn = np.pi * (low + high) * delay
+    return np.ascontiguousarray([size * np.cos(turn), size * np.sin(turn)])
