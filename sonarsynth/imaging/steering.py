@@ -30,6 +30,12 @@ class Steering(Method):
     shading: Shading = "uniform"
     """Weights over the aperture."""
 
+    def __init_subclass__(cls) -> None:
+        """Raises TypeError for a method that would be delay and sum under another name."""
+        own = {name for of in cls.__mro__[: cls.__mro__.index(Steering)] for name in vars(of)}
+        if own.isdisjoint({"energies", "steer", "separable"}):
+            raise TypeError(f"{cls.__name__} has neither energies nor steer")
+
     def beams(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> BeamSpectra:
         """Beams of a window of the signals, computed when their energies or spectra are asked for."""
         energies = partial(self.energies, snapshots, elements, sonar)

@@ -133,11 +133,19 @@ class ArrayExpansion(Columns):
         """The first polynomials at places (point, xyz): (point, term)."""
         return monomials_at(points, self.aperture, self.monomials[:terms])
 
+    @property
+    def varies(self) -> bool:
+        """Whether anything varies beside the sphere."""
+        return any(getattr(self, name).shape[1] for name in QUANTITIES)
+
     @staticmethod
     def join(parts: Sequence[ArrayExpansion]) -> ArrayExpansion:
-        """The paths of all parts over one aperture; terms that some of them lack are 0."""
+        """The paths of all parts over one aperture; terms that some of them lack are 0. Raises ValueError for parts of
+        different arrays."""
         columns = {name: stacked([getattr(part, name) for part in parts]) for name in (*QUANTITIES, "error")}
         widest = max(parts, key=lambda part: part.aperture)
+        if any((part.aperture, part.monomials) != (widest.aperture, widest.monomials) for part in parts if part.varies):
+            raise ValueError("paths over different arrays cannot be joined")
         return ArrayExpansion(**columns, aperture=widest.aperture, monomials=widest.monomials)
 
 

@@ -10,6 +10,7 @@ import pytest
 from sonarsynth.conventions import direction
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.imaging.image_window import energy_image
+from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
 from tests.lattice import lattice_energies
@@ -216,3 +217,9 @@ def test_a_window_that_was_not_recorded_is_refused(method, start, stop, message)
 def test_energies_of_another_shape_than_the_grid_are_refused():
     with pytest.raises(ValueError, match=r"shape \(357,\), and its beams \(17, 21\)"):
         energy_image(np.ones(357), SONAR, *WINDOW)
+
+
+def test_a_beamformer_that_would_be_delay_and_sum_under_another_name_is_refused():
+    with pytest.raises(TypeError, match="Misspelt has neither energies nor steer"):
+        type("Misspelt", (Steering,), {"energy": Steering.energies})
+    type("OfItsOwn", (Steering,), {"steer": Steering.steer})

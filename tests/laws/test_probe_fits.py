@@ -85,3 +85,11 @@ def test_images_of_probes_are_seen_from_where_a_facet_has_moved_to() -> None:
     centre = departure[:, None].copy()
     at_centre = to_moved_images(length, departure, mirrored, np.zeros((1, 3)), apart, turn, axes)
     np.testing.assert_allclose(moved(length, centre, apart, turn, axes), at_centre, atol=1e-14)
+
+
+def test_paths_over_different_arrays_are_not_joined() -> None:
+    """Their terms belong to other polynomials."""
+    line = probes(elements(PlanarLattice(columns=9, rows=1, pitch=0.03)))
+    parts = [ArrayExpansion.none(1, of.aperture, of.monomials).but(delay=np.ones((1, 4))) for of in (PROBES, line)]
+    with pytest.raises(ValueError, match="different arrays"):
+        ArrayExpansion.join(parts)

@@ -191,7 +191,7 @@ def test_the_echo_of_a_ghost_comes_from_the_mirrored_place() -> None:
     assert (towards @ mirrored / np.linalg.norm(mirrored) > np.cos(0.3 / 15)).all()
 
 
-def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
+def test_a_snap_on_the_bottom_and_its_image_there_are_one() -> None:
     """Of one strength to a snap a hair above the bottom, whose two ways add up when they come together."""
     fluid = SeaBottom(reflection=FluidHalfSpace(density_ratio=1.8, speed_ratio=1.15, loss_tangent=0.02))
     environment = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), bottom=fluid)
@@ -212,7 +212,7 @@ def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
 
 
 @pytest.mark.parametrize("profile", [UNIFORM, THERMOCLINE], ids=["uniform", "thermocline"])
-def test_the_sound_of_a_snap_on_the_bed_is_one_path_that_each_sensor_hears_as_both(profile: Profile) -> None:
+def test_the_sound_of_a_snap_on_the_bottom_is_one_path_that_each_sensor_hears_as_both(profile: Profile) -> None:
     """As it hears those of a snap a hair above the bottom, which come apart; its grazing angle is its own."""
     fluid = FluidHalfSpace(density_ratio=1.8, speed_ratio=1.15, loss_tangent=0.02)
     environment = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), bottom=SeaBottom(reflection=fluid))

@@ -81,7 +81,8 @@ def _edges(name: str, values: Floats, sampled: SampledGeometry) -> Floats:
     if name in ("azimuth", "elevation"):
         half = _half_span(name, sampled)
         low, high = min(low, -half), max(high, half)
-    room = max(0.02 * (high - low), 0.01 * max(abs(high), 1.0))  # of one value alone, ticks that can be read
+    wide, size = high - low, max(abs(low), abs(high), 1.0)
+    room = 0.02 * wide if wide > 1e-3 * size else 0.01 * size  # of one value alone, ticks that can be read
     return np.linspace(low - room, high + room, BINS + 1)
 
 

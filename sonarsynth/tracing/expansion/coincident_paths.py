@@ -1,5 +1,4 @@
-"""Legs that coincide at every sensor, of a snap on the bottom and of its image there, added up: they are heard as
-one."""
+"""Legs that coincide at every sensor added up: a snap on the bottom and its image there are heard as one source."""
 
 from __future__ import annotations
 
@@ -18,9 +17,11 @@ SILENCE = 1e-12
 def with_coincident_added(
     legs: ReceivePaths, over: ArrayExpansion, gain: Floats, receiver: Receiver
 ) -> tuple[ReceivePaths, ArrayExpansion, Floats]:
-    """Legs of one snap that is alike in all directions, sorted by time; with their wavefronts but for amplitudes, and
-    gain (leg, probe) over the aperture. Those that coincide become the one of the fewest reflections, with the modulus
-    and phase of their sum. What comes blurred by a rough bottom stays apart from what does not.
+    """The same of legs of one snap, alike in all directions, of which those that coincide are one: that of the fewest
+    reflections, with the modulus and phase of their sum. What a rough bottom blurs stays apart from what it does not.
+
+    legs (leg,): sorted by time; over (leg,): their wavefronts, but for amplitudes; gain (leg, probe): their amplitudes
+    at the probes over that at the centre.
     """
     first = apart(legs.row, legs.travel_time, legs.arrival)
     first[1:] |= np.diff(legs.delay_std) != 0
@@ -36,11 +37,8 @@ def with_coincident_added(
     shared = heard & (np.diff(begin, append=len(first)) > 1)
     ratio = at_probes[shared] / centre[shared, None]
     phase, missed = probe.expand(np.angle(ratio))
-    error, gain, terms = (
-        np.maximum.reduceat(over.error, begin),
-        gain[best],
-        np.zeros((len(begin), probe.basis.shape[1])),
-    )
+    error, gain = np.maximum.reduceat(over.error, begin), gain[best]
+    terms = np.zeros((len(begin), probe.basis.shape[1]))
     terms[:, : over.phase.shape[1]] = over.phase[best]
     terms[shared], gain[shared] = phase, np.abs(ratio)
     error[shared] += missed / (2.0 * np.pi * receiver.band[1])

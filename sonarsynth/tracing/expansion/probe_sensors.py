@@ -33,9 +33,7 @@ class Probes:
     basis: Floats  # (probe, term)
     aperture: float  # m
     solve_few: Floats  # (term, probe): as solve, from the first of FEW probes to terms up to the second degree
-    monomials: tuple[
-        int, ...
-    ]  # (term,) which of `aperture_terms` it belongs to: those that do not vanish at all probes
+    monomials: tuple[int, ...]  # (term,) which of `aperture_terms` it is: those that do not vanish at all probes
 
     def expand(self, values: Floats) -> tuple[Floats, Floats]:
         """Terms (path, term) of `ArrayExpansion`, 0 at the centre, by least squares through values (path, probe), and
