@@ -14,7 +14,7 @@ from sonarsynth.equations.arrays.spherical_wave import envelope_peak, tangent_pl
 from sonarsynth.equations.arrays.wavefront_errors import bending_covariance
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.geometry.motion import Track
+from sonarsynth.geometry.motion import Circle, Track
 from sonarsynth.planning.notes.source_notes import OBLIQUE, oblique_error
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
@@ -73,20 +73,30 @@ def test_moving_and_turning_everything_changes_nothing():
         assert np.allclose(value, getattr(there, name), rtol=1e-9, atol=1e-12), name
 
 
-def test_an_array_that_moves_locates_as_one_at_rest():
+@pytest.mark.parametrize(
+    ("velocity", "turning"), [((8.0, -5.0, 1.0), 0.0), ((0.0, 0.0, 0.0), 1.0), ((8.0, -5.0, 1.0), -0.5)]
+)
+def test_an_array_that_moves_and_turns_locates_as_one_at_rest(velocity, turning):
     """Sensors come towards the wave while it passes them: for rest, directions would be off by v/c times a tangent, and
-    times by what faces hear differently there, 2 ns."""
-    source, velocity, late = np.array([9.0, -5.0, -6.0]), np.array([8.0, -5.0, 1.0]), np.zeros(SMALL.count)
+    times by what faces hear differently there, 2 ns. To an array that turns the wave is bent as one from elsewhere: at
+    57 degrees a second its range is off by 8 mm of 12 m."""
+    source, velocity, late = np.array([9.0, -5.0, -6.0]), np.array(velocity), np.zeros(SMALL.count)
+    of_sensors = velocity + np.cross([0.0, 0.0, turning], SMALL.position)
     for _ in range(4):
-        moved = SMALL.position + np.outer(late, velocity)
+        moved = SMALL.position + late[:, None] * of_sensors
         late = (np.linalg.norm(source - moved, axis=1) - np.linalg.norm(source)) / C
     signals, arrival = hear_direct(replace(SMALL, position=moved), source), np.linalg.norm(source) / C + envelope_late()
-    track, survey = Track(AHEAD, AHEAD.turn_to_world(velocity)), Survey(-float(AHEAD.to_world(source)[2]), WATER)
+    turns = Circle(centre=(0.0, 0.0, -8.0), radius=2.0, speed=2.0 * turning)
+    track = Track(AHEAD, AHEAD.turn_to_world(velocity), turns)
+    survey = Survey(-float(AHEAD.to_world(source)[2]), WATER)
     receivers = (Receiver(AHEAD, SMALL, Sonar(assumed_sound_speed=C), known) for known in (track, None))
     known, taken_for_still = (SensorDelays().locate(signals, receiver, survey, 1) for receiver in receivers)
     assert np.linalg.norm(known.position[0] - source) < 1e-3
     assert abs(known.time[0] - arrival) < 5e-10
-    assert np.linalg.norm(taken_for_still.position[0] - source) > 2e-2
+    assert np.linalg.norm(taken_for_still.position[0] - source) > (2e-2 if velocity.any() else 2e-3)
+    ranges = (estimates.range_from_curvature[0] for estimates in (known, taken_for_still))
+    off, off_for_still = (abs(r - np.linalg.norm(source)) for r in ranges)
+    assert off < 1e-4 and off_for_still > 5e-3
 
 
 def test_what_a_trigger_tells_is_seen_from_where_the_array_is_when_it_hears():

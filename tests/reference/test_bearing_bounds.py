@@ -74,7 +74,7 @@ def test_directions_reach_the_bound(decibels):
     errors, predicted = [], []
     for _ in range(150):
         noisy = add_noise(clean, noise, random)
-        found = fit_pulse(noisy, array, sonar, 300.0 / C, array.aperture / C + 3.2e-4, np.zeros(3), np.inf)
+        found = fit_pulse(noisy, array, sonar, 300.0 / C, array.aperture / C + 3.2e-4, np.zeros((1, 3)), np.inf)
         assert not isinstance(found, int)
         errors.append(found[0].direction[1:] - source[1:] / 300.0)
         predicted.append(found[0].time)

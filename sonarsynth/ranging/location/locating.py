@@ -104,7 +104,8 @@ def locate(
     loud = loudness(signals, live, width)
     rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
     quiet = quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
-    velocity = np.zeros(3) if receiver.track is None else receiver.track.in_own_frame[0]
+    ahead, spin = np.zeros((2, 3)) if receiver.track is None else receiver.track.in_own_frame
+    velocity = ahead + np.cross(spin, elements.position)
     knowledge = SonarKnowledge(
         elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, reflected, velocity
     )
@@ -178,7 +179,7 @@ def fit_pulse(
     signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats, quiet: float
 ) -> tuple[Wavefront, Pulse, Elements] | int:
     """Wavefront of the pulse about `centre` (s), the pulse as measured last, and the sensors where they hear it; or why
-    it is refused, of REASONS. velocity (xyz): of the array, m/s, sonar frame; quiet as `SonarKnowledge` has it.
+    it is refused, of REASONS. velocity (sensor, xyz): m/s, sonar frame; quiet as `SonarKnowledge` has it.
 
     Envelope peaks of the sensors give eq. 6 in closed form, then the sphere, robustly; then the sensors are aligned
     and their lags measured coherently, until these settle.
@@ -189,7 +190,7 @@ def fit_pulse(
     c, q, rest, aligned, longer, (wave, off) = sonar.assumed_sound_speed, elements.position, elements, None, 1.0, first
     for _ in range(ROUNDS):
         if velocity.any():
-            q = rest.position + np.outer(_times(wave, q, c) - wave.time, velocity)
+            q = rest.position + (_times(wave, q, c) - wave.time)[:, None] * velocity
             elements = replace(rest, position=q)
         expected = _times(wave, q, c)
         aside = ASIDE * longer * pulse_times.half_length(sonar.band)
@@ -235,7 +236,7 @@ def _first_wave(
     off = 1.4826 * float(np.median(np.abs(wave.residual[live]))) * float(np.sqrt(4.0 / np.count_nonzero(live)))
     if velocity.any():
         passing = _times(wave, q, c)
-        wave = fit_wave(passing, q + np.outer(passing - wave.time, velocity), c, loud, wave)
+        wave = fit_wave(passing, q + (passing - wave.time)[:, None] * velocity, c, loud, wave)
     return None if wave is None else (wave, off)
 
 

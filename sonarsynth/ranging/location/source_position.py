@@ -78,7 +78,7 @@ class SonarKnowledge:
     on_bottom: bool = True  # whether sources may be taken to be on the bottom, where the wavefront agrees
     kink: float = 0.0  # 1/s: change of the gradient of the sound speed over the array
     reflected: bool = False  # whether sources are heard with their reflections at surface and bottom
-    velocity: Floats = field(default_factory=lambda: np.zeros(3))  # (xyz) m/s of the array, sonar frame
+    velocity: Floats = field(default_factory=lambda: np.zeros((1, 3)))  # (sensor, xyz) m/s, sonar frame
 
 
 @dataclass(frozen=True, eq=False)
