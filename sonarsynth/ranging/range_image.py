@@ -33,7 +33,8 @@ def range_image(received: ReceivedWindow, ranges: Floats, track: Track | None) -
     echoes, window = echo_filter(received), received.beams.snapshots
     first = window.start - float(found.time[0])
     if track is not None and not track.still:
-        velocity, spin = track.in_own_frame
+        between = 0.5 * (float(found.time[0]) + window.start + 0.5 * window.duration)
+        velocity, spin = track.later(between).in_own_frame
         drift = -(velocity + np.cross(spin, found.position[0]))
     for elevation in image.elevation:
         beams = direction(image.azimuth, np.full(len(image.azimuth), elevation))

@@ -54,7 +54,7 @@ def test_points_of_a_moving_hull_fall_together_on_it(crossing: Path) -> None:
 
 
 SWIMMING = """
-title: A ball that darts past a crate that swings, before a sonar that turns as it goes
+title: A ball that circles before a crate that swings, before a sonar that turns as it goes
 seed: 3
 scene:
   world:
@@ -62,7 +62,7 @@ scene:
     targets:
       - name: ball
         shape: {kind: sphere, radius: 0.4 m, edge: 8 cm}
-        motion: {kind: course, start: [14, 1, -5], heading: 140 deg, speed: 6 m/s}
+        motion: {kind: circle, centre: [14, 0, -5], radius: 1.5 m, speed: 6 m/s}
       - name: crate
         shape: {kind: box, size: [1.2 m, 0.6 m, 0.5 m], edge: 8 cm}
         motion: {kind: hover, position: [17, -3, -6], heading: 40 deg, pitch: 20 deg, yaw: 60 deg, period: 2 s}
@@ -72,14 +72,15 @@ scene:
     assumed_sound_speed: 1530 m/s
     beams: {azimuth_span: 40 deg, azimuths: 41, elevation_span: 30 deg, elevations: 31}
   trajectory:
-    frames: 4
+    frames: 16
     interval: 0.3 s
     sonar: {kind: hover, position: [0, 0, -6], heading: 90 deg, surge: 1 m, yaw: 20 deg, period: 4 s}
 """
 
 
 def test_points_are_on_hulls_that_move_and_turn_before_a_sonar_that_does(tmp_path: Path) -> None:
-    """In the frame of each target, and as far from its sphere or box as their labels say; in the world as well."""
+    """In the frame of each target, and as far from its sphere or box as their labels say; in the world as well. Points
+    of a ball are as far as its facets glint beside each other, at rest as well; of a crate that was 8 mm, rms."""
     path = tmp_path / "s.zarr"
     assert schedule.build(loads(SWIMMING), path, workers=0, products="cloud").ok
     tree = ss.open(path)
@@ -91,7 +92,8 @@ def test_points_are_on_hulls_that_move_and_turn_before_a_sonar_that_does(tmp_pat
         beyond = np.abs(place) - [0.6, 0.3, 0.25]
         boxed = np.linalg.norm(np.maximum(beyond, 0.0), axis=1) - np.minimum(beyond.max(axis=1), 0.0)
         apart = boxed if number else np.abs(np.linalg.norm(place, axis=1) - 0.4)
-        assert own.sum() > 2 and np.median(apart) < 0.01
+        assert own.sum() > 10 and np.median(apart) < (0.003 if number else 0.01)
+        assert np.sqrt(np.mean(apart**2)) < (0.005 if number else 0.02)
         np.testing.assert_allclose(cloud["distance"].values[own], apart, atol=4e-3)  # a mesh is inside its sphere
         met = tree["truth/targets/position_at_echo"].values[frame, 0, number]
         np.testing.assert_allclose(

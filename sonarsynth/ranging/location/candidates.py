@@ -12,7 +12,7 @@ bottom. A pulse that satisfies all of this may be an echo, and is refused.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from scipy.ndimage import uniform_filter1d
 
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.geometry import Pose
+from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Signals
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location.source_position import (
@@ -78,6 +79,15 @@ def loudness(signals: Signals, live: Bools, length: int) -> PowerTrack:
 def quiet_bin(quiet: float, live: int, band: Band, half: float) -> float:
     """Mean power in a bin, (Pa s)^2, of noise at a sensor, at most: `quiet` (Pa2) of `live` sensors, in the band."""
     return quiet / max(live, 1) * half / (band.high - band.low)
+
+
+def when_heard(knowledge: SonarKnowledge, track: Track | None, time: float) -> SonarKnowledge:
+    """Where an array on a track is when it hears a pulse at a time (s) of the frame, and how fast its sensors go."""
+    if track is None or track.still:
+        return knowledge
+    then = track.later(time)
+    ahead, spin = then.in_own_frame
+    return replace(knowledge, pose=then.pose, velocity=ahead + np.cross(spin, knowledge.elements.position))
 
 
 class Candidate(NamedTuple):

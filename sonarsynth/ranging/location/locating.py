@@ -12,7 +12,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, robust_wave, spherical_wave, wavefront_delays
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.location.candidates import QUIET, Candidate, Candidates, loudness, quiet_bin
+from sonarsynth.ranging.location.candidates import QUIET, Candidate, Candidates, loudness, quiet_bin, when_heard
 from sonarsynth.ranging.location.pulse_times import AlignedPulse, Pulse
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
@@ -104,10 +104,8 @@ def locate(
     loud = loudness(signals, live, width)
     rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
     quiet = quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
-    ahead, spin = np.zeros((2, 3)) if receiver.track is None else receiver.track.in_own_frame
-    velocity = ahead + np.cross(spin, elements.position)
     knowledge = SonarKnowledge(
-        elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, reflected, velocity
+        elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, reflected
     )
     track, candidates = loud.track.copy(), Candidates(knowledge)
     for _ in range(4 * snaps):
@@ -115,7 +113,8 @@ def locate(
         if top is None or not track[top] > QUIET * loud.quiet:
             break
         centre = signals.start + top / signals.sampling_frequency
-        candidates.found.append(Candidate(centre, float(track[top]), candidate(signals, knowledge, centre, half, bend)))
+        row = candidate(signals, when_heard(knowledge, receiver.track, centre), centre, half, bend)
+        candidates.found.append(Candidate(centre, float(track[top]), row))
         track[max(top - width, 0) : top + width + 1] = 0.0
     return as_estimates(candidates.rows, snaps)
 
