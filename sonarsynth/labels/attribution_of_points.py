@@ -19,7 +19,7 @@ import numpy.typing as npt
 from sonarsynth.conventions import NO_TARGET, Bools, Complexes, Floats, Ints
 from sonarsynth.equations.arrays.apertures import live_gain
 from sonarsynth.equations.scattering.facet_pulses import facet_response
-from sonarsynth.geometry import Pose
+from sonarsynth.geometry.motion import Track
 from sonarsynth.labels import point_kernels as kernels
 from sonarsynth.labels.level_band import Band
 from sonarsynth.products import FAMILIES, Arrivals, Kind
@@ -50,9 +50,7 @@ class SonarTiming:
     sound_speed: float  # m/s that beams are steered by
     focus: float | None  # m
     clock: float  # s: when the direct pulse that delays are counted from is loudest
-    pose: Pose
-    velocity: Floats  # (xyz) m/s of the array, world
-    spin: Floats  # (xyz) rad/s of the array, world
+    track: Track  # of the array
     late: Floats  # (snap,) s: when its pulse is loudest, after the time that delays of paths count from
 
 

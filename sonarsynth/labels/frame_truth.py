@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.geometry import Pose
+from sonarsynth.geometry import Pose, quaternion_product
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.oriented_box import oriented_box
@@ -19,6 +19,10 @@ from sonarsynth.products import Truth, View
 from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import BeamGrid
 from sonarsynth.state import FrameContext, meeting_times, positions
+
+BRIEF = 1e-6
+"""s: from the instant of a frame, in which nothing moves or turns."""
+TINY = 1e-300
 
 
 def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -> Truth:
@@ -43,6 +47,7 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
         partial(_straight_times, 1.0 / medium.profile.speed[0]) if straight_lines else partial(_direct_times, connect)
     )
     met = meeting_times(tracks, context.snaps, travel)
+    way, turn = _mean_motion(context, met, snap_level)
     lit = [
         [lit_fraction(b, a.visible, bodies, snap, medium, bent) for b, a in zip(bodies, appearances, strict=True)]
         for snap in context.snaps
@@ -50,8 +55,8 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     return Truth(
         sonar_position=sonar_pose.position,
         sonar_orientation=sonar_pose.orientation,
-        sonar_velocity=np.zeros(3) if sonar_track is None else sonar_track.velocity,
-        sonar_spin=np.zeros(3) if sonar_track is None else sonar_track.spin,
+        sonar_velocity=way,
+        sonar_spin=turn,
         target_position=_rows([b.pose.position for b in bodies], 3),
         target_orientation=_rows([b.pose.orientation for b in bodies], 4),
         target_velocity=_rows([b.velocity for b in bodies], 3),
@@ -131,6 +136,29 @@ def _orientations(tracks: list[Track], times: Floats) -> Floats:
     for snap, number in np.argwhere(np.isfinite(times)).tolist():
         orientations[snap, number] = tracks[number].later(float(times[snap, number])).pose.orientation
     return orientations
+
+
+def _mean_motion(context: FrameContext, met: Floats, snap_level: Floats) -> tuple[Floats, Floats]:
+    """Velocity (xyz) m/s and spin (xyz) rad/s, world, that bring the array from the instant of the frame to where it is
+    when it hears echoes; met: (snap, target) s when sound meets targets, snap_level: (snap,) dB.
+
+    Of the loudest snap that lights targets, in the mean over these; those of the instant where none does.
+    """
+    track, lights = context.receiver.track, [n for n, snap in enumerate(context.snaps) if snap.illuminates]
+    lights = [n for n in lights if np.isfinite(met[n]).any()]
+    if track is None or track.straight or not lights:
+        return (np.zeros(3), np.zeros(3)) if track is None else (track.velocity, track.spin)
+    first = max(lights, key=lambda n: float(snap_level[n]))
+    away = np.linalg.norm(positions([body.track for body in context.bodies], met[first]) - track.pose.position, axis=1)
+    heard = float(np.nanmean(met[first] + away / context.receiver.speed(context.medium)))
+    if abs(heard) < BRIEF:
+        return track.velocity, track.spin
+    then, (w, *back) = track.later(heard).pose, track.pose.orientation
+    turn = quaternion_product(then.orientation, np.array([w, *np.negative(back)]))
+    turn *= np.copysign(1.0, turn[0])
+    sine = float(np.linalg.norm(turn[1:]))
+    rate = 2.0 * float(np.arctan2(sine, turn[0])) / max(sine, TINY) / heard
+    return (then.position - track.pose.position) / heard, rate * turn[1:]
 
 
 def _rows(rows: list[Floats], width: int) -> Floats:

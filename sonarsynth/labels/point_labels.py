@@ -126,10 +126,12 @@ def _from_targets(
         heard, met = kernels.means(*shares, times).T
         placed = moment.bodies[number].later(float(met.mean()))
         spots = placed.pose.to_world(placed.mesh.centroid[np.where(target == number, facet, 0)])
-        spots += np.outer(times[:, 1] - met.mean(), placed.velocity) - np.outer(delay, listening.velocity)
-        away = np.linalg.norm(spots - listening.pose.position, axis=1)
+        middle = float(heard.mean())
+        sonar = listening.track.later(middle)
+        spots += np.outer(times[:, 1] - met.mean(), placed.velocity) - np.outer(delay - middle, sonar.velocity)
+        away = np.linalg.norm(spots - sonar.pose.position, axis=1)
         ranges[at] = kernels.means(*shares, away[:, None])[:, 0]
-        array = listening.pose.position + np.outer(heard, listening.velocity)
-        place = array + turned(listening.pose.turn_to_world(places[at]), listening.spin, heard)
+        array = sonar.pose.position + np.outer(heard - middle, sonar.velocity)
+        place = array + turned(sonar.pose.turn_to_world(places[at]), sonar.spin, heard - middle)
         distance[at] = surface_distances(placed, place - np.outer(met - met.mean(), placed.velocity))
     return ranges, distance

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.geometry.motion import Track
 from sonarsynth.labels import SLICES, Band, SonarTiming, label_points
 from sonarsynth.pipeline.stored_values import Values, of_isolated, sensor_values, table
 from sonarsynth.pipeline.synthesis import errors_of, known_elements
@@ -66,9 +67,7 @@ def point_labels(
         sonar.assumed_sound_speed,
         plan.choices.beamforming.focus,
         float(estimates.time[0]) if len(estimates.time) else np.nan,
-        frame.sonar_pose,
-        frame.sonar_velocity * moves,
-        frame.sonar_track.spin * moves,
+        frame.sonar_track if moves else Track(frame.sonar_pose, np.zeros(3)),
         np.array([lateness(snap.waveform, sonar) for snap in frame.moment.snaps]),
     )
     return label_points(cloud, arrivals, band, moment, listening, scattered)

@@ -64,7 +64,7 @@ class Truth:
 
     sonar_position: Floats  # (xyz) m, world
     sonar_orientation: Floats  # (wxyz)
-    sonar_velocity: Floats  # (xyz) m/s, world: while sound is under way
+    sonar_velocity: Floats  # (xyz) m/s, world: mean until echoes of the loudest snap are heard
     sonar_spin: Floats  # (xyz) rad/s, world: the same of its angular velocity
     target_position: Floats  # (target, xyz) m, world
     target_orientation: Floats  # (target, wxyz)

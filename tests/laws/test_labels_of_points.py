@@ -56,10 +56,9 @@ def made(recipe: Recipe, focus: float | None = 20.0, snap: int = 0) -> Made:
     traced = trace_frame(resolved, 0)
     arrivals, sonar = traced.arrivals, resolved.scene.sonar
     clock = arrivals.delay[arrivals.direct & (arrivals.snap == snap)].min()
-    pose, velocity = traced.frame.sonar_pose, traced.frame.sonar_velocity
     late = np.zeros(len(traced.frame.moment.snaps))  # the clock is that of their time 0
     listening = SonarTiming(
-        resolved.elements, sonar.assumed_sound_speed, focus, float(clock), pose, velocity, np.zeros(3), late
+        resolved.elements, sonar.assumed_sound_speed, focus, float(clock), traced.frame.sonar_track, late
     )
     return Made(resolved, traced.frame, arrivals, band_of(resolved, traced.frame.moment.snaps), listening)
 

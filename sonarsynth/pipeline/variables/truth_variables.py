@@ -16,15 +16,14 @@ from sonarsynth.pipeline.variables.variable import (
 )
 from sonarsynth.receiver.sensor_errors import SensorState
 
+_MEAN = "mean from the instant of the frame until it hears echoes of the loudest snap"
 _SONAR = group_of(
     "/truth",
     "truth",
     row("sonar_position", ("frame", "xyz"), "m", "position of the array centre in the world"),
     row("sonar_orientation", ("frame", "wxyz"), "1", "unit quaternion from the sonar frame to the world"),
-    row("sonar_velocity", ("frame", "xyz"), "m s-1", "velocity of the array in the world while sound is under way"),
-    row(
-        "sonar_spin", ("frame", "xyz"), "rad s-1", "angular velocity of the array in the world while sound is under way"
-    ),
+    row("sonar_velocity", ("frame", "xyz"), "m s-1", f"velocity of the array in the world, {_MEAN}"),
+    row("sonar_spin", ("frame", "xyz"), "rad s-1", f"angular velocity of the array in the world, {_MEAN}"),
 )
 _EMISSIONS = group_of(
     "/truth/emissions",

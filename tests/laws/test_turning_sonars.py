@@ -1,0 +1,125 @@
+"""Sonars that turn and swing: where they locate a snap and see a point, against times solved on the moving world."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sonarsynth as ss
+from sonarsynth import schedule
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import Pose, unit
+from sonarsynth.geometry.motion import Circle, Hover, Line, Motion, Still, pose
+from sonarsynth.pipeline import beamform_frame, cloud_of, trace_at
+from sonarsynth.planning import Plan, plan
+from sonarsynth.products import PointCloud
+from sonarsynth.recipe import Recipe
+from sonarsynth.recipe.reading import loads
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.sources.shrimp import SnappingShrimp
+from tests.scenes import point_scene
+
+SNAP, TARGET, C = (10.0, 3.0, -55.0), (16.0, 1.0, -51.0), 1500.0
+TURNS = Circle(centre=(0.0, -2.0, -50.0), radius=2.0, speed=-2.0, bearing=0.0)
+SWINGS = Hover(position=(0.0, 0.0, -50.0), heading=np.deg2rad(75), surge=1.0, yaw=np.deg2rad(20), period=4.0)
+SWIMS = Line(start=TARGET, stop=(17.0, 7.0, -51.0), duration=1.1)
+
+
+def scene(sonar: Motion, target: Motion, snap_time: float) -> Recipe:
+    """A point, and a snap so long (s) after the instant of the frame."""
+    recipe = point_scene(TARGET, SNAP, sound_speed_error=0.0)
+    world, trajectory = recipe.scene.world, replace(recipe.scene.trajectory, sonar=sonar)
+    points = (replace(world.targets[0], motion=target),)
+    world = replace(world, targets=points, sources=(SnappingShrimp(position=SNAP, snap_times=(snap_time,)),))
+    return replace(recipe, scene=replace(recipe.scene, world=world, trajectory=trajectory))
+
+
+def heard(motion: Motion, place: Floats, sent: float, speed: float = C) -> float:
+    """When (s) what is on a track hears, or is met by, what is sent from a place at a time."""
+    at = sent
+    for _ in range(40):
+        at = sent + float(np.linalg.norm(pose(motion, at).position - place)) / speed
+    return at
+
+
+@pytest.mark.parametrize(
+    ("sonar", "target", "snap_time"),
+    [(TURNS, Still(position=TARGET), 0.0), (TURNS, SWIMS, 0.0), (SWINGS, SWIMS, 0.0), (SWINGS, SWIMS, 0.1)],
+    ids=["turns", "all", "swings", "swings, late"],
+)  # fmt: skip
+def test_points_are_where_a_sonar_hears_them_that_turns_and_swings(
+    tmp_path: Path, sonar: Motion, target: Motion, snap_time: float
+) -> None:
+    """At 57 degrees a second sources were 16 mm off and points 13 mm; of a sonar that swings, whose snap comes 0.1 s
+    after the instant of the frame, points were 10 cm off in the world, and as much from the hull by their labels."""
+    path = tmp_path / "s.zarr"
+    assert schedule.build(scene(sonar, target, snap_time), path, workers=0, products="cloud").ok
+    tree = ss.open(path)
+    direct, met = heard(sonar, np.array(SNAP), snap_time), heard(target, np.array(SNAP), snap_time)
+    place = pose(target, met).position
+    echo = heard(sonar, place, met)
+    source = tree["source_estimates/position"].values[0, 0]
+    np.testing.assert_allclose(source, pose(sonar, direct).to_body(SNAP), rtol=0, atol=1e-4)
+    cloud: Any = tree["cloud"].isel(frame=0).dataset
+    assert int(cloud["count"]) == 1
+    own, there = np.array([float(cloud[axis][0]) for axis in "xyz"]), pose(sonar, echo)
+    assert float(cloud["range"][0]) == pytest.approx(np.linalg.norm(place - there.position), abs=3e-3)
+    assert float(cloud["true_range"][0]) == pytest.approx(np.linalg.norm(place - there.position), abs=1.2e-3)
+    for to, origin in (("world", Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))), ("point", pose(target, met))):
+        found = ss.points(tree, relative_to=to)["position"].values[0]
+        np.testing.assert_allclose(found, origin.to_body(there.to_world(own)), rtol=0, atol=1e-3)
+    off = float(np.linalg.norm(there.to_world(own) - place))
+    assert float(cloud["distance"][0]) == pytest.approx(off, abs=2e-3)
+
+
+CIRCLING = """
+scene:
+  world:
+    environment: {depth: 12 m, sound_speed: {kind: isovelocity, speed: 1530 m/s}}
+    targets:
+      - name: ball
+        shape: {kind: sphere, radius: 0.4 m, edge: 8 cm}
+        motion: {kind: circle, centre: [14, 0, -5], radius: 1.5 m, speed: 6 m/s}
+    sources: [{kind: snapping_shrimp, position: [12, -6], source_level: 188 dB}]
+  sonar:
+    array: {kind: planar_lattice, columns: 16, rows: 12, pitch: 4 cm}
+    assumed_sound_speed: 1530 m/s
+    beams: {azimuth_span: 40 deg, azimuths: 41, elevation_span: 30 deg, elevations: 31}
+  trajectory:
+    frames: 10
+    interval: 0.31 s
+    sonar: {kind: hover, position: [0, 0, -6], heading: 90 deg, surge: 1 m, yaw: 20 deg, period: 4 s}
+"""
+
+
+def cloud(made: Plan, frame: Frame) -> PointCloud:
+    return cloud_of(made, frame, beamform_frame(made, frame.index, trace_at(made, frame)))
+
+
+def test_points_of_a_ball_that_moves_are_those_of_one_at_rest_where_sound_meets_it() -> None:
+    """Seen by a sonar at rest where it hears that: which of its facets glint, and so where on it points are, by up to
+    2 cm, is the same. Ranges were 6 mm off."""
+    made, off = plan(loads(CIRCLING), ["cloud"]), list[list[float]]()
+    for index in range(10):
+        frame = made.frame(index)
+        (ball,), (snap,), sonar = frame.moment.bodies, frame.moment.snaps, made.scene.trajectory.sonar
+        motion, nearest = ball.motion, ball.pose.position
+        for _ in range(8):  # the point of it where the path is shortest
+            met = frame.time + snap.time + float(np.linalg.norm(nearest - snap.position)) / 1530.0
+            echo = heard(sonar, nearest, met, 1530.0)
+            middle, there = pose(motion, met), pose(sonar, echo)
+            to_both = unit(snap.position - middle.position) + unit(there.position - middle.position)
+            nearest = middle.position + 0.4 * unit(to_both)
+        at_rest = replace(frame.moment, bodies=(replace(ball.frozen, pose=middle),))
+        still = replace(frame, sonar_pose=there, sonar_velocity=np.zeros(3), sonar_motion=None, moment=at_rest)
+        found, wanted = cloud(made, frame), cloud(made, still)
+        apart = np.linalg.norm(found.position[:, None] - wanted.position, axis=2)
+        for n, m in zip(*np.nonzero(apart < 0.1), strict=True):
+            beside = found.range[n] * (found.azimuth[n] - wanted.azimuth[m])
+            off.append([found.range[n] - wanted.range[m], float(beside)])
+    assert len(off) > 6
+    assert (np.median(np.abs(off), axis=0) < 2e-3).all() and np.abs(np.median(off, axis=0)).max() < 1.5e-3
