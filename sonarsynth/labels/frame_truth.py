@@ -8,21 +8,18 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.geometry import Pose, quaternion_product
+from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.oriented_box import oriented_box
 from sonarsynth.labels.views.appearance import Appearance, Connect, appearance, lit_fraction
 from sonarsynth.labels.views.beam_cells import beam_views
 from sonarsynth.labels.views.box_in_view import box_in_view, pixel_box, truncation
+from sonarsynth.labels.views.hearing import as_heard, hearing, mean_motion
 from sonarsynth.products import Truth, View
 from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import BeamGrid
 from sonarsynth.state import FrameContext, meeting_times, positions
-
-BRIEF = 1e-6
-"""s: from the instant of a frame, in which nothing moves or turns."""
-TINY = 1e-300
 
 
 def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -> Truth:
@@ -31,23 +28,26 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     A beam's label is the first surface that a ray launched from the array centre in the beam's direction meets; its
     range is the distance of that point from the array centre. `label` traces the bent ray by a straight one to the
     bodies as they appear: each vertex moved to (its arrival direction) * (its distance); of straight rays, where it is.
-    A target's `image_box` bounds what the array sees of it within the spans of the beams; NaN where that is nothing,
-    and `view` says why (`views.View`).
+    Boxes and beams are of the sonar's frame as the array hears: of bodies where sound met them, from where it hears
+    that (`hearing`). A target's `image_box` bounds what the array sees of it within the spans of the beams; NaN where
+    that is nothing, and `view` says why (`views.View`).
     """
     bodies, sonar_pose, beams = context.bodies, context.receiver.pose, context.receiver.sonar.beams
     medium, sonar_track = context.medium, context.receiver.track
     connect = partial(propagation.direct.connect, medium.profile, medium.depth)
     bent = connect if propagation.bends else None
-    appearances = [appearance(body, bodies, sonar_pose, bent) for body in bodies]
-    seen = [(a.corners, b.mesh.faces, a.boxes, a.full_box) for b, a in zip(bodies, appearances, strict=True)]
-    nearest = beam_views(seen, beams)
     tracks = [body.track if sonar_track else body.frozen.track for body in bodies]
     straight_lines = medium.profile.uniform and propagation.straight(medium.profile)
     travel = (
         partial(_straight_times, 1.0 / medium.profile.speed[0]) if straight_lines else partial(_direct_times, connect)
     )
     met = meeting_times(tracks, context.snaps, travel)
-    way, turn = _mean_motion(context, met, snap_level)
+    when = hearing(context, met, snap_level)
+    heard = as_heard(bodies, when)
+    appearances = [appearance(body, heard, sonar_pose, bent) for body in heard]
+    seen = [(a.corners, b.mesh.faces, a.boxes, a.full_box) for b, a in zip(heard, appearances, strict=True)]
+    nearest = beam_views(seen, beams)
+    way, turn = mean_motion(sonar_track, when)
     lit = [
         [lit_fraction(b, a.visible, bodies, snap, medium, bent) for b, a in zip(bodies, appearances, strict=True)]
         for snap in context.snaps
@@ -63,8 +63,8 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
         meeting_time=met,
         position_at_echo=positions(tracks, met),
         orientation_at_echo=_orientations(tracks, met),
-        **_oriented(bodies, sonar_pose),
-        **_boxes(bodies, appearances, sonar_pose, beams),
+        **_oriented(heard, sonar_pose),
+        **_boxes(heard, appearances, sonar_pose, beams),
         visible_fraction=np.array([a.fraction for a in appearances]),
         lit_fraction=np.array(lit, float).reshape(len(context.snaps), len(bodies)),
         snap_position=_rows([s.position for s in context.snaps], 3),
@@ -136,29 +136,6 @@ def _orientations(tracks: list[Track], times: Floats) -> Floats:
     for snap, number in np.argwhere(np.isfinite(times)).tolist():
         orientations[snap, number] = tracks[number].later(float(times[snap, number])).pose.orientation
     return orientations
-
-
-def _mean_motion(context: FrameContext, met: Floats, snap_level: Floats) -> tuple[Floats, Floats]:
-    """Velocity (xyz) m/s and spin (xyz) rad/s, world, that bring the array from the instant of the frame to where it is
-    when it hears echoes; met: (snap, target) s when sound meets targets, snap_level: (snap,) dB.
-
-    Of the loudest snap that lights targets, in the mean over these; those of the instant where none does.
-    """
-    track, lights = context.receiver.track, [n for n, snap in enumerate(context.snaps) if snap.illuminates]
-    lights = [n for n in lights if np.isfinite(met[n]).any()]
-    if track is None or track.straight or not lights:
-        return (np.zeros(3), np.zeros(3)) if track is None else (track.velocity, track.spin)
-    first = max(lights, key=lambda n: float(snap_level[n]))
-    away = np.linalg.norm(positions([body.track for body in context.bodies], met[first]) - track.pose.position, axis=1)
-    heard = float(np.nanmean(met[first] + away / context.receiver.speed(context.medium)))
-    if abs(heard) < BRIEF:
-        return track.velocity, track.spin
-    then, (w, *back) = track.later(heard).pose, track.pose.orientation
-    turn = quaternion_product(then.orientation, np.array([w, *np.negative(back)]))
-    turn *= np.copysign(1.0, turn[0])
-    sine = float(np.linalg.norm(turn[1:]))
-    rate = 2.0 * float(np.arctan2(sine, turn[0])) / max(sine, TINY) / heard
-    return (then.position - track.pose.position) / heard, rate * turn[1:]
 
 
 def _rows(rows: list[Floats], width: int) -> Floats:

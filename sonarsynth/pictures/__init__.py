@@ -110,11 +110,11 @@ def earlier_points(frames: list[StoredFrame]) -> Iterator[Floats]:
     earlier: dict[int, list[Floats]] = {}
     for frame in frames:
         poses = {t: pose for t, pose in enumerate(frame.poses) if np.isfinite(pose.position).all()}
-        carried = [frame.sonar.to_body(poses[t].to_world(np.concatenate(earlier[t]))) for t in earlier if t in poses]
+        carried = [poses[t].to_world(np.concatenate(earlier[t])) for t in earlier if t in poses]
         yield np.concatenate([np.zeros((0, 3)), *carried])
         for t, pose in poses.items():
             if (own := (frame.point_target == t) & np.isfinite(frame.range_error)).any():
-                earlier.setdefault(t, []).append(pose.to_body(frame.sonar.to_world(frame.points[own])))
+                earlier.setdefault(t, []).append(pose.to_body(frame.points[own]))
 
 
 def _interest(frame: StoredFrame) -> tuple[int, int]:

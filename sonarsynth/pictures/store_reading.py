@@ -101,7 +101,7 @@ class StoredFrame:
     target: np.ndarray  # (elevation, azimuth) true target; -1 for none
     true_range: Floats  # (elevation, azimuth) m
     snap: Floats  # (snap, xyz) m, true positions
-    poses: tuple[Pose, ...]  # of the targets in the world; NaN of one that is not there
+    poses: tuple[Pose, ...]  # of the boxes of targets in the sonar's frame; NaN of one that is not there
     hulls: tuple[Hull, ...]
     ghosts: tuple[Ghost, ...]
     lobes: tuple[Floats, ...]  # (frequency, azimuth and elevation) deg: grating lobes over the band
@@ -156,11 +156,11 @@ def _sonar(tree: xr.DataTree, index: int) -> Pose:
 
 
 def _poses(tree: xr.DataTree, index: int) -> tuple[Pose, ...]:
-    """The poses of the targets; none in a store without."""
-    position, orientation = (read(tree, f"truth/targets/{name}", index) for name in ("position", "orientation"))
-    if position is None or orientation is None:
+    """The poses of the boxes of targets, as the array hears them, in the sonar's frame; none in a store without."""
+    centre, orientation = (read(tree, f"truth/targets/box_{name}", index) for name in ("centre", "orientation"))
+    if centre is None or orientation is None:
         return ()
-    return tuple(Pose(*pose) for pose in zip(position, orientation, strict=True))
+    return tuple(Pose(*pose) for pose in zip(centre, orientation, strict=True))
 
 
 def echo_levels(tree: xr.DataTree, frame: int) -> tuple[Floats, list[str]] | None:
@@ -239,20 +239,17 @@ def mesh_group(tree: xr.DataTree, target: int, index: int) -> str:
 
 
 def hulls(tree: xr.DataTree, index: int) -> tuple[Hull, ...]:
-    """The targets of a frame where they truly are; none of a frame that was not built."""
-    sonar = _sonar(tree, index)
-    names = read(tree, "truth/targets/target")
-    if names is None or not np.isfinite(sonar.position).all():
+    """The targets of a frame where they truly are when they are heard; none of a frame that was not built."""
+    names, poses = read(tree, "truth/targets/target"), _poses(tree, index)
+    if names is None or not poses:
         return ()
-    placed = (needed(tree, f"truth/targets/{name}", index) for name in ("position", "orientation", "scale"))
-    position, orientation, scale = placed
-    bodies = []
+    scale, bodies = needed(tree, "truth/targets/scale", index), []
     for i, name in enumerate(map(str, names)):
-        if not np.isfinite(position[i]).all():  # not in this sequence
+        if not np.isfinite(poses[i].position).all():  # not in this sequence
             continue
         group = mesh_group(tree, i, index)
         vertices, faces = read(tree, f"{group}/vertices"), read(tree, f"{group}/faces")
         if vertices is not None and faces is not None:
-            points = sonar.to_body(Pose(position[i], orientation[i]).to_world(scale[i] * vertices))
-            bodies.append(Hull(name, points, faces.astype(np.int64)))
+            middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+            bodies.append(Hull(name, poses[i].to_world(scale[i] * (vertices - middle)), faces.astype(np.int64)))
     return tuple(bodies)

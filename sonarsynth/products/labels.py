@@ -57,9 +57,9 @@ class PointLabels:
 class Truth:
     """Exact ground truth of a frame, from the same arrivals that made the signals.
 
-    Poses, boxes and beams are those of the frame's instant. What is heard is of when the sound met the target: where it
-    was then, and how it lay, is `position_at_echo` and `orientation_at_echo`, which echoes, images and points are to be
-    judged by; and of where the array was when it heard it.
+    Poses in the world are those of the frame's instant. What is heard is of when the sound met the target: where it was
+    then, and how it lay, is `position_at_echo` and `orientation_at_echo`. Boxes and beams, in the sonar's frame, are of
+    that too, and of where the array was when it heard it.
     """
 
     sonar_position: Floats  # (xyz) m, world

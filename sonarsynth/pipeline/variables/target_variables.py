@@ -7,9 +7,14 @@ from sonarsynth.products import VIEWS, View
 
 INSTANT = comment("at the instant of the frame; what is heard is of when sound met the target: position_at_echo")
 """Of what is where it is then."""
+HEARD = comment(
+    "as the array hears the loudest snap that lights a target: where its sound met the target, from where the array is "
+    "when it hears that; at the instant of the frame where it hears none"
+)
+"""Of what is in the sonar's frame."""
 _MEETING = comment(
-    "what echoes, images and points show is where the sound met the target; poses, boxes and beams of the truth are "
-    "those of the instant of the frame. Sound by surface or bottom meets it later. NaN where no direct path leads to it"
+    "where the sound met the target is what echoes, images and points show; other poses are those of the instant of "
+    "the frame. Sound by surface or bottom meets it later. NaN where no direct path leads to it"
 )
 _YES = (("flag_values", [0, 1]), ("flag_meanings", "no yes"))
 TARGETS = group_of(
@@ -63,9 +68,7 @@ TARGETS = group_of(
         attributes=INSTANT,
     ),
     row("velocity", (*TARGET, "xyz"), "m s-1", "velocity of the target in the world"),
-    row(
-        "box", (*TARGET, "corner", "xyz"), "m", "corners of the oriented bounding box, sonar frame", attributes=INSTANT
-    ),
+    row("box", (*TARGET, "corner", "xyz"), "m", "corners of the oriented bounding box, sonar frame", attributes=HEARD),
     row(
         "box_centre",
         (*TARGET, "xyz"),
@@ -91,10 +94,10 @@ TARGETS = group_of(
         "image_box",
         (*TARGET, "bound"),
         "degree",
-        "bounds in azimuth and elevation of the visible part in view, at the instant of the frame",
+        "bounds in azimuth and elevation of the visible part in view",
         attributes=comment(
-            "where the array sees it, rays bent; cut at the first and last beam each way; NaN where nothing is in "
-            "view, see view"
+            "where the array sees it when it hears it, rays bent; cut at the first and last beam each way; NaN "
+            "where nothing is in view, see view"
         ),
     ),
     row(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sonarsynth.pipeline.variables.target_variables import INSTANT, SIGNAL_TO_NOISE, TARGETS
+from sonarsynth.pipeline.variables.target_variables import HEARD, SIGNAL_TO_NOISE, TARGETS
 from sonarsynth.pipeline.variables.variable import (
     BEAMS,
     CELL,
@@ -53,15 +53,15 @@ _EMISSIONS = group_of(
 _BEAMS = group_of(
     "/truth/beams",
     "truth",
-    row("target", BEAMS, "1", "target that the beam points at", dtype="int16", attributes=(*NONE, *INSTANT)),
-    row("facet", BEAMS, "1", "facet that the beam points at", dtype="int32", attributes=(*NONE, *INSTANT)),
+    row("target", BEAMS, "1", "target that the beam points at", dtype="int16", attributes=(*NONE, *HEARD)),
+    row("facet", BEAMS, "1", "facet that the beam points at", dtype="int32", attributes=(*NONE, *HEARD)),
     row(
         "range",
         BEAMS,
         "m",
         "distance to the first surface in the beam's direction",
         dtype="float32",
-        attributes=INSTANT,
+        attributes=HEARD,
     ),
     row(
         "coverage",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sonarsynth.pipeline.variables.target_variables import INSTANT
+from sonarsynth.pipeline.variables.target_variables import HEARD
 from sonarsynth.pipeline.variables.truth_variables import LEVELS, SENSORS, SOUNDSCAPE, TRUTH
 from sonarsynth.pipeline.variables.variable import (
     BEAMS,
@@ -91,7 +91,7 @@ _RANGES = group_of(
         "1",
         "target that a beam of this azimuth meets at this range",
         dtype="int16",
-        attributes=(*NONE, *INSTANT),
+        attributes=(*NONE, *HEARD),
     ),
 )
 KINDS = tuple(kind.name.lower() for kind in Kind)

@@ -1,0 +1,86 @@
+"""When the array hears each body, and the bodies as it has them then: where sound met them, from where it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import Pose, quaternion_product
+from sonarsynth.geometry.motion import Track
+from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.state import FrameContext, positions
+
+BRIEF = 1e-6
+"""s: from the instant of a frame, in which nothing moves or turns."""
+ROUNDS = 3
+"""Of solving for when the array hears: each leaves its speed over that of sound of the error."""
+TINY = 1e-300
+
+
+class Hearing(NamedTuple):
+    """Of the loudest snap that lights targets, by direct paths; in the mean of the others where one has none."""
+
+    met: Floats  # (target,) s on the clock of the frame: when its sound meets each target
+    heard: Floats  # (target,) s: when the middle of the array hears that
+    sonar: Track
+
+
+def hearing(context: FrameContext, met: Floats, snap_level: Floats) -> Hearing | None:
+    """Of a frame; None where nothing moves while sound is under way, or no snap lights a target.
+
+    met: (snap, target) s when the sound of each snap meets each target; snap_level: (snap,) dB.
+    """
+    track, lights = context.receiver.track, [n for n, snap in enumerate(context.snaps) if snap.illuminates]
+    lights = [n for n in lights if np.isfinite(met[n]).any()]
+    if track is None or not lights:
+        return None
+    times = met[max(lights, key=lambda n: float(snap_level[n]))]
+    times = np.where(np.isfinite(times), times, np.nanmean(times))
+    place, heard = positions([body.track for body in context.bodies], times), times
+    for _ in range(ROUNDS):
+        away = np.linalg.norm(place - track.positions(heard), axis=1)
+        heard = times + away / context.receiver.speed(context.medium)
+    return Hearing(times, heard, track)
+
+
+def as_heard(bodies: tuple[PlacedTarget, ...], when: Hearing | None) -> tuple[PlacedTarget, ...]:
+    """Bodies where sound met them, as far and in the direction that the array then has them, from its place at the
+    instant of the frame."""
+    if when is None:
+        return bodies
+    times = zip(when.met.tolist(), when.heard.tolist(), strict=True)
+    return tuple(_heard(body, *of, when.sonar) for body, of in zip(bodies, times, strict=True))
+
+
+def _heard(body: PlacedTarget, met: float, heard: float, sonar: Track) -> PlacedTarget:
+    placed = body.later(met)
+    if sonar.still:
+        return placed
+    then, now = sonar.later(heard).pose, sonar.pose
+    turn = quaternion_product(now.orientation, _inverse(then.orientation))
+    pose = Pose(now.to_world(then.to_body(placed.pose.position)), quaternion_product(turn, placed.pose.orientation))
+    return replace(placed, pose=pose)
+
+
+def mean_motion(sonar: Track | None, when: Hearing | None) -> tuple[Floats, Floats]:
+    """Velocity (xyz) m/s and spin (xyz) rad/s, world, that bring the array from the instant of the frame to where it is
+    when it hears echoes, in the mean over targets; those of the instant where it hears none."""
+    if sonar is None:
+        return np.zeros(3), np.zeros(3)
+    heard = 0.0 if when is None else float(when.heard.mean())
+    if sonar.straight or abs(heard) < BRIEF:
+        return sonar.velocity, sonar.spin
+    then = sonar.later(heard).pose
+    turn = quaternion_product(then.orientation, _inverse(sonar.pose.orientation))
+    turn *= np.copysign(1.0, turn[0])
+    sine = float(np.linalg.norm(turn[1:]))
+    rate = 2.0 * float(np.arctan2(sine, turn[0])) / max(sine, TINY) / heard
+    return (then.position - sonar.pose.position) / heard, rate * turn[1:]
+
+
+def _inverse(orientation: Floats) -> Floats:
+    w, *rest = orientation
+    return np.array([w, *np.negative(rest)])
