@@ -234,8 +234,7 @@ def known_elements(plan: Plan, frame: Frame) -> Elements:
 
 @lru_cache(maxsize=8)
 def _working(elements: Elements, drawn: DrawnErrors) -> Elements:
-    works = (drawn.state != SensorState.DEAD) & (drawn.state != SensorState.STUCK)
-    return elements if works.all() else replace(elements, gain=elements.gain * works)
+    return elements if drawn.works.all() else replace(elements, gain=elements.gain * drawn.works)
 
 
 def known_signals(plan: Plan, frame: Frame, signals: Signals) -> Signals:

@@ -55,6 +55,20 @@ WRONG = [
         "pitch: 5 cm, dead: [20]",
         "14: scene.sonar.array: dead: there is no hydrophone 20; they are 0 to 19",
     ),
+    ("pitch: 5 cm", f"pitch: 5 cm, dead: {list(range(20))}", "14: scene.sonar.array.dead: names every hydrophone"),
+    *(
+        (
+            "pitch: 5 cm}",
+            f"pitch: 5 cm, dead: [{own}]}}\n    converter: {{bits: 16, full_scale: 200 Pa}}"
+            f"\n    sensor_errors: {{{share}, known: {known}}}",
+            "16: scene.sonar.sensor_errors: every hydrophone is dead or stuck at frame 0",
+        )
+        for own, share, known in (
+            ("", "dead: 0.5, stuck: 0.5", "gain"),
+            ("", "stuck: 1", "all"),
+            (", ".join(str(i) for i in range(19)), "dead: 0.999", "gain"),
+        )
+    ),
     (
         "pitch: 5 cm}",
         "pitch: 5 cm}\n    assumed_sound_speed: 1 m/s",
