@@ -39,7 +39,8 @@ def run(app: typer.Typer, arguments: list[str] | None = None) -> int:
         gc.set_threshold(50_000, 20, 50)  # what libraries make when they are imported stays: a tenth of a short command
     for name in ONE_THREAD:  # work is spread over processes; read when numpy is imported
         os.environ.setdefault(name, "1")
-    before = signal.signal(signal.SIGTERM, _interrupt)
+    before, usual = signal.signal(signal.SIGTERM, _interrupt), warnings.formatwarning
+    warnings.formatwarning = lambda *said: f"sonarsynth: {said[0]}\n" if "Unmarked" in str(said[1]) else usual(*said)
     try:
         status = app(arguments, prog_name="sonarsynth", standalone_mode=False)
         return _interrupted() if status == INTERRUPTED else status if isinstance(status, int) else 0
@@ -54,6 +55,7 @@ def run(app: typer.Typer, arguments: list[str] | None = None) -> int:
         return _explain(error, "--debug" in arguments)
     finally:
         signal.signal(signal.SIGTERM, before)
+        warnings.formatwarning = usual
 
 
 def _interrupted() -> int:
