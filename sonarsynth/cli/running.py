@@ -17,10 +17,14 @@ if TYPE_CHECKING:
     import typer
 
 OURS, INPUT, STORE, INTERRUPTED = 1, 2, 4, 130
-STATUS = dict.fromkeys(("StoreLocked", "BuildEnded", "Damage"), STORE) | dict.fromkeys(
-    ("RecipeError", "Mismatch", "NothingToDraw", "TooLarge", "Unreachable", "NoScheduler")
-    + ("RecordingError", "TrackError", "DetectionsError"),
-    INPUT,
+STATUS = (
+    dict.fromkeys(("StoreLocked", "BuildEnded", "Damage"), STORE)
+    | {"WrongReturn": OURS}
+    | dict.fromkeys(
+        ("RecipeError", "Mismatch", "NothingToDraw", "TooLarge", "Unreachable", "NoScheduler")
+        + ("RecordingError", "TrackError", "DetectionsError"),
+        INPUT,
+    )
 )
 """Of errors that say all there is to say, by name: what raises them may not be imported yet."""
 BAD_PLACE = FileNotFoundError, PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError
