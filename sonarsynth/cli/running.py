@@ -21,7 +21,7 @@ STATUS = (
     dict.fromkeys(("StoreLocked", "BuildEnded", "Damage"), STORE)
     | {"WrongReturn": OURS}
     | dict.fromkeys(
-        ("RecipeError", "Mismatch", "NothingToDraw", "TooLarge", "Unreachable", "NoScheduler")
+        ("RecipeError", "Mismatch", "NothingToDraw", "BadEnding", "TooLarge", "Unreachable", "NoScheduler")
         + ("RecordingError", "TrackError", "DetectionsError"),
         INPUT,
     )
@@ -85,7 +85,8 @@ def _explain(error: Exception, shown: bool) -> int:
         return max(_say(line, STATUS.get(name, INPUT)) for line in lines)
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""
-        return _say(f"{file}{error.strerror}", INPUT if isinstance(error, BAD_PLACE) else OURS)
+        what = "is a file, and a folder is needed" if isinstance(error, FileExistsError) else error.strerror
+        return _say(f"{file}{what}", INPUT if isinstance(error, BAD_PLACE) else OURS)
     line = f"{type(error).__name__}: {error}"
     return _say(line if shown else f"{line} (traceback in {_keep_traceback(error)})", OURS)
 

@@ -154,6 +154,33 @@ def test_a_store_needs_a_name(command: Command, small_file: Path) -> None:
     assert (status, out, err) == (2, "", "sonarsynth: /: is no place for a store\n")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("snap", "small.yaml", "--out", "snap.abc"), "snap.abc: is none of "),
+        (("accuracy", "small.yaml", "--out", "small.yaml"), "--out: small.yaml is a file, and a folder is needed"),
+        (("target-strength", "{kind: sphere}", "--out", "small.yaml/x"), "--out: small.yaml is a file, and a folder"),
+        (("card", "s.zarr", "--out", "small.yaml"), "small.yaml: is a file, and a folder is needed"),
+        (("plan", "folder"), "folder: is not a file but a folder"),
+        (("export", "truth.zarr"), "cloud: the store has no cloud: it was built without that product"),
+    ],
+)
+def test_wrong_places_and_products_are_said_in_one_line(
+    command: Command, small_file: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], said: str
+) -> None:
+    """Of a folder that is a file, before anything is computed."""
+    monkeypatch.chdir(small_file.parent)
+    Path("folder").mkdir()
+    store, products = next((n for n in arguments if n.endswith(".zarr")), ""), "image" if "card" in arguments else ""
+    if store:
+        assert (
+            command("build", "small.yaml", store, "--workers", "0", "--frames", "0:1", "--products", products)[0] == 0
+        )
+    status, out, err = command(*arguments)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"sonarsynth: {said}")
+
+
 def test_calls_that_cannot_be(small: Recipe, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="'film' is not a product; known: signals, image, cloud"):
         sonarsynth.plan(small, ["film"])
