@@ -12,7 +12,9 @@ import pytest
 
 import sonarsynth as ss
 from sonarsynth.description.method import WrongReturn
+from sonarsynth.detection import ImagePeaks, Region, SonarView, detections_of
 from sonarsynth.environment.noise import FlatNoise
+from sonarsynth.environment.noise.noise_field import NoiseField
 from sonarsynth.environment.scatterers.stones import Stones
 from sonarsynth.planning import Plan
 from sonarsynth.planning.notes.source_notes import locator
@@ -92,3 +94,27 @@ def test_it_is_named_with_what_was_expected(
     line = rf"^sonarsynth\.\S+\.{of.__name__}\.{name} returned .*{said}"
     with pytest.raises(WrongReturn, match=line):
         ss.render(ss.plan(ss.load(small_file, settings)), 3)
+
+
+@pytest.mark.parametrize(
+    ("region", "said"),
+    [
+        (Region(np.array([1]), np.array([1, 2]), 1.0), r"shape \(1,\) as rows, not an array of shape \(2,\)"),
+        (Region(np.array([1]), np.array([2]), np.nan), "NaN as score"),
+        ((1, 2), "a tuple as rows"),
+    ],
+)
+def test_regions_of_detectors_are_looked_at(monkeypatch: pytest.MonkeyPatch, region: Any, said: str) -> None:
+    view = SonarView(np.ones((9, 11)), np.arange(11.0), np.arange(9.0), 1.0, np.zeros((0, 4)))
+    monkeypatch.setattr(ImagePeaks, "regions", lambda self, view: [region])
+    with pytest.raises(WrongReturn, match=rf"image_peaks\.ImagePeaks\.regions returned .*{said}"):
+        detections_of(view, ImagePeaks())
+
+
+@pytest.mark.parametrize(
+    ("matrix", "said"), [(np.eye(3), r"\(3, 3\), not .* \(2, 3, 3\)"), (np.full((2, 3, 3), np.nan), "NaN")]
+)
+def test_cross_spectra_of_noise_are_looked_at(monkeypatch: pytest.MonkeyPatch, matrix: Any, said: str) -> None:
+    monkeypatch.setattr(FlatNoise, "cross_spectral_density", lambda self, frequency, position: matrix)
+    with pytest.raises(WrongReturn, match=rf"FlatNoise\.cross_spectral_density returned .*{said}"):
+        NoiseField.factors(FlatNoise(level=40.0), np.array([1e4, 2e4]), np.eye(3))
