@@ -235,19 +235,19 @@ def must_hold_all(store: Folder | str) -> None:
 
 def warn_unmarked(store: Folder) -> None:
     """Warn, in one line, where a store has data and no marks of them: readers take a file that is missing for one of
-    fill values. A shard that a build writes has no mark yet. In an object store only the layout's is asked for."""
-    lost = [MARKS]
-    if any(place.there(store, name) for name in MANIFESTS):
-        files = [] if isinstance(store, Remote) else entries(store, SHOWS)
-        numbers = {name.split(".")[1] for name in files if name.startswith("c.")}
+    fill values. A shard that a build writes has no mark yet, and what xarray wrote has files of other names. In an
+    object store only the layout's is asked for."""
+    far, laid = isinstance(store, Remote), any(place.there(store, name) for name in MANIFESTS)
+    if (far and laid) or held_by(store):
+        return
+    numbers = {name.split(".")[1] for name in entries(store, SHOWS) if name.startswith("c.")}
+    lost, remedy = [MARKS], "copy it as well, or 'sonarsynth repair' computes these frames anew"
+    if laid:
         lost = [f"{MARKS}/{number}.json" for number in sorted(numbers - {str(number) for number in marked(store)})]
-    if lost and not held_by(store):
-        warnings.warn(
-            f"{store}: {lost[0]} is missing: no one can say which files were written, and those that are gone read as "
-            "NaN: copy it as well, or 'sonarsynth repair' computes these frames anew",
-            Unmarked,
-            stacklevel=3,
-        )
+        remedy = "a build was killed, or a copy cut short: build again, or 'sonarsynth repair', computes them anew"
+    if lost and numbers:
+        what = "is missing: no one can say which files were written, and those that are gone read as NaN"
+        warnings.warn(f"{store}: {lost[0]} {what}: {remedy}", Unmarked, stacklevel=3)
 
 
 def all_files(store: Folder) -> Iterator[str]:
