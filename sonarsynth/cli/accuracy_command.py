@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from sonarsynth.cli.options import Json, Settings
+from sonarsynth.cli.options import Json, Settings, check_folder
 from sonarsynth.cli.running import BadOption
 
 if TYPE_CHECKING:
@@ -63,6 +63,7 @@ def accuracy(
     from sonarsynth.validation.report import as_json as for_programs
     from sonarsynth.validation.report import write
 
+    check_folder(out)
     _check(recipe, reference, extremes, settings or [o for o in (frames, hydrophones, seed) if o is not None])
     if recipe is not None:
         from sonarsynth.cli.accuracy_tables.frontier_table import recipe_table

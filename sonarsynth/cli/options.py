@@ -59,3 +59,12 @@ def worker_bounds(
         except ValueError as error:
             raise BadOption(f"--scheduler: {error}") from None
     return {"frame_timeout": timeout, "worker_memory": None if memory_gb is None else int(memory_gb * 1e9)}
+
+
+def check_folder(out: Path | None) -> None:
+    """Raise BadOption where --out, a folder that is to be written, is a file or in one: before anything is computed."""
+    for place in () if out is None else (out, *out.parents):
+        if place.exists():
+            if not place.is_dir():
+                raise BadOption(f"--out: {place} is a file, and a folder is needed")
+            return

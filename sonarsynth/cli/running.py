@@ -17,10 +17,14 @@ if TYPE_CHECKING:
     import typer
 
 OURS, INPUT, STORE, INTERRUPTED = 1, 2, 4, 130
-STATUS = dict.fromkeys(("StoreLocked", "BuildEnded", "Damage"), STORE) | dict.fromkeys(
-    ("RecipeError", "Mismatch", "NothingToDraw", "TooLarge", "Unreachable", "NoScheduler")
-    + ("RecordingError", "TrackError", "DetectionsError"),
-    INPUT,
+STATUS = (
+    dict.fromkeys(("StoreLocked", "BuildEnded", "Damage"), STORE)
+    | {"WrongReturn": OURS}
+    | dict.fromkeys(
+        ("RecipeError", "Mismatch", "NothingToDraw", "BadEnding", "TooLarge", "Unreachable", "NoScheduler")
+        + ("RecordingError", "TrackError", "DetectionsError"),
+        INPUT,
+    )
 )
 """Of errors that say all there is to say, by name: what raises them may not be imported yet."""
 BAD_PLACE = FileNotFoundError, PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError
@@ -39,7 +43,8 @@ def run(app: typer.Typer, arguments: list[str] | None = None) -> int:
         gc.set_threshold(50_000, 20, 50)  # what libraries make when they are imported stays: a tenth of a short command
     for name in ONE_THREAD:  # work is spread over processes; read when numpy is imported
         os.environ.setdefault(name, "1")
-    before = signal.signal(signal.SIGTERM, _interrupt)
+    before, usual = signal.signal(signal.SIGTERM, _interrupt), warnings.formatwarning
+    warnings.formatwarning = lambda *said: f"sonarsynth: {said[0]}\n" if "Unmarked" in str(said[1]) else usual(*said)
     try:
         status = app(arguments, prog_name="sonarsynth", standalone_mode=False)
         return _interrupted() if status == INTERRUPTED else status if isinstance(status, int) else 0
@@ -54,6 +59,7 @@ def run(app: typer.Typer, arguments: list[str] | None = None) -> int:
         return _explain(error, "--debug" in arguments)
     finally:
         signal.signal(signal.SIGTERM, before)
+        warnings.formatwarning = usual
 
 
 def _interrupted() -> int:
@@ -79,7 +85,8 @@ def _explain(error: Exception, shown: bool) -> int:
         return max(_say(line, STATUS.get(name, INPUT)) for line in lines)
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""
-        return _say(f"{file}{error.strerror}", INPUT if isinstance(error, BAD_PLACE) else OURS)
+        what = "is a file, and a folder is needed" if isinstance(error, FileExistsError) else error.strerror
+        return _say(f"{file}{what}", INPUT if isinstance(error, BAD_PLACE) else OURS)
     line = f"{type(error).__name__}: {error}"
     return _say(line if shown else f"{line} (traceback in {_keep_traceback(error)})", OURS)
 

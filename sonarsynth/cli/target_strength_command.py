@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from sonarsynth.cli.options import Json
+from sonarsynth.cli.options import Json, check_folder
 from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import described
 
@@ -58,6 +58,7 @@ def target_strength(
     from sonarsynth.targets.meshes import mesh_of
     from sonarsynth.targets.shapes import MeshFile
 
+    check_folder(out)
     law = described(scattering, "--scattering", Scattering)
     shape = _shape(body, unit)
     f, degrees = _values(frequency, "--frequency"), _values(aspect, "--aspect")

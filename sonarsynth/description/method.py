@@ -1,10 +1,13 @@
-"""What the planner asks of a method beside its mathematics: a new method may leave all of it as it is here."""
+"""What the planner asks of a method beside its mathematics: a new method may leave all of it as it is here. What a
+method returns is looked at where it is first used (`returned`)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 UNSTATED = float("nan")
 """The error of a method that says none."""
@@ -74,3 +77,55 @@ class Method:
     def refusal(self, elements: Any) -> str:
         """Why it cannot serve an array, in one line; empty where it can."""
         return ""
+
+
+class WrongReturn(TypeError):
+    """A method returned what its family does not; str() is one line that names it."""
+
+
+def returned(
+    method: object, name: str, value: Any, shape: tuple[int, ...], column: str = "", *, unknown: bool = False
+) -> Any:
+    """`value`, which `name` of a method returned: an array of this shape, or what has one as its attribute `column`.
+
+    Raises WrongReturn for another shape, for what is no array of numbers, and for NaN unless these may be `unknown`.
+    """
+    array = np.asarray(getattr(value, column, None) if column else value)
+    of, numbers = f" as {column}" if column else "", array.dtype.kind in "bifuc"
+    if array.shape != shape or not numbers:
+        what = f"an array of shape {array.shape}" if numbers else f"a {type(value).__name__}"
+        raise WrongReturn(f"{_place(method, name)} returned {what}{of}, not an array of shape {shape}")
+    if not unknown and _has_nan(array):
+        raise WrongReturn(f"{_place(method, name)} returned NaN{of}")
+    return value
+
+
+def returned_rows(
+    method: object, name: str, value: Any, kind: type, like: str, known: tuple[str, ...],
+    wide: Mapping[str, tuple[int, ...]], rows: int | None = None,
+) -> Any:  # fmt: skip
+    """`value`, which `name` of a method returned: a table of a kind, each column with so many rows; left out: with
+    those of the column `like`. known: columns without NaN; wide: shapes of the rows of those that are not numbers.
+
+    Raises WrongReturn as `returned`.
+    """
+    if not isinstance(value, kind):
+        raise WrongReturn(f"{_place(method, name)} returned a {type(value).__name__}, not a {kind.__name__}")
+    count = np.size(getattr(value, like)) if rows is None else rows
+    for column, array in vars(value).items():
+        if column == like or column in wide or isinstance(array, np.ndarray):
+            shape = (count, *wide.get(column, ()))
+            if getattr(array, "shape", None) != shape or (column in known and _has_nan(array)):
+                returned(method, name, value, shape, column, unknown=column not in known)
+    return value
+
+
+def _place(method: object, name: str) -> str:
+    """A function of a method, as Python finds it."""
+    return f"{type(method).__module__}.{type(method).__name__}.{name}"
+
+
+def _has_nan(array: np.ndarray) -> bool:
+    """Whether there is NaN among numbers: their maximum is. A third of the time of `numpy.isnan`."""
+    top = np.maximum.reduce(array, axis=None) if array.size else 0.0
+    return bool(top != top)  # noqa: PLR0124

@@ -71,7 +71,7 @@ def detect(
     frames = chosen_frames(tree, split)
     rows = []
     for done, (frame, view) in enumerate(views(tree, frames), 1):
-        rows += [{"frame": frame, **detection} for detection in detections_of(view, chosen.regions(view))]
+        rows += [{"frame": frame, **detection} for detection in detections_of(view, chosen)]
         if progress is not None:
             progress(done, len(frames), 0)
     return from_rows(rows)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.description.method import returned
 from sonarsynth.detection.sonar_view import SonarView
 
 
@@ -29,13 +30,19 @@ class DetectionMethod(Protocol):
         """Regions of the image that are objects, in any order. Sees no truth."""
 
 
-def detections_of(view: SonarView, regions: list[Region]) -> list[dict[str, Any]]:
+def detections_of(view: SonarView, method: DetectionMethod) -> list[dict[str, Any]]:
     """Columns of the detections of a frame.
 
     The box is about the middle of a region, without the beam width that a point spreads over; the direction is that of
-    the middle; the range is that of the loudest point of the cloud in the region.
+    the middle; the range is that of the loudest point of the cloud in the region. Raises WrongReturn for regions that
+    are none.
     """
-    return [_detection(view, region) for region in regions]
+    found = []
+    for region in method.regions(view):
+        returned(method, "regions", region, np.asarray(getattr(region, "columns", ())).shape, "rows")
+        returned(method, "regions", region, (), "score")
+        found.append(_detection(view, region))
+    return found
 
 
 def _detection(view: SonarView, region: Region) -> dict[str, Any]:

@@ -49,7 +49,7 @@ def points(
 
     tree = store if isinstance(store, xr.DataTree) else open_store(store)
     if "cloud" not in tree.children:
-        raise FieldError(("relative_to",), "the store has no cloud: it was built without that product")
+        raise FieldError(("cloud",), "the store has no cloud: it was built without that product")
     for group, variable in NEEDED:
         if variable not in tree[group].data_vars:
             raise FieldError(("store",), f"has no {group}/{variable}, which it takes to place points: build it again")

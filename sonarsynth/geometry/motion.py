@@ -60,7 +60,7 @@ class Waypoint:
     position: Position
     """Position (x, y, z): east, north and up, 0 at the surface."""
     heading: Radians | None = None
-    """Heading there, clockwise from north; left out: towards the next waypoint (the last: as before)."""
+    """Heading there, clockwise from north; left out: to the next waypoint (the last, and where it waits: as before)."""
 
 
 @description
@@ -266,12 +266,15 @@ def _leg(motion: Waypoints, time: float) -> tuple[Waypoint, Waypoint]:
 
 
 def _heading_at(motion: Waypoints, index: int) -> float:
-    points = motion.points
-    heading = points[index].heading
-    if heading is not None:
-        return heading
-    i = min(index, len(points) - 2)
-    return _course(np.array(points[i + 1].position) - np.array(points[i].position))
+    """Heading at a waypoint: its own, or that of the leg that begins; where that goes nowhere, or straight up, what the
+    body came with, or else the first that there is."""
+    points, last = motion.points, len(motion.points) - 1
+    for i in (*range(index, -1, -1), *range(index + 1, last)):
+        heading, leg = points[i].heading, min(i, last - 1)
+        way = np.subtract(points[leg + 1].position, points[leg].position)
+        if heading is not None or way[:2].any():
+            return _course(way) if heading is None else heading
+    return points[last].heading or 0.0
 
 
 def _pose_on_waypoints(motion: Waypoints, time: float) -> Pose:

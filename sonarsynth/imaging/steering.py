@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats, direction
-from sonarsynth.description.method import FrameSize, Method
+from sonarsynth.description.method import FrameSize, Method, returned
 from sonarsynth.equations.arrays.beams import beam_spectra
 from sonarsynth.imaging.delay_and_sum.lattice_beams import LatticeBeams
 from sonarsynth.imaging.image_window import Shading, energy_image, snapshots_of, weights
@@ -38,8 +38,14 @@ class Steering(Method):
 
     def beams(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> BeamSpectra:
         """Beams of a window of the signals, computed when their energies or spectra are asked for."""
-        energies = partial(self.energies, snapshots, elements, sonar)
-        return BeamSpectra(snapshots, energies, self.steered(snapshots, elements, sonar))
+        return BeamSpectra(
+            snapshots, partial(self._image, snapshots, elements, sonar), self.steered(snapshots, elements, sonar)
+        )
+
+    def _image(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
+        """The energies, once they have the shape of an image."""
+        shape, energy = (sonar.beams.elevations, sonar.beams.azimuths), self.energies(snapshots, elements, sonar)
+        return np.asarray(returned(self, "energies", energy, shape))
 
     def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
         """Energy (elevation, azimuth) in Pa2 s of the beams of the sonar's grid: sum over bins of |B|^2.
@@ -55,6 +61,7 @@ class Steering(Method):
         for low in range(0, len(direction), BEAMS_AT_ONCE):
             block = slice(low, low + BEAMS_AT_ONCE)
             beams = self.steer(snapshots, elements, sonar, direction[block])
+            returned(self, "steer", beams, (len(direction[block]), len(snapshots.frequency)), unknown=True)
             energy[block] = np.sum(np.abs(beams).astype(float) ** 2, axis=1)
         return np.asarray(snapshots.unit * energy)
 

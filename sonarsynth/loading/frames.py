@@ -15,7 +15,7 @@ from sonarsynth.products import SPLITS
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.store.frame_reading import FrameReader
-from sonarsynth.store.marks import must_hold_files
+from sonarsynth.store.marks import must_hold_files, warn_unmarked
 
 
 class Frames:
@@ -60,6 +60,7 @@ class Frames:
         self._form = SampleForm(image, targets, signals)
         if missing := [name for name in self._form.needs if name not in self._reader]:
             raise KeyError(f"{missing[0]}: the store was built without it")
+        warn_unmarked(self._reader.root)
         must_hold_files(self._reader.root, ("truth/sonar_position", *self._form.needs))
         chosen = np.isfinite(self._reader.array("truth/sonar_position").every()[:, 0])
         if split is not None:

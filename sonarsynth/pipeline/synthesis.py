@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, depth
+from sonarsynth.description.method import returned
 from sonarsynth.geometry.motion import pose, velocity
 from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.planning import Plan, arrivals_of, behind_baffle, context_of, frame_start
@@ -113,7 +114,12 @@ def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Element
     """Pressure at hydrophones, of arrivals that are expanded over all of them; the baffle weakens sound from behind.
     whole: as of `Reception`."""
     reception = reception_of(plan, frame)._replace(elements=sensors, whole=whole)
-    return plan.choices.synthesis.signals(behind_baffle(arrivals, plan.scene.sonar), frame.moment.snaps, reception)
+    method, heard = plan.choices.synthesis, behind_baffle(arrivals, plan.scene.sonar)
+    made = method.signals(heard, frame.moment.snaps, reception)
+    samples = (reception.samples,) if whole else np.shape(getattr(made, "pressure", 0))[1:]
+    refused = plan.scene.sonar.converter is not None  # NaN, without a look at all samples here
+    signals: Signals = returned(method, "signals", made, (sensors.count, *samples), "pressure", unknown=refused)
+    return signals
 
 
 def errors_of(plan: Plan, frame: Frame) -> DrawnErrors | None:
@@ -234,8 +240,7 @@ def known_elements(plan: Plan, frame: Frame) -> Elements:
 
 @lru_cache(maxsize=8)
 def _working(elements: Elements, drawn: DrawnErrors) -> Elements:
-    works = (drawn.state != SensorState.DEAD) & (drawn.state != SensorState.STUCK)
-    return elements if works.all() else replace(elements, gain=elements.gain * works)
+    return elements if drawn.works.all() else replace(elements, gain=elements.gain * drawn.works)
 
 
 def known_signals(plan: Plan, frame: Frame, signals: Signals) -> Signals:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.description.method import FrameSize, Method
+from sonarsynth.description.method import FrameSize, Method, returned_rows
 from sonarsynth.environment.sea import Profile
 from sonarsynth.products import Paths
 
@@ -40,6 +40,13 @@ class PathModel(Method):
         for points outside the water or not finite.
         """
         raise NotImplementedError(f"{type(self).__name__} connects no points")
+
+    def joined(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
+        """What `connect` returns, once it has the shape of paths."""
+        wide, known = {"departure": (3,), "arrival": (3,)}, ("travel_time", "length", "spreading")
+        found = self.connect(profile, environment_depth, start, end)
+        paths: Paths = returned_rows(self, "connect", found, Paths, "pair", known, wide)
+        return paths
 
     @property
     def bends(self) -> bool:

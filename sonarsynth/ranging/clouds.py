@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats, azimuth_elevation, direction
+from sonarsynth.description.method import returned_rows
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.arrays.apertures import defocus_spread
 from sonarsynth.geometry import Pose, unit
@@ -34,7 +35,7 @@ def point_cloud(
     that moves, which places are relative to where it hears the echo."""
     if not window.located:
         return no_points()
-    echoes = picking.picks(window)
+    echoes = returned_rows(picking, "picks", picking.picks(window), PickedEchoes, "delay", ("azimuth", "delay"), {})
     source, velocity, spin = window.estimates.position[0], np.zeros(3), np.zeros(3)
     if track is not None and not track.still:
         middle = 0.5 * float(np.mean(echoes.delay)) if len(echoes.delay) else 0.0
@@ -42,6 +43,8 @@ def point_cloud(
         echoes = _at_true_directions(echoes, velocity, window)
     beam = direction(echoes.azimuth, echoes.elevation)
     solution = placing.place(echoes.delay, beam, source, window.sonar, sonar_pose, profile)
+    wide = {"position": (3,), "by_source": (3,)}
+    solution = returned_rows(placing, "place", solution, Solution, "range", (), wide, len(beam))
     if velocity.any() or spin.any():
         solution = solution.as_array_moves(source, -echoes.delay[:, None] * (velocity + np.cross(spin, source)))
     echoes = replace(echoes, delay_error=np.hypot(echoes.delay_error, window.late))

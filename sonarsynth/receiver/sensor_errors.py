@@ -12,6 +12,7 @@ from annotated_types import Ge, Gt, Le
 from pydantic import model_validator
 
 from sonarsynth.conventions import (
+    Bools,
     Decibels,
     Floats,
     Hertz,
@@ -109,6 +110,11 @@ class DrawnErrors:
     state: Ints  # (sensor,) a SensorState
     stuck_at: Floats  # (sensor,) -1 to 1, of full scale
     clock_rate: float  # of time, relative
+
+    @property
+    def works(self) -> Bools:
+        """Which channels (sensor,) hear at all: neither dead nor stuck."""
+        return np.asarray((self.state != SensorState.DEAD) & (self.state != SensorState.STUCK))
 
     def delays(self, sound_speed: float) -> Floats:
         """Delays (sensor,) in s by which channels hear sound from ahead too late; sound_speed in m/s."""

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
+from sonarsynth.description.method import returned
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.equations.scattering.lobes import dot, lambert, lit_and_seen, slope_lobe
 from sonarsynth.geometry.mesh import Mesh
@@ -92,7 +93,9 @@ class Lobe(Component):
 
     def amplitude(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
         """As `Component.amplitude`: the same at all wavenumbers."""
-        return self.law.amplitude(incident, scattered, patch.normal, patch.area, self.beyond)
+        shape = np.broadcast_shapes(incident.shape[:-1], scattered.shape[:-1], patch.area.shape)
+        amplitude = self.law.amplitude(incident, scattered, patch.normal, patch.area, self.beyond)
+        return np.asarray(returned(self.law, "amplitude", amplitude, shape))
 
     def past_limb(self) -> Lobe:
         """As `Component.past_limb`."""

@@ -23,7 +23,7 @@ def facing_share(mesh: Mesh) -> float:
     """
     if not len(mesh.faces):
         return 0.0
-    pick, u, v, out, turn = _even(RAYS, 5).T
+    pick, u, v, out, turn = evenly_in(RAYS, 5).T
     share = np.cumsum(mesh.area) / mesh.area.sum()
     facet = np.minimum(np.searchsorted(share, pick), len(share) - 1)
     normal, root = mesh.normal[facet], np.sqrt(u)
@@ -35,7 +35,7 @@ def facing_share(mesh: Mesh) -> float:
     return float(np.mean(first_hit(mesh, start, direction)[0] >= 0))
 
 
-def _even(count: int, axes: int) -> Floats:
+def evenly_in(count: int, axes: int) -> Floats:
     """Points (point, axis) spread evenly over the unit cube: multiples of powers of the root of x^(axes+1) = x + 1."""
     root = 1.5
     for _ in range(60):

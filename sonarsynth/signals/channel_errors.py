@@ -35,8 +35,7 @@ def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_
     """Signals that processing uses: corrected for the errors that it knows (`SensorErrors.known`)."""
     if errors.known == "none":
         return signals
-    works = (drawn.state == SensorState.WORKING) | (drawn.state == SensorState.NOISY)
-    return _through(signals, drawn, sound_speed, works, phases=errors.known == "all", inverse=True)
+    return _through(signals, drawn, sound_speed, drawn.works, phases=errors.known == "all", inverse=True)
 
 
 def _through(

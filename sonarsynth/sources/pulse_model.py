@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Self
 
-from sonarsynth.description.method import Method
+from sonarsynth.description.method import Method, returned_rows
 from sonarsynth.equations.bubble.pulses import Pulse
 from sonarsynth.equations.bubble.snap_pressure import Bubble
 
@@ -22,6 +22,12 @@ class PulseModel(Method):
         Raises ValueError in one line where the model has none.
         """
         raise NotImplementedError(f"{type(self).__name__} has no pulse")
+
+    def made(self, depth: float, highest: float) -> Pulse:
+        """What `pulse` returns, once it has the shape of a pulse."""
+        found, known = self.pulse(depth, highest), ("time", "strength")
+        pulse: Pulse = returned_rows(self, "pulse", found, Pulse, "time", known, {})
+        return pulse
 
     def at_depth(self, depth: float) -> Self:
         """The model where its source is (m), if it has no depth of its own."""

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.description.method import Method
+from sonarsynth.description.method import Method, returned
 from sonarsynth.geometry.motion import Motion
 from sonarsynth.sources.pulse_model import PulseModel
 from sonarsynth.sources.snap_pulses import Waveform, waveform
@@ -73,6 +73,10 @@ class SoundSource(Method):
         """Where it is (xyz) in m, over a bottom at this depth (m), at a time (s) since the start of the motions."""
         raise NotImplementedError(f"{type(self).__name__} is nowhere")
 
+    def placed(self, bottom: float, time: float = 0.0) -> Floats:
+        """What `position_at` returns, once it is a place."""
+        return np.asarray(returned(self, "position_at", self.position_at(bottom, time), (3,)))
+
     def on_relief(self, bottom: float, ground: Callable[[Floats], float]) -> Self:
         """The same where the bottom rises over its mean depth (m): by a height (m) at each place (xy). What gives its
         own z stays there."""
@@ -114,4 +118,4 @@ class SoundSource(Method):
         """What it emits `time` (s) after the instant of a frame, gain times as loud and width times as long."""
         now, model = start + time, self.model(bottom)
         motion = self.velocity(now), self.directivity(now)
-        return Emission(self.position_at(bottom, now), time, model, self.level, gain, width, *motion, self.illuminates)
+        return Emission(self.placed(bottom, now), time, model, self.level, gain, width, *motion, self.illuminates)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -21,6 +22,7 @@ import google_crc32c
 import numpy as np
 
 from sonarsynth.store.files import place
+from sonarsynth.store.files.lock import held_by
 from sonarsynth.store.files.place import (
     FileRecord,
     Folder,
@@ -44,12 +46,23 @@ MANIFESTS: Final = (f"{MARKS}/{LAYOUT}.json", f"{MARKS}/{LAYOUT}.copy.json")
 
 _CRC: Final = "crc32c:"
 
+SHOWS: Final = "truth/sonar_position"
+"""An array of every store, with a file for each shard that was written."""
+
 ABSENT: Final[FileRecord] = (-1, "")
 """Record of a shard whose numbers are all the fill value: zarr leaves its file out, and readers fill in."""
 
 
 class Damage(ValueError):
     """Something in a store is not as it was written; str() is one line."""
+
+
+class Unmarked(UserWarning):
+    """A store of which nobody can say whether it is whole, since marks of it are gone."""
+
+
+REMEDY: Final = "'sonarsynth repair' writes it again, computing anew the frames that it is of: nothing is lost"
+"""For a damaged mark."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +110,7 @@ def parsed(file: str, name: str, text: bytes | OSError) -> Mark | None:
     if isinstance(text, FileNotFoundError):
         return None
     if isinstance(text, OSError):
-        raise Damage(f"{file}: the mark is damaged: it cannot be read ({text.strerror})")
+        raise Damage(f"{file}: the mark is damaged: it cannot be read ({text.strerror}): {REMEDY}")
     try:
         body: dict[str, Any] = json.loads(text)
         files = {path: (int(size), str(digest)) for path, (size, digest) in body["files"].items()}
@@ -106,7 +119,7 @@ def parsed(file: str, name: str, text: bytes | OSError) -> Mark | None:
             return mark
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         pass
-    raise Damage(f"{file}: the mark is damaged")
+    raise Damage(f"{file}: the mark is damaged: {REMEDY}")
 
 
 def _plain(mark: Mark) -> bool:
@@ -218,6 +231,23 @@ def must_hold_all(store: Folder | str) -> None:
     for mark in (load_layout(folder), *(mark for _, mark in load_marks(folder, marked(folder)))):
         if isinstance(mark, Mark) and (file := first_missing(mark)):
             raise missing(file)
+
+
+def warn_unmarked(store: Folder) -> None:
+    """Warn, in one line, where a store has data and no marks of them: readers take a file that is missing for one of
+    fill values. A shard that a build writes has no mark yet, and what xarray wrote has files of other names. In an
+    object store only the layout's is asked for."""
+    far, laid = isinstance(store, Remote), any(place.there(store, name) for name in MANIFESTS)
+    if (far and laid) or held_by(store):
+        return
+    numbers = {name.split(".")[1] for name in entries(store, SHOWS) if name.startswith("c.")}
+    lost, remedy = [MARKS], "copy it as well, or 'sonarsynth repair' computes these frames anew"
+    if laid:
+        lost = [f"{MARKS}/{number}.json" for number in sorted(numbers - {str(number) for number in marked(store)})]
+        remedy = "a build was killed, or a copy cut short: build again, or 'sonarsynth repair', computes them anew"
+    if lost and numbers:
+        what = "is missing: no one can say which files were written, and those that are gone read as NaN"
+        warnings.warn(f"{store}: {lost[0]} {what}: {remedy}", Unmarked, stacklevel=3)
 
 
 def all_files(store: Folder) -> Iterator[str]:

@@ -12,7 +12,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.products import SPLITS
 from sonarsynth.store.files.place import Folder, Opened, absolute, read_json, there
 from sonarsynth.store.files.within import Mismatch
-from sonarsynth.store.marks import Damage, load_layout
+from sonarsynth.store.marks import Damage, load_layout, warn_unmarked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +50,8 @@ def open_store(path: Folder | str) -> xr.DataTree:
     store is followed, and counts of the converter decode to float32 (plain xarray: float64).
 
     path: a folder or a URL. Returns the tree. Raises Mismatch where there is no store of ours, or one of another
-    format. Reading a variable of the tree raises Damage where a file cannot be decoded, or is missing.
+    format. Reading a variable of the tree raises Damage where a file cannot be decoded, or is missing. Warns
+    (`Unmarked`) where marks are gone, so that what is missing is not known.
     """
     import xarray as xr
     import zarr
@@ -76,6 +77,7 @@ def open_store(path: Folder | str) -> xr.DataTree:
         first = (str(error).splitlines() or [type(error).__name__])[0]
         raise Mismatch(f"{folder}: not a store that xarray can open ({first})") from None
     tree.set_close(stored.close)
+    warn_unmarked(folder)
     return tree
 
 

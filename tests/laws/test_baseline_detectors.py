@@ -25,7 +25,7 @@ def view(*spots: tuple[float, float, float], noise: float = 1e-4, points: object
 def test_each_spot_is_found_where_it_is_with_its_range(method: ImagePeaks | CellAveraging) -> None:
     points = [(10.0, 5.0, 12.0, 1.0), (10.5, 5.0, 14.0, 0.1), (-8.0, -6.0, 20.0, 1.0), (0.0, 0.0, 3.0, 9.0)]
     seen = view((10.0, 5.0, 1.0), (-8.0, -6.0, 0.5), points=points)
-    found = sorted(detections_of(seen, method.regions(seen)), key=lambda one: -one["score"])
+    found = sorted(detections_of(seen, method), key=lambda one: -one["score"])
     assert len(found) == 2
     for one, (azimuth, elevation, away) in zip(
         sorted(found, key=lambda one: -one["azimuth"]), [(10.0, 5.0, 12.0), (-8.0, -6.0, 20.0)], strict=True
@@ -40,10 +40,10 @@ def test_each_spot_is_found_where_it_is_with_its_range(method: ImagePeaks | Cell
 
 def test_the_box_of_a_point_is_one_beam_and_that_of_a_line_is_as_long() -> None:
     seen = view((0.0, 0.0, 1.0))
-    (point,) = detections_of(seen, ImagePeaks().regions(seen))
+    (point,) = detections_of(seen, ImagePeaks())
     assert point["box"][2] - point["box"][0] <= 2.0
     seen = view(*((azimuth, 0.0, 1.0) for azimuth in np.arange(-6.0, 6.1, 0.5)))
-    (line,) = detections_of(seen, ImagePeaks().regions(seen))
+    (line,) = detections_of(seen, ImagePeaks())
     x0, y0, x1, y1 = line["box"]
     assert x1 - x0 == pytest.approx(12.0 / 0.5, abs=2.0) and y1 - y0 <= 2.0
 

@@ -93,6 +93,34 @@ def test_bodies_head_along_their_track(motion) -> None:
         assert ahead @ horizontal == pytest.approx(np.linalg.norm(horizontal))
 
 
+@pytest.mark.parametrize(
+    ("places", "headings"),
+    [
+        ([(0, 0), (5, 0), (5, 0), (5, 5)], [90, 90, 0, 0]),  # it waits as it came, and turns where it goes on
+        ([(0, 0), (0, 0), (5, 0)], [90, 90, 90]),  # it waits as it will leave
+        ([(0, 0), (5, 0), (5, 0), (5, 0)], [90, 90, 90, 90]),  # nothing comes after
+        ([(0, 0, 70), (0, 0), (0, 0)], [70, 70, 70]),
+        ([(0, 0), (0, 0), (0, 0, 70)], [70, 70, 70]),
+        ([(0, 0), (0, 0), (0, 0)], [0, 0, 0]),  # of which nothing is known
+    ],
+)
+def test_a_body_that_waits_at_a_waypoint_keeps_its_heading(
+    places: list[tuple[float, ...]], headings: list[float]
+) -> None:
+    """It turned north. The same where it goes straight up."""
+    for climb in (0.0, 1.0):
+        motion = Waypoints(
+            points=tuple(
+                Waypoint(time=i, position=(x, y, climb * i - 9.0), heading=np.deg2rad(own[0]) if own else None)
+                for i, (x, y, *own) in enumerate(places)
+            )
+        )
+        for i, heading in enumerate(headings):
+            ahead = pose(motion, i).to_world(np.array([[1.0, 0.0, 0.0]]))[0] - pose(motion, i).position
+            expected = [np.sin(np.deg2rad(heading)), np.cos(np.deg2rad(heading)), 0.0]
+            np.testing.assert_allclose(ahead, expected, atol=1e-12, err_msg=f"waypoint {i}")
+
+
 def test_headings_of_waypoints_turn_the_short_way() -> None:
     motion = Waypoints(
         points=(

@@ -55,6 +55,20 @@ WRONG = [
         "pitch: 5 cm, dead: [20]",
         "14: scene.sonar.array: dead: there is no hydrophone 20; they are 0 to 19",
     ),
+    ("pitch: 5 cm", f"pitch: 5 cm, dead: {list(range(20))}", "14: scene.sonar.array.dead: names every hydrophone"),
+    *(
+        (
+            "pitch: 5 cm}",
+            f"pitch: 5 cm, dead: [{own}]}}\n    converter: {{bits: 16, full_scale: 200 Pa}}"
+            f"\n    sensor_errors: {{{share}, known: {known}}}",
+            "16: scene.sonar.sensor_errors: every hydrophone is dead or stuck at frame 0",
+        )
+        for own, share, known in (
+            ("", "dead: 0.5, stuck: 0.5", "gain"),
+            ("", "stuck: 1", "all"),
+            (", ".join(str(i) for i in range(19)), "dead: 0.999", "gain"),
+        )
+    ),
     (
         "pitch: 5 cm}",
         "pitch: 5 cm}\n    assumed_sound_speed: 1 m/s",
@@ -138,6 +152,33 @@ def test_drawing_what_is_not_there(command: Command, small_file: Path, tmp_path:
 def test_a_store_needs_a_name(command: Command, small_file: Path) -> None:
     status, out, err = command("build", small_file, "/", "--workers", "0")
     assert (status, out, err) == (2, "", "sonarsynth: /: is no place for a store\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("snap", "small.yaml", "--out", "snap.abc"), "snap.abc: is none of "),
+        (("accuracy", "small.yaml", "--out", "small.yaml"), "--out: small.yaml is a file, and a folder is needed"),
+        (("target-strength", "{kind: sphere}", "--out", "small.yaml/x"), "--out: small.yaml is a file, and a folder"),
+        (("card", "s.zarr", "--out", "small.yaml"), "small.yaml: is a file, and a folder is needed"),
+        (("plan", "folder"), "folder: is not a file but a folder"),
+        (("export", "truth.zarr"), "cloud: the store has no cloud: it was built without that product"),
+    ],
+)
+def test_wrong_places_and_products_are_said_in_one_line(
+    command: Command, small_file: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], said: str
+) -> None:
+    """Of a folder that is a file, before anything is computed."""
+    monkeypatch.chdir(small_file.parent)
+    Path("folder").mkdir()
+    store, products = next((n for n in arguments if n.endswith(".zarr")), ""), "image" if "card" in arguments else ""
+    if store:
+        assert (
+            command("build", "small.yaml", store, "--workers", "0", "--frames", "0:1", "--products", products)[0] == 0
+        )
+    status, out, err = command(*arguments)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"sonarsynth: {said}")
 
 
 def test_calls_that_cannot_be(small: Recipe, tmp_path: Path) -> None:

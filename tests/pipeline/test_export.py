@@ -134,7 +134,7 @@ def test_files_hold_the_points_with_colours_normals_and_labels(crossing: Path, t
         (["--frames", "5:70"], "ends past the last frame, 63"),
         (["--frames", "1:3"], "--frames: none of these frames has been built"),
         (["--to", "bellhop"], "is a folder: bellhop is of a recipe"),
-        (["--out", "/dev/null/x.ply"], "/dev/null: File exists"),
+        (["--out", "/dev/null/x.ply"], "/dev/null: is a file, and a folder is needed"),
     ],
 )
 def test_bad_input_gets_one_line(

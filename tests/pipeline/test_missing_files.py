@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import pickle
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +16,12 @@ import sonarsynth as ss
 from sonarsynth import schedule
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
+from sonarsynth.loading import Frames
 from sonarsynth.planning import Plan
-from sonarsynth.store import Damage, Remote
+from sonarsynth.schedule.repairing import repair
+from sonarsynth.store import Damage, Remote, lock
 from sonarsynth.store.frame_reading import FrameReader
-from sonarsynth.store.marks import ABSENT, load_marks, marked
+from sonarsynth.store.marks import ABSENT, Unmarked, load_mark, load_marks, marked
 from tests.places import contents, web_server
 
 FRAMES = range(10)
@@ -108,6 +112,43 @@ def test_commands_say_what_is_missing_and_leave_nothing(
     assert said == f"sonarsynth: {file}: the file is missing: 'sonarsynth repair' restores it"
     assert [made for made in copy.parent.iterdir() if made.suffix in (".md", ".json", ".html", ".ply")] == []
     assert not any(copy.with_name(f"s.zarr.{to}").exists() for to in ("coco", "sonar-netcdf"))
+
+
+def test_a_store_without_its_marks_is_said_to_be_one(copy: Path) -> None:
+    """All of them, as `cp STORE/*` leaves them behind, or that of one shard; not one that is still being written."""
+    mark, said = copy / ".marks/1.json", r" is missing: no one can say .* read as NaN: "
+    content = mark.read_bytes()
+    mark.unlink()
+    with pytest.warns(Unmarked, match=rf"s\.zarr: \.marks/1\.json{said}a build was killed, or a copy cut short"):
+        ss.open(copy)
+    with lock(copy):
+        ss.open(copy)
+    mark.write_bytes(content)
+    shutil.move(copy / ".marks", copy.parent / "marks")
+    for reads in (ss.open, Frames):
+        with pytest.warns(Unmarked, match=rf"s\.zarr: \.marks{said}copy it as well"):
+            reads(copy)
+    shown = [sys.executable, "-m", "sonarsynth", "show", str(copy), "--frame", "9"]
+    said_by_show = subprocess.run(shown, capture_output=True, text=True, check=True).stderr
+    assert said_by_show.startswith(f"sonarsynth: {copy}: .marks is missing: ") and said_by_show.count("\n") == 1
+    place = Remote("memory://unmarked/s.zarr")
+    place.write_each(contents(copy))
+    with pytest.warns(Unmarked, match=rf"s\.zarr: \.marks{said}copy it as well"):
+        ss.open(str(place))
+    assert repair(copy, workers=0).ok
+    assert (copy / ".marks/1.json").read_bytes() == content
+    ss.open(copy)
+
+
+def test_a_damaged_mark_says_what_to_do(copy: Path) -> None:
+    """It is no loss: the frames are in the recipe."""
+    before = contents(copy)
+    for text in (b"", (copy / ".marks/1.json").read_bytes() + b" "):
+        (copy / ".marks/1.json").write_bytes(text)
+        with pytest.raises(Damage, match=r"^\.marks/1\.json: the mark is damaged: 'sonarsynth repair' writes it again"):
+            load_mark(copy, 1)
+        assert repair(copy, workers=0).ok
+        assert contents(copy) == before
 
 
 def test_a_build_makes_again_what_is_gone(copy: Path, whole: Path, small_plan: Plan) -> None:

@@ -64,3 +64,18 @@ def test_ranges_that_err_are_blamed_on_what_makes_them_err(water: ss.Isovelocity
     assert any("sound at 1540 m/s, good to 1 m/s" in line and "further off than predicted" in line for line in lines)
     assert why in note
     assert ("bend" in note) == (not isinstance(water, ss.Isovelocity))
+
+
+def test_subarrays_that_a_kink_of_the_sound_speed_asks_for_are_put_down_to_it(small_text: str) -> None:
+    """The array is 5 m deep and 15 cm high; of a kink elsewhere nothing is said."""
+    bent = "kind: thermocline, mixed_depth: {} m"
+    said = {}
+    for deep, allowed in ((5.0, 1e-4), (5.05, 1e-4), (8.0, 1e-7)):
+        text = small_text.replace("kind: isovelocity, speed: 1540", bent.format(deep))
+        made = ss.plan(ss.loads(f"{text}\naccuracy: {{signal: {allowed}}}\n"), ["signals"])
+        (said[deep],) = (line for line in made.warnings if "traced by itself" in line)
+    for deep in (5.0, 5.05):
+        assert said[deep].endswith(
+            f", for the sound speed has a kink at {deep:g} m, within the array: move one of the two"
+        )
+    assert "kink" not in said[8.0]

@@ -141,7 +141,7 @@ def test_an_alias_bomb_is_refused(tmp_path: Path) -> None:
 
 def test_files_that_are_not_there(tmp_path: Path) -> None:
     assert refused(tmp_path / "none.yaml") == " no such file"
-    assert refused(tmp_path) == " is not a file"
+    assert refused(tmp_path) == " is not a file but a folder"
 
 
 def test_settings_reach_into_lists_and_make_mappings(small_file: Path) -> None:

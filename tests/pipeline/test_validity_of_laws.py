@@ -13,6 +13,7 @@ from sonarsynth.equations.scattering.modal_series import sphere_amplitude
 from sonarsynth.pipeline.variables import attributes
 from sonarsynth.planning import arrivals_of, plan
 from sonarsynth.scattering import Scatterer, Scattering
+from sonarsynth.scattering.facet_law import FacetLaw
 from sonarsynth.scattering.law_notes import SmallBody
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.target_strength import target_strength
@@ -111,3 +112,21 @@ def test_a_law_of_ones_own_is_asked_as_well(monkeypatch: pytest.MonkeyPatch) -> 
     recipe = scene(0.1, ss.Isotropic())
     assert "ball: made for ka 10.5" in plan(recipe, ()).warnings
     assert "ball: isotropic: made for ka 10.5" in plan(replace(recipe, seed=2), ()).validity
+
+
+@pytest.mark.parametrize(
+    ("times", "said"), [(0.5, ""), (1.0, ""), (3.0, "scatters 3 times"), (1e12, "scatters 1e+12 times")]
+)
+def test_a_law_that_gives_back_more_than_it_gets_is_noted(
+    monkeypatch: pytest.MonkeyPatch, times: float, said: str
+) -> None:
+    """Of one that scatters alike over half of all directions, 2 pi |f|^2 is what it gives back."""
+    monkeypatch.setattr(ss.Isotropic, "validity", FacetLaw.validity)
+    area = float(np.median(scene(0.1, ss.Isotropic()).scene_of(0).meshes[0].area))
+    strength = np.sqrt(times * area * np.cos(np.deg2rad(40.0)) / (2.0 * np.pi))
+    law = ss.Isotropic(strength=float(strength))
+    assert law.returned_share(area) == pytest.approx(times, rel=1e-3)
+    notes = [line for line in plan(scene(0.1, law), ()).warnings if "the power that reaches a facet" in line]
+    assert [line.split(" the power")[0] for line in notes] == ([f"ball: {said}"] if said else [])
+    assert ss.MirrorLobe().returned_share(area) == pytest.approx(1.0, abs=0.01)
+    assert ss.Kirchhoff().returned_share(area) == 0.0, "it has parts of its own"

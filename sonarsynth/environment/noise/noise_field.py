@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.conventions import Complexes, Floats
-from sonarsynth.description.method import FrameSize, Method
+from sonarsynth.description.method import FrameSize, Method, returned
 from sonarsynth.environment.noise.directions import NoiseDirections
 
 ROUNDING = 1e-10
@@ -40,7 +40,10 @@ class NoiseField(Method):
         matrix = self.cross_spectral_density(frequency, position)
         if matrix is None:
             return None
+        shape = (len(frequency), len(position), len(position))
+        returned(self, "cross_spectral_density", matrix, shape, unknown=True)
         power = np.trace(matrix, axis1=1, axis2=2).real / matrix.shape[1]
+        returned(self, "cross_spectral_density", power, frequency.shape)
         try:
             return np.linalg.cholesky(matrix + ROUNDING * power[:, None, None] * np.eye(matrix.shape[1]))
         except np.linalg.LinAlgError:

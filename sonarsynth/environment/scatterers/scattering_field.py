@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.description.method import Method
+from sonarsynth.description.method import Method, returned_rows
 from sonarsynth.scattering import Scatterers
 
 
@@ -19,6 +19,13 @@ class ScatteringField(Method):
     def scatterers(self, bottom: float, random: np.random.Generator) -> Scatterers:
         """All of them; bottom: its depth in m, positive down; random: a stream of their own in each sequence."""
         raise NotImplementedError(f"{type(self).__name__} has no scatterers")
+
+    def placed(self, bottom: float, random: np.random.Generator) -> Scatterers:
+        """What `scatterers` returns, once it has the shape of that."""
+        made, known = self.scatterers(bottom, random), ("position", "normal", "area", "sign")
+        wide = {"position": (3,), "normal": (3,)}
+        loose: Scatterers = returned_rows(self, "scatterers", made, Scatterers, "area", known, wide)
+        return loose
 
     def row(self) -> str:
         """As `Method.row`: with their number."""

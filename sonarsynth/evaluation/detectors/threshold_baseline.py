@@ -28,9 +28,7 @@ def threshold_lines(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     if "image" not in tree.children or not len(objects):
         return []
     peaks = by_kind("peaks")
-    rows = [
-        {"frame": frame, **row} for frame, view in views(tree, used) for row in detections_of(view, peaks.regions(view))
-    ]
+    rows = [{"frame": frame, **row} for frame, view in views(tree, used) for row in detections_of(view, peaks)]
     report = DetectorReport(len(used), tuple(category_names(tree)), from_rows(rows), objects)
     reached = float(report.as_json()["ap_2m"])
     precision = f"a threshold reaches an average precision of {reached:.2f} (at 2 m, {counted(len(objects), 'object')}"

@@ -59,6 +59,10 @@ def compass(bearing: float) -> str:
     return f"{WINDS[round(degrees / 22.5) % 16]} ({round(degrees) % 360:03d} deg)"
 
 
+class BadEnding(ValueError):
+    """The name of a file ends as that of no picture does; str() is one line."""
+
+
 def figure(width: float, height: float, layout: str = "constrained", **more: Any) -> Figure:
     """An empty figure (inches) on its own Agg canvas: no window, no state shared with other figures. Where axes have
     places of their own, `layout` is "none", which spares a quarter of a second."""
@@ -71,8 +75,13 @@ def figure(width: float, height: float, layout: str = "constrained", **more: Any
 
 
 def save(fig: Figure, out: Path, **options: Any) -> Path:
-    """Write a figure into a file, a PNG where the name does not say, and its folder; returns the file."""
-    file = out if out.suffix else out.with_suffix(".png")
+    """Write a figure into a file, a PNG where the name does not say, and its folder; returns the file.
+
+    Raises BadEnding for a name that ends as that of no picture.
+    """
+    file, known = out if out.suffix else out.with_suffix(".png"), fig.canvas.get_supported_filetypes()
+    if file.suffix[1:].lower() not in known:
+        raise BadEnding(f"{file}: is none of {', '.join(sorted(known))} (by its ending)")
     file.parent.mkdir(parents=True, exist_ok=True)
     fig.savefig(file, **options)
     return file

@@ -133,7 +133,7 @@ def _judge(numbers: dict[str, Any], tree: xr.DataTree, built: Ints, progress: Pr
     rows: dict[str, list[dict[str, Any]]] = {kind: [] for kind in methods}
     for done, (frame, view) in enumerate(views(tree, judged), 1):
         for kind, method in methods.items():
-            rows[kind] += [{"frame": frame, **detection} for detection in detections_of(view, method.regions(view))]
+            rows[kind] += [{"frame": frame, **detection} for detection in detections_of(view, method)]
         if progress is not None:
             progress(done, len(judged), 0)
     objects = true_objects(tree, judged)

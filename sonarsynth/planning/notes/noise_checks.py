@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sonarsynth.description import FieldError
+from sonarsynth.description.method import returned
 from sonarsynth.environment.noise import Noise
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.sources.noise_source import NoiseRecording
@@ -25,7 +26,10 @@ def check_noises(scene: Scene) -> None:
         try:
             if isinstance(noise, NoiseRecording):
                 noise.segment(0.0, INSTANT, 1)
-            elif not noise.correlated and not noise.density(np.array([centre]))[0] > 0.0:
+                continue
+            band = np.linspace(scene.sonar.band.low, scene.sonar.band.high, 17)
+            returned(noise, "density", noise.density(band), band.shape)
+            if not noise.correlated and not noise.density(np.array([centre]))[0] > 0.0:
                 said = "; ".join(noise.validity(scene.sonar.band.low, scene.sonar.band.high))
                 raise ValueError(
                     f"holds nothing of the middle of the band, {centre:g} Hz" + (f": {said}" if said else "")

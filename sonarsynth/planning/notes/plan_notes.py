@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sonarsynth.conventions import depth
 from sonarsynth.environment.sea import Profile
+from sonarsynth.environment.sound_speed import kink
 from sonarsynth.planning.choices import OF_BEAMS, OWN_VIEW
 from sonarsynth.planning.measured.lost_echoes import lost_echoes
 from sonarsynth.planning.measured.sampled_frames import SampledScene
@@ -43,6 +45,9 @@ UNKNOWN = 0.1
 """Part of the water, at an end, that a profile may leave out without a word."""
 NOTED = 8
 """Sequences that the notes on scenes are from, at most."""
+
+SHARP, LEAST_SPAN = 0.5, 1e-3
+"""Change of the gradient of the sound speed (1/s) that is called a kink; and over which depth (m) it is measured."""
 
 
 def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
@@ -155,7 +160,7 @@ def _accuracy(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
     if count > 1 and errors.uncut > 0.0:
         lines.append(
             f"accuracy.signal {allowed.signal:g} needs {count} subarrays, each traced by itself: with one the error is "
-            f"{errors.uncut:.3g}"
+            f"{errors.uncut:.3g}{_kink_in_array(plan, looks)}"
         )
     if plan.choices.occlusion == "sensors" and plan.scene.physics.occlusion == "auto":
         needs = f"accuracy.signal {allowed.signal:g} needs the targets' occlusion from each hydrophone"
@@ -188,6 +193,18 @@ def _accuracy(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
             f"{allowed.image_db:g}; use more scene.processing.beamforming.subarrays, or kind dense"
         )
     return lines
+
+
+def _kink_in_array(plan: Plan, looks: Sequence[SampledScene]) -> str:
+    """Why one expansion fails where the sound speed has a kink within the array: rays to its parts bend differently."""
+    reach = plan.elements.aperture
+    for look in looks:
+        middle = float(depth(look.frames[0].sonar_pose.position))
+        if kink(look.profile, middle, reach) > SHARP:
+            nodes = look.profile.depth[np.abs(look.profile.depth - middle) < reach]
+            at = float(nodes[np.argmax([kink(look.profile, node, LEAST_SPAN) for node in nodes])])
+            return f", for the sound speed has a kink at {at:g} m, within the array: move one of the two"
+    return ""
 
 
 def _why_ranges_err(scene: Scene, looks: Sequence[SampledScene]) -> str:

@@ -18,6 +18,7 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.planning.notes.noise_checks import check_noises
 from sonarsynth.planning.notes.track_checks import check_tracks
 from sonarsynth.receiver import Sonar, elements
+from sonarsynth.receiver.sensor_errors import drawn_errors
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.array_paths import MAX_DOPPLER
 from sonarsynth.signals.filtered_pulse import heard_part
@@ -126,7 +127,7 @@ def check_shrimp(scene: Scene) -> None:
     """Every source must be in the water, and its pulse one that can be made and heard."""
     bottom_depth = scene.world.environment.depth
     for i, source in enumerate(scene.sources):
-        position = source.position_at(bottom_depth, scene.trajectory.start)
+        position = source.placed(bottom_depth, scene.trajectory.start)
         if not np.abs(position).max() <= FARTHEST:
             raise FieldError(
                 ("scene", "world", "sources", i, "position"), f"is more than {FARTHEST:g} m from the origin"
@@ -155,7 +156,8 @@ def check_shrimp(scene: Scene) -> None:
 
 
 def check_frame(scene: Scene, frame: Frame) -> None:
-    """The array and every body must be in the water, and no snap inside a body or the array."""
+    """The array and every body must be in the water, no snap inside a body or the array, and a hydrophone must hear."""
+    _check_hearing(scene, frame)
     bottom_depth = scene.world.environment.depth
     hydrophones = frame.sonar_pose.to_world(elements(scene.sonar.array).position)
     when = f"frame {frame.index}"
@@ -184,6 +186,18 @@ def check_frame(scene: Scene, frame: Frame) -> None:
         _check_depth(
             scatterer_path, "a scatterer", field.position, scene.world.environment.depth, f"frame {frame.index}"
         )
+
+
+def _check_hearing(scene: Scene, frame: Frame) -> None:
+    """Processing must be left a hydrophone, without those that it knows to be dead or stuck."""
+    gain, errors = elements(scene.sonar.array).gain, scene.sonar.sensor_errors
+    if not gain.any():
+        raise FieldError(("scene", "sonar", "array", "dead"), "names every hydrophone: none is left to hear")
+    if errors is None or errors.known == "none":
+        return
+    if not (gain * drawn_errors(errors, len(gain), frame.seed, frame.key).works).any():
+        path = ("scene", "sonar", "sensor_errors")
+        raise FieldError(path, f"every hydrophone is dead or stuck at frame {frame.index}")
 
 
 def _check_met(scene: Scene, frame: Frame, number: int) -> None:
@@ -264,7 +278,7 @@ def _check_pulse(source: SoundSource, bottom_depth: float, sonar: Sonar) -> None
     gain, longest = source.largest_scales
     if fault := model.fault(longest, LONGEST_SNAP):
         raise ValueError(fault)
-    pulse = model.pulse(0.0, 0.0)
+    pulse = model.made(0.0, 0.0)
     if not longest * (pulse.end - pulse.start) <= LONGEST_SNAP:
         raise ValueError(f"lasts {longest * (pulse.end - pulse.start):.3g} s; a snap is over in {LONGEST_SNAP:g} s")
     level = float(20.0 * np.log10(gain * pulse.peak / REFERENCE_PRESSURE))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.description.method import FrameSize, Method
+from sonarsynth.description.method import FrameSize, Method, returned_rows
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.receiver import Band, Elements
 from sonarsynth.state import Emission, Receiver, Survey, Trigger
@@ -16,6 +16,13 @@ class LocatingMethod(Method):
     def locate(self, signals: Signals, receiver: Receiver, survey: Survey, snaps: int) -> SourceEstimates:
         """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found."""
         raise NotImplementedError(f"{type(self).__name__} locates nothing")
+
+    def located(self, signals: Signals, receiver: Receiver, survey: Survey, snaps: int) -> SourceEstimates:
+        """What `locate` returns, once it has the shape of that."""
+        found = self.locate(signals, receiver, survey, snaps)
+        wide = {"position": (3,), "position_covariance": (3, 3)}
+        estimates: SourceEstimates = returned_rows(self, "locate", found, SourceEstimates, "time", (), wide, snaps)
+        return estimates
 
     def told(self, snaps: tuple[Emission, ...], receiver: Receiver, random: np.random.Generator) -> tuple[Trigger, ...]:
         """What a trigger tells the sonar of the emissions of a frame, loudest first; nothing, unless it has one.

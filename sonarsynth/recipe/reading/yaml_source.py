@@ -83,7 +83,8 @@ def read_file(path: Path | str) -> Source:
     path, name = Path(path), str(path)
     try:
         if not path.is_file():
-            raise RecipeError(name, "", "", "no such file" if not path.exists() else "is not a file")
+            there = "is not a file" + " but a folder" * path.is_dir()
+            raise RecipeError(name, "", "", there if path.exists() else "no such file")
         with path.open("rb") as file:
             raw = file.read(MAX_BYTES + 1)
     except OSError as error:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from sonarsynth.conventions import Floats
-from sonarsynth.description.method import Method
+from sonarsynth.description.method import Method, returned
 from sonarsynth.equations.reverberation.bottom_strength import Angles
 
 
@@ -28,3 +30,7 @@ class BoundaryLaw(Method):
     def strength(self, angles: Angles, site: BoundarySite) -> Floats:
         """Cross-section (...) per m2 and sr. Raises ValueError in one line where the site is not what it needs."""
         raise NotImplementedError(f"{type(self).__name__} has no strength")
+
+    def scattered(self, angles: Angles, site: BoundarySite) -> Floats:
+        """What `strength` returns, once it is of each pair of angles."""
+        return np.asarray(returned(self, "strength", self.strength(angles, site), np.shape(angles.sine_in)))

@@ -17,6 +17,7 @@ from sonarsynth.store.marks import (
     LAYOUT,
     MANIFESTS,
     MARKS,
+    REMEDY,
     Damage,
     Mark,
     all_files,
@@ -111,10 +112,15 @@ def _manifests(path: Folder, problems: list[Problem]) -> frozenset[str]:
             if read_mark(path, name, LAYOUT) is not None:
                 continue
         except Damage as damage:
-            fault = str(damage).partition(": ")[2]
+            fault = _fault(damage)
         bad.add(name)
         problems.append(Problem(name, fault))
     return frozenset(bad)
+
+
+def _fault(damage: Damage) -> str:
+    """What is wrong with a mark; what to do is said once of all."""
+    return str(damage).partition(": ")[2].removesuffix(f": {REMEDY}")
 
 
 def frame_count(path: Folder) -> int:
@@ -146,8 +152,7 @@ def _marks(
     marks, bad = {}, set()
     for number, mark in load_marks(path, marked(path)):
         if isinstance(mark, Damage):
-            file, _, fault = str(mark).partition(": ")
-            problems.append(Problem(file, fault, region(number)))
+            problems.append(Problem(str(mark).partition(": ")[0], _fault(mark), region(number)))
             bad.add(number)
         elif mark is not None:
             marks[number] = mark
