@@ -121,7 +121,7 @@ def assumed_speed_notes(looks: Sequence[SampledScene]) -> list[str]:
             worst = off
             lines = [
                 f"the sonar assumes sound at {assumed:g} m/s, good to {error:g} m/s, and the water about it has "
-                f"{speed:.4g} m/s: directions {OBLIQUE} deg off the axis of a plane array err by "
+                f"{speed:.5g} m/s: directions {OBLIQUE} deg off the axis of a plane array err by "
                 f"{oblique_error(assumed / speed):.2g} deg, those beyond by more, and places are further off than "
                 "predicted (scene.sonar.assumed_sound_speed)"
             ]

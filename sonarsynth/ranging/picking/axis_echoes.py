@@ -24,7 +24,7 @@ NOISE = 16.0
 """An echo must stand this many dB above the median of its own beam: noise does so once in 10^12 samples."""
 OWN_WIDTH = 0.3
 """Standard angle between a beam and the echo that is loudest in it, in half widths."""
-INTERFERENCE = 0.5
+INTERFERENCE = 0.25
 """Standard error of a peak's delay where echoes overlap, in units of the resolution."""
 
 
@@ -88,7 +88,7 @@ def pick(profiles: Profiles, image: EnergyImage, locality: float) -> AxisEchoes:
         good = (own > 0) & (excess <= locality) & (own * 10 ** (GHOST / 10) >= anywhere)
         good &= own >= noise * 10 ** (NOISE / 10)
         good &= np.minimum(top, power.shape[1] - 1 - top) * profiles.step >= pulse_times.PULSE_HALF
-        off_beam = profiles.width * np.hypot(np.sqrt(excess / 3), OWN_WIDTH)
+        off_beam = profiles.width * np.hypot(np.sqrt(excess / 3), OWN_WIDTH) / np.sqrt(2.0)  # of either angle
         jitter = profiles.resolution * np.hypot(np.sqrt(0.5 * noise / own), INTERFERENCE)
         snr = 10 * np.log10(own / noise * np.log(2.0))
     delay = profiles.first + (top + offset) * profiles.step
