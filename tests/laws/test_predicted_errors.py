@@ -133,7 +133,6 @@ def test_points_err_by_what_is_predicted(name: str) -> None:
     """Of 32 scenes. Ranges were predicted to err by 3 times too much, by 50 where a beam of a ping has one echo."""
     rows = np.concatenate([pulls(FAMILIES[name], seed) for seed in range(32)])
     ranges, angles = np.sqrt(np.mean(rows[:, 0] ** 2)), np.sqrt(np.mean(rows[:, 1:] ** 2))
-    print(name, len(rows), ranges, angles)
     assert len(rows) > 40
     assert 0.7 < ranges < 1.2 and 0.7 < angles < 1.2, (ranges, angles)
     assert np.mean(np.abs(rows) > 3.0) < 0.02
