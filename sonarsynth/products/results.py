@@ -83,7 +83,10 @@ class EnergyImage:
 
 @dataclass(frozen=True, eq=False)
 class PointCloud(Columns):
-    """Where the echoes of a frame come from: a list of points, in the order of their beams. Sonar frame."""
+    """Where the echoes of a frame come from: a list of points, in the order of their beams. Sonar frame.
+
+    Predicted errors are one standard error, of where each echo was made (`clouds.range_error`).
+    """
 
     position: npt.NDArray[np.float32]  # (point, xyz) m
     range: npt.NDArray[np.float32]  # (point,) m from the array centre

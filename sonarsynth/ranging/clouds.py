@@ -115,20 +115,17 @@ def true_directions(beam: Floats, mach: Floats, normal: Floats | None) -> Floats
 
 
 def range_error(solution: Solution, echoes: PickedEchoes, estimates: SourceEstimates, sonar: Sonar) -> Floats:
-    """Predicted standard error (echo,) in m: direction, clock, snap position, sound speed.
+    """Predicted standard error (echo,) in m of the range of where an echo was made: direction, clock, snap position,
+    sound speed.
 
-    The same delay means another range in another direction (dr/dpsi, psi the angle between beam and source). An echo
-    that is taken for one on the axis of its beam comes from beside it, where a sloping surface has another range as
-    well (`PickedEchoes.slope`).
+    The same delay means another range in another direction (dr/dpsi, psi the angle between beam and source).
     """
     c = sonar.assumed_sound_speed
-    beside = np.hypot(
-        solution.by_angle * _angle_error(echoes, estimates.position[0]), _slope_error(echoes, solution.range)
-    )
+    beside = solution.by_angle * _angle_error(echoes, estimates.position[0])
     clock = solution.by_path * c * echoes.delay_error
     g = solution.by_source
     snap = np.einsum("bi,ij,bj->b", g, estimates.position_covariance[0], g)
-    speed = solution.by_path * echoes.delay * sonar.sound_speed_error
+    speed = solution.by_speed * sonar.sound_speed_error
     return np.asarray(np.sqrt(beside**2 + clock**2 + np.maximum(snap, 0.0) + speed**2))
 
 
@@ -142,9 +139,3 @@ def _angle_error(echoes: PickedEchoes, source: Floats) -> Floats:
     share = np.sum(to_port * unit(np.where(length > 0.0, away, to_port)), axis=1) ** 2
     sideways = echoes.azimuth_error * np.cos(echoes.elevation)
     return np.asarray(np.sqrt(share * sideways**2 + (1.0 - share) * echoes.elevation_error**2))
-
-
-def _slope_error(echoes: PickedEchoes, distance: Floats) -> Floats:
-    """What the slope of the surface adds (echo,) in m."""
-    sideways = echoes.azimuth_error * np.cos(echoes.elevation)
-    return np.asarray(echoes.slope * distance * np.sqrt(0.5 * (sideways**2 + echoes.elevation_error**2)))

@@ -78,7 +78,7 @@ def test_good_data_pass_without_a_warning() -> None:
     assert all(check.ok is not False and not check.warning for check in checks)
     numbers = row(checks, "predicted range errors").numbers
     assert numbers["points"] == 400 and numbers["off_target"] == 0
-    assert numbers["pull_std"] == pytest.approx(1.0, abs=0.1)
+    assert numbers["pull_rms"] == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize(

@@ -97,5 +97,5 @@ def refracted_solution(
         r = r - np.clip(late / slope, -0.5 * r, 0.5 * r)
         v = unit(v + missed)
     good = settled & ~closed.ill_conditioned & (slope * local >= 0.1)
-    position = np.where(good[:, None], pose.to_body(point), np.nan)
-    return Solution(position, np.where(good, r, np.nan), closed.by_path, closed.by_angle, closed.by_source)
+    position, r = np.where(good[:, None], pose.to_body(point), np.nan), np.where(good, r, np.nan)
+    return Solution(position, r, closed.by_path, closed.by_angle, closed.by_source, closed.by_path * delay)

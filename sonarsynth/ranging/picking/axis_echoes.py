@@ -22,14 +22,10 @@ GHOST = 8.0
 """An echo is a ghost or a side lobe where another beam holds this many dB more at the same delay."""
 NOISE = 16.0
 """An echo must stand this many dB above the median of its own beam: noise does so once in 10^12 samples."""
-EXTENT = 0.05
-"""Share of a profile's peak above which it is echo: how far that spreads is the depth of the target in the beam."""
 OWN_WIDTH = 0.3
 """Standard angle between a beam and the echo that is loudest in it, in half widths."""
-INTERFERENCE = 0.5
+INTERFERENCE = 0.25
 """Standard error of a peak's delay where echoes overlap, in units of the resolution."""
-SLOPE = 0.7
-"""Standard slope of a surface against the beam: its range changes by this share of the distance across the beam."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +63,6 @@ def axis_echoes(
         delay_error=echoes.delay_error[own],
         energy=window.image.energy[row, column],
         snr=echoes.snr[own],
-        slope=np.full(len(angle), SLOPE),
         overflow=left_out,
     )
 
@@ -78,8 +73,7 @@ def pick(profiles: Profiles, image: EnergyImage, locality: float) -> AxisEchoes:
     At the delay of its peak, no beam within a beam width may hold `locality` dB more, or the echo comes from there; and
     no beam at all `GHOST` dB more, or it comes through a side lobe or a grating lobe; and it must stand out of the
     noise. Nearer to an end of the profile than half a pulse (`pulse_times.PULSE_HALF`) a peak is what the window left
-    of an echo, whose own peak may be outside: that is none. Where a beam holds echoes of several delays its axis may
-    meet the surface of another than the loudest: their spread is in the error of the delay.
+    of an echo, whose own peak may be outside: that is none.
     """
     power, count = profiles.power, len(profiles.power)
     rows = np.arange(count)
@@ -94,23 +88,11 @@ def pick(profiles: Profiles, image: EnergyImage, locality: float) -> AxisEchoes:
         good = (own > 0) & (excess <= locality) & (own * 10 ** (GHOST / 10) >= anywhere)
         good &= own >= noise * 10 ** (NOISE / 10)
         good &= np.minimum(top, power.shape[1] - 1 - top) * profiles.step >= pulse_times.PULSE_HALF
-        off_beam = profiles.width * np.hypot(np.sqrt(excess / 3), OWN_WIDTH)
+        off_beam = profiles.width * np.hypot(np.sqrt(excess / 3), OWN_WIDTH) / np.sqrt(2.0)  # of either angle
         jitter = profiles.resolution * np.hypot(np.sqrt(0.5 * noise / own), INTERFERENCE)
         snr = 10 * np.log10(own / noise * np.log(2.0))
     delay = profiles.first + (top + offset) * profiles.step
-    clock = np.hypot(jitter, _extent(profiles, top, own))
-    return AxisEchoes(np.where(good, delay, np.nan), clock, off_beam, snr)
-
-
-def _extent(profiles: Profiles, top: Ints, own: npt.NDArray[np.float32]) -> Floats:
-    """Root mean square distance (beam,) in s of a beam's echo from its peak; 0 for one glint, but for its own width."""
-    echo = np.where(profiles.power >= EXTENT * own[:, None], profiles.power, np.float32(0.0))
-    steps = np.arange(echo.shape[1], dtype=np.float32)
-    total = np.maximum(echo.sum(axis=1), np.finfo(np.float32).tiny)
-    mean = echo @ steps / total
-    square = np.einsum("bt,bt->b", echo, (steps - mean[:, None]) ** 2) / total
-    spread = profiles.step * np.sqrt(square + (mean - top) ** 2)
-    return np.asarray(np.sqrt(np.maximum(spread**2 - profiles.resolution**2, 0.0)))
+    return AxisEchoes(np.where(good, delay, np.nan), jitter, off_beam, snr)
 
 
 def _loudest_near(profiles: Profiles, image: EnergyImage, top: Ints) -> npt.NDArray[np.float32]:

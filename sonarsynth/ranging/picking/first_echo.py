@@ -41,5 +41,6 @@ class FirstEcho(Method):
         """The first delay of each profile over the share, where the beam has an echo of its own at all."""
         over = profiles.power >= self.share * profiles.power.max(axis=1, keepdims=True)
         first = profiles.first + over.argmax(axis=1) * profiles.step
-        error = np.hypot(loudest.delay_error, loudest.delay - np.minimum(first, loudest.delay))
-        return replace(loudest, delay=np.minimum(first, loudest.delay), delay_error=error)
+        delay = np.minimum(first, loudest.delay)
+        beyond = (loudest.delay - delay) / np.sqrt(3.0)  # it is anywhere between the two, root mean square
+        return replace(loudest, delay=delay, delay_error=np.hypot(loudest.delay_error, beyond))

@@ -50,10 +50,11 @@ CENTRE_WINDOW = 1.4
 """Standard deviation, in widths of a peak, of the window about it in which the centre of power is looked for."""
 NOISE_CLEAR = 4.0
 """Power below that, in units of the mean power of noise, does not count for the centre."""
-CENTRE_ERROR = 1.3
-"""Standard error of a peak over how far the centre of power about it is from it (fitted to five recipes)."""
-SURFACE_ERROR = np.array([0.04, 0.04, 0.15])
-"""Standard error along elevation, azimuth and delay, in widths, of echoes of surfaces, not points (fitted)."""
+CENTRE_ERROR = np.array([1.3, 1.3, 0.4])
+"""Standard error of a peak along elevation, azimuth and delay over how far the centre of power about it is from it
+(fitted to random scenes, as `test_points_err_by_what_is_predicted` has them)."""
+SURFACE_ERROR = np.array([0.05, 0.05, 0.17])
+"""Standard error along these, in widths, of echoes of surfaces, not points (fitted to these)."""
 UNKNOWN = 0.5
 """Standard error of a direction along an axis that is not resolved, in half widths of the beam."""
 
@@ -98,7 +99,6 @@ def peak_echoes(
         delay_error=error[:, 2],
         energy=energy.astype(np.float32),
         snr=10 * np.log10(snr),
-        slope=np.zeros(len(b)),
         overflow=left_out,
     )
 

@@ -24,11 +24,10 @@ class PickedEchoes(Columns):
     delay_error: Floats  # (echo,) s
     energy: npt.NDArray[np.float32]  # (echo,) Pa2 s: of the echo, or of its beam
     snr: Floats  # (echo,) dB: power of the peak over the mean power of noise in its beam
-    slope: Floats  # (echo,) m/m: by how much the range may differ across `azimuth_error`, beside what geometry says
     overflow: int = 0  # beams that were not looked at, the faintest
 
 
 def no_echoes(image: EnergyImage, overflow: int) -> PickedEchoes:
     """None."""
     none = np.zeros(0)
-    return PickedEchoes(none, none, none, none, none, none, image.energy.ravel()[:0], none, none, overflow)
+    return PickedEchoes(none, none, none, none, none, none, image.energy.ravel()[:0], none, overflow)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 from sonarsynth.conventions import Floats
@@ -33,8 +34,10 @@ class RefractedPlacing(Method):
     def place(
         self, delay: Floats, beam: Floats, source: Floats, sonar: Sonar, sonar_pose: Pose, profile: Profile
     ) -> Solution:
-        """See `PlacingMethod`. Positions lie where the rays lead; a range is the straight distance to there."""
+        """See `PlacingMethod`. Positions lie where the rays lead; a range is the straight distance to there. By the
+        profile of the water itself no error of the assumed sound speed enters it."""
         from sonarsynth.ranging.location.refraction import refracted_solution
 
         believed = profile if self.profile is None else profile_of(self.profile)
-        return refracted_solution(delay, beam, source, sonar.assumed_sound_speed, sonar_pose, believed)
+        solution = refracted_solution(delay, beam, source, sonar.assumed_sound_speed, sonar_pose, believed)
+        return solution if self.profile is not None else replace(solution, by_speed=0.0 * solution.by_speed)

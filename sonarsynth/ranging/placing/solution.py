@@ -20,6 +20,7 @@ class Solution:
     by_path: Floats  # (echo,) dr/dx, x the excess path
     by_angle: Floats  # (echo,) m/rad
     by_source: Floats  # (echo, xyz) dr/dS
+    by_speed: Floats  # (echo,) s: dr/dc, c the sound speed that places are computed with; 0 where that is the water's
 
     def as_array_moves(self, source: Floats, shift: Floats) -> Solution:
         """Of an array that has moved between the direct arrival and the echo, so that the source (xyz) m, sonar frame,
@@ -33,4 +34,5 @@ def isovelocity_solution(delay: Floats, beam: Floats, source: Floats, sound_spee
     """Closed form; NaN where the target would be too near the line from source to array."""
     bistatic = bistatic_range(sound_speed * delay, beam, source)
     r = np.where(bistatic.ill_conditioned, np.nan, bistatic.range)
-    return Solution(r[:, None] * beam, r, bistatic.by_path, bistatic.by_angle, bistatic.by_source)
+    by_speed = bistatic.by_path * delay
+    return Solution(r[:, None] * beam, r, bistatic.by_path, bistatic.by_angle, bistatic.by_source, by_speed)
