@@ -198,9 +198,7 @@ def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays, start: Floats
     for boundary, count, c in met:
         effect = bounces(boundary, np.arccos(np.minimum(rays.slowness * c, 1.0)), count, c, frequency)
         factor *= effect.modulus * np.exp(-0.5 * (2.0 * np.pi * frequency * effect.delay_std) ** 2)
-    vertices = rays.surface + rays.bottom + rays.turning
-    climb = np.nan_to_num(rays.start_sine)
-    lost = plan.absorption_at_depths.lost(rays.length, plan.profile, start[rays.pair], end[rays.pair], climb, vertices)
+    lost = plan.medium.absorbed(rays.length, start[rays.pair], end[rays.pair])
     with np.errstate(divide="ignore"):
         return np.asarray(-20.0 * np.log10(factor) + lost)
 
