@@ -7,7 +7,6 @@ Exit status: 0 done, 1 our fault, 2 bad input, 3 finished, but some frames faile
 from __future__ import annotations
 
 import json
-import time
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -139,7 +138,7 @@ def build(
     prediction, predicting = None, not schedule.brief(plan, wanted) if predicting is None else predicting
     if predicting and scheduler is None and (restart or stores.missing(store, plan, wanted)):
         with printing.planning("timing frames"):
-            prediction = schedule.predict(plan, prepared=time.process_time())
+            prediction = schedule.predict(plan)
     with printing.progress() as progress:
         report = schedule.build(
             plan, store, frames=wanted, workers=workers, scheduler=scheduler, restart=restart,
@@ -170,7 +169,7 @@ def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_P
     with reading.opened(recipe, settings) as made_from, printing.planning():
         planned = planning.plan(made_from, chosen)
     with printing.planning("timing frames"):
-        prediction = schedule.predict(planned, prepared=time.process_time())
+        prediction = schedule.predict(planned)
     planned = prediction.tried(planned)
     if as_json:
         _print_json({**planned.as_json(), **prediction.as_json()})

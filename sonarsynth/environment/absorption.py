@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.environment.sea import Absorption, Profile
-from sonarsynth.equations.rays import path_means
+from sonarsynth.conventions import Floats
+from sonarsynth.environment.sea import Absorption
 from sonarsynth.equations.water import seawater
 from sonarsynth.equations.water.formula_ranges import noted
 
@@ -25,15 +23,13 @@ def absorption_db_per_m(absorption: Absorption, frequency: npt.ArrayLike, depth:
         return _formula(absorption, frequency, depth)
 
 
-ALIKE = 1e-3
-"""dB: a ray over which the depths of the water can differ by no more is averaged along straight legs."""
 NODES = 513
 """Depths that absorption is taken at: linear in between, it errs by 4e-6 of itself in 12 km of water."""
 
 
 @dataclass(frozen=True, eq=False)
 class DepthAbsorption:
-    """Absorption at one frequency at every depth: each path loses its mean over the depths that it passes."""
+    """Absorption at one frequency at every depth."""
 
     depth: Floats  # (node,) m, from the surface to the bottom
     value: Floats  # (node,) dB/m
@@ -44,34 +40,16 @@ class DepthAbsorption:
         depth = np.linspace(0.0, bottom, NODES)
         return DepthAbsorption(depth, absorption_db_per_m(absorption, frequency, depth))
 
-    @cached_property
-    def integral(self) -> Floats:
-        """(node,) dB: of the value, from the surface down."""
-        value = self.value
-        return np.append(0.0, np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(self.depth)))
+    def between(self, start: Floats, end: Floats) -> Floats:
+        """Mean (path,) in dB/m along straight lines from depths start to end (path,) m, by Simpson's rule. Rays that
+        are reflected or bent pass other depths too, which are taken to absorb as much."""
+        first, middle, last = (np.interp(z, self.depth, self.value) for z in (start, 0.5 * (start + end), end))
+        return np.asarray((first + 4.0 * middle + last) / 6.0)
 
-    def lost(
-        self, length: Floats, profile: Profile, start: Floats, end: Floats, climb: Floats, vertices: Ints
-    ) -> Floats:
-        """What is absorbed (path,) in dB along rays of some length (path,) m; the rest as of `along`. Off by `ALIKE` at
-        most where that spares following them."""
-        bent = length * np.ptp(self.value) > ALIKE
-        return length * self.along(profile, start, end, climb, vertices, bent)
-
-    def along(
-        self, profile: Profile, start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: Bools | None = None
-    ) -> Floats:
-        """Mean (path,) in dB/m along rays from depths start to end (path,) m.
-
-        profile: what bends them, a uniform one if nothing does; climb (path,): upward component of the unit vector in
-        which each leaves; vertices (path,): reflections and turning points; bent (path,): which are followed where they
-        bend, all if left out.
-        """
-        out = np.empty(len(start))
-        water, table = (profile.depth, profile.speed), (self.depth, self.value, self.integral)
-        bent = np.full(len(start), not profile.uniform) if bent is None else bent & (not profile.uniform)
-        path_means.means(start, end, climb, vertices, bent, float(self.depth[-1]), water, table, out)
-        return out
+    @property
+    def mean(self) -> float:
+        """Mean (dB/m) over all depths."""
+        return float(np.trapezoid(self.value, self.depth) / self.depth[-1])
 
 
 def absorption_notes(absorption: Absorption, frequency: npt.ArrayLike, depth: npt.ArrayLike) -> tuple[str, ...]:

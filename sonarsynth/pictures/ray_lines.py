@@ -26,11 +26,10 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.pictures.ray_figures.ray_styles import FAN
 from sonarsynth.planning import Plan
 from sonarsynth.products import FAMILIES
-from sonarsynth.propagation.polylines import Polylines, polylines
 from sonarsynth.propagation.ray_request import EigenrayRequest
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.filtered_pulse import snap_levels
-from sonarsynth.tracing.ray_fan import EVENTS, RayFan
+from sonarsynth.tracing.ray_fan import EVENTS, RayFan, follow_eigenrays
 
 WORDS = {GOOD: "good", COINCIDENT: "coincident ends", CAUSTIC: "near a caustic", PASSED: "past a caustic"}
 """Flags of eigenrays, `ray_solutions.REASONS`, in the words of a table."""
@@ -178,7 +177,7 @@ def _legs(
     start, end = (np.array([pair[index].position for pair in pairs]) for index in (0, 1))
     distance = np.hypot(*(end - start)[:, :2].T)
     rays = eigenrays(layers, depth(start), depth(end), distance, vertices, vertices)
-    lines = polylines(layers, start, end, rays, sagitta=1e-4 * environment.depth)
+    lines = follow_eigenrays(layers, start, end, rays, 1e-4 * environment.depth)
     loss = _transmission_loss(plan, layers, rays, depth(start), depth(end))
     row = np.searchsorted(lines.ray, np.arange(len(rays.pair) + 1))
     by_pair: list[list[RayLine]] = [[] for _ in pairs]
@@ -199,16 +198,12 @@ def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays, start: Floats
     for boundary, count, c in met:
         effect = bounces(boundary, np.arccos(np.minimum(rays.slowness * c, 1.0)), count, c, frequency)
         factor *= effect.modulus * np.exp(-0.5 * (2.0 * np.pi * frequency * effect.delay_std) ** 2)
-    vertices = rays.surface + rays.bottom + rays.turning
-    climb = np.nan_to_num(rays.start_sine)
-    lost = plan.absorption_at_depths.lost(rays.length, plan.profile, start[rays.pair], end[rays.pair], climb, vertices)
+    lost = plan.medium.absorbed(rays.length, start[rays.pair], end[rays.pair])
     with np.errstate(divide="ignore"):
         return np.asarray(-20.0 * np.log10(factor) + lost)
 
 
-def _leg(
-    lines: Polylines, span: slice, rays: Eigenrays, i: int, loss: float, others: tuple[PlacedTarget, ...]
-) -> RayLine:
+def _leg(lines: RayFan, span: slice, rays: Eigenrays, i: int, loss: float, others: tuple[PlacedTarget, ...]) -> RayLine:
     """Eigenray i as a line; others: the bodies that may hide it."""
     position = lines.position[span]
     hidden = bool(occluded(others, position[:-1], position[1:]).any())

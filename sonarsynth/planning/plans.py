@@ -148,18 +148,18 @@ class Plan:
     def absorption(self, frequency: np.ndarray | float) -> Floats:
         """Absorption in dB/m at frequencies (Hz): the mean over the depths of the sequence's paths.
 
-        That gives the spectrum its shape; at the centre of the band each path has its own (`absorption_at_depths`).
+        That gives the spectrum its shape; at the centre of the band each path has its own (`Medium.absorbed`).
         """
         return mean_absorption(self.scene.world.environment.absorption, self._path_depths, frequency)
 
     @property
     def medium(self) -> Medium:
         """The water of the sequence."""
-        return Medium(self.scene.world.environment, self.profile, self.absorption_at_depths)
+        return Medium(self.scene.world.environment, self.profile, self._absorption_at_depths)
 
     @cached_property
-    def absorption_at_depths(self) -> DepthAbsorption:
-        """Absorption at the centre of the band, which each path loses by the depths that it passes."""
+    def _absorption_at_depths(self) -> DepthAbsorption:
+        """Absorption at the centre of the band."""
         environment = self.scene.world.environment
         return DepthAbsorption.of(environment.absorption, self.scene.sonar.band.centre, environment.depth)
 

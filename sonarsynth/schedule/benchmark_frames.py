@@ -52,10 +52,8 @@ class Trial:
 
     frames: tuple[int, ...]  # those that were made
     cpu: Mapping[str, float]  # s of one core a frame, by stage
-    loading: float  # s of one core that the very first frame took longer
     waiting: float  # wall-clock time over processor time, of frames
-    writing: tuple[float, float]  # s to write a whole shard: processor, wall clock
-    laying_out: tuple[float, float]  # s to lay the store out: processor, wall clock
+    writing: float  # s of one core to write a whole shard
     fixed: Sizes  # of the store without frames
     shard: Sizes  # that a whole shard adds
     failures: tuple[str, ...]  # of frames that could not be made, a line each
@@ -85,28 +83,25 @@ def try_frames(plan: Plan, folder: Path | None = None) -> Trial:
     """
     if sum(stage.seconds for stage in plan.stages) > LONGEST:
         raise RuntimeError(f"one would take more than {LONGEST:g} s")
-    timed, failures, loading = list[_TimedFrame](), list[str](), 0.0
+    timed, failures = list[_TimedFrame](), list[str]()
     for index in _spread(plan.recipe.frames):
         if sum(frame.seconds for frame in timed) > TRIED:
             break
         try:
-            first = None if timed else _make(plan, index)
+            if not timed:
+                _make(plan, index)
             timed.append(_make(plan, index))
         except Exception as error:
             failures.append(f"frame {index}: {' '.join(f'{type(error).__name__}: {error}'.split())}")
-            continue
-        loading = loading if first is None else max(first.seconds - timed[0].seconds, 0.0)
     if not timed:
         raise RuntimeError(failures[0])
-    laying_out, fixed, writing, shard = _write(plan, [frame.values for frame in timed], folder)
+    fixed, writing, shard = _write(plan, [frame.values for frame in timed], folder)
     names = dict.fromkeys(name for frame in timed for name in frame.cpu)
     return Trial(
         frames=tuple(frame.frame for frame in timed),
         cpu={name: sum(frame.cpu.get(name, 0.0) for frame in timed) / len(timed) for name in names},
-        loading=loading,
         waiting=max(sum(frame.wall for frame in timed) / max(sum(frame.seconds for frame in timed), 1e-9), 1.0),
         writing=writing,
-        laying_out=laying_out,
         fixed=fixed,
         shard=shard,
         failures=tuple(failures),
@@ -147,26 +142,23 @@ def _make(plan: Plan, index: int) -> _TimedFrame:
     return _TimedFrame(index, values, dict(cpu), time.perf_counter() - began)
 
 
-Times = tuple[float, float]
-
-
-def _write(plan: Plan, tried: Sequence[Values], folder: Path | None) -> tuple[Times, Sizes, Times, Sizes]:
+def _write(plan: Plan, tried: Sequence[Values], folder: Path | None) -> tuple[Sizes, float, Sizes]:
     """Lay the store out in a folder that is removed, and write its first shard from frames that were tried."""
     with tempfile.TemporaryDirectory(prefix=".sonarsynth-", dir=folder) as scratch:
         path = Path(scratch) / "store"
-        laying_out = _timed(partial(store.create, path, plan))
+        store.create(path, plan)
         fixed = disk_use(path)
         frames = {frame: tried[frame % len(tried)] for frame in layout_of(plan).region(0)}
         writing = min(_timed(partial(store.write_shard, path, plan, 0, frames)) for _ in range(2))
         disk = disk_use(path)
-        return laying_out, fixed, writing, disk + fixed * -1.0
+        return fixed, writing, disk + fixed * -1.0
 
 
-def _timed(work: Callable[[], object]) -> Times:
-    """Seconds of the processor and of the wall clock."""
-    cpu, wall = time.process_time(), time.perf_counter()
+def _timed(work: Callable[[], object]) -> float:
+    """Seconds of the processor."""
+    began = time.process_time()
     work()
-    return time.process_time() - cpu, time.perf_counter() - wall
+    return time.process_time() - began
 
 
 def disk_use(location: store.Folder | str) -> Sizes:

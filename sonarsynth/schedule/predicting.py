@@ -21,18 +21,8 @@ from sonarsynth.schedule.making import usable_cores
 if TYPE_CHECKING:
     from sonarsynth.schedule.build_report import BuildReport
 
-PREPARED: Final = 3.0
-"""Seconds of one core until a process has a plan, where that was not measured: imports, reading, compiled kernels."""
-CLUSTER: Final = 0.35
-"""Share of that to start and to end a scheduler and its client."""
-WORKER: Final = 0.75
-"""Share of it that a worker takes until it is at its pace: to join its scheduler, to have the plan, kernels."""
-PER_FRAME: Final = 3e-3
-"""Seconds of one core for the scheduler to see to the tasks of a frame."""
-CLOSING: Final = 0.3
-"""Seconds that nothing happens in while processes start and end."""
-LAYING_OUT: Final = 0.1
-"""Seconds of one core to lay a store out, where that was not tried."""
+STARTING: Final = 4.0
+"""Seconds of one core until worker processes are at their pace: a scheduler, imports, the plan, compiled kernels."""
 COMPRESSED: Final = 0.4
 """Bytes after compression over those before, where that was not tried."""
 
@@ -48,11 +38,8 @@ class Prediction:
     basis: str  # what it is known from, in words
     stages: Mapping[str, float]  # s of one core a frame, by stage; `write` with it
     raw_bytes_a_frame: int  # before compression
-    loading: float  # s of one core, before the first frame of a process is at the pace of the others
-    prepared: float  # s of one core until a process has the plan
+    starting: float  # s of one core until a worker is at its pace
     waiting: float  # wall-clock time over processor time here and now, of one process
-    writing_wait: float  # s a frame that writing takes longer than its processor time
-    laying_out: tuple[float, float]  # s: processor, wall clock
     sizes: tuple[Sizes, Sizes]  # of the store without frames; that a whole shard adds
     files: int  # and folders, at most
     failures: tuple[str, ...] = ()  # frames that could not be tried, a line each
@@ -71,32 +58,22 @@ class Prediction:
 
     @property
     def frames_seconds(self) -> float:
-        """Seconds of one core for all frames: making (what workers load with it), without writing."""
-        return self.frames * (self.frame_seconds - self.stages.get("write", 0.0)) + self.workers * self.loading
+        """Seconds of one core to make all frames, without writing."""
+        return self.frames * (self.frame_seconds - self.stages.get("write", 0.0))
 
     @property
     def core_seconds(self) -> float:
         """Seconds of the processor in all, those of starting too."""
-        work = self.frames * self.frame_seconds + self.workers * self.loading
-        if self.workers:
-            work += (CLUSTER + self.workers * WORKER) * self.prepared + self.frames * PER_FRAME
-        return self.laying_out[0] + work
+        return self.frames * self.frame_seconds + self.workers * self.starting
 
     @property
     def seconds(self) -> float:
         """Seconds of the wall clock, from the call of `build` to its end, with the machine as busy as it is now."""
-        if not self.frames:
-            return self.laying_out[1]
-        parallel = max(min(self.workers, self.cores), 1)  # workers that run at the same time
-        crowded = max(self.workers, 1) / parallel
+        processes = max(self.workers, 1)
+        crowded = processes / min(processes, self.cores)  # more than run at the same time
         shards = -(-self.frames // self.shard_frames)
-        busiest = min(self.frames, -(-shards // max(self.workers, 1)) * self.shard_frames)
-        work = busiest * self.frame_seconds + (self.loading if self.workers else 0.0)
-        wall = self.laying_out[1] + work * crowded * self.waiting + busiest * self.writing_wait
-        if self.workers:
-            seeing_to = self.frames * PER_FRAME / (self.cores if self.workers >= self.cores else 1)
-            wall += self.waiting * ((CLUSTER + crowded * WORKER) * self.prepared + seeing_to) + CLOSING
-        return wall
+        busiest = min(self.frames, -(-shards // processes) * self.shard_frames)
+        return self.waiting * crowded * (busiest * self.frame_seconds + (self.starting if self.workers else 0.0))
 
     @property
     def raw_bytes(self) -> int:
@@ -164,19 +141,15 @@ def predict(
     frames: int | None = None,
     workers: int | None = None,
     folder: Path | str | None = None,
-    prepared: float | None = None,
 ) -> Prediction:
     """Predict a build of a plan, by making some of its frames, which takes a second or two.
 
     `frames`: how many (left out: all); `workers`: as for `build`; `folder`: where a scratch store may be laid out and
-    removed again (left out: that of temporary files); `prepared`: seconds of the processor that a process like this
-    one takes until it has the plan, where that was measured (much more of it was for choices, that workers are
-    given, or for a compiler, whose work is kept). Never raises for a frame or a disk that fails: costs are
-    by counts of work then, and `basis` says why.
+    removed again (left out: that of temporary files). Never raises for a frame or a disk that fails: costs are by
+    counts of work then, and `basis` says why.
     """
     cores = usable_cores()
     counted = {stage.stage: stage.seconds for stage in plan.stages}
-    usual = PREPARED * machine_factor()
     raw = sum(stage.bytes for stage in plan.stages)
     result = Prediction(
         frames=plan.recipe.frames,
@@ -186,11 +159,8 @@ def predict(
         basis="counts of operations",
         stages=counted,
         raw_bytes_a_frame=raw,
-        loading=0.0,
-        prepared=usual if prepared is None else min(prepared, 1.25 * usual),
+        starting=STARTING * machine_factor(),
         waiting=1.0,
-        writing_wait=0.0,
-        laying_out=(LAYING_OUT, LAYING_OUT),
         files=store.layout_of(plan).files(),
         sizes=(Sizes(3e5, 1.1e6), Sizes(1.0, 1.6) * (COMPRESSED * raw * plan.shard_frames)),
     )
@@ -207,15 +177,12 @@ def predict(
 def _from(prediction: Prediction, trial: Trial) -> Prediction:
     """A prediction with what a trial has shown."""
     stages = {name: seconds for name, seconds in trial.cpu.items() if name != "collect"}
-    stages["write"] = trial.writing[0] / prediction.shard_frames + trial.cpu.get("collect", 0.0)
+    stages["write"] = trial.writing / prediction.shard_frames + trial.cpu.get("collect", 0.0)
     return replace(
         prediction,
         basis=f"timing frames on this machine (number {', '.join(map(str, sorted(trial.frames)))})",
         stages=stages,
-        loading=min(trial.loading, 0.2 * prediction.prepared),  # not what a compiler did, which is kept
         waiting=trial.waiting,
-        writing_wait=max(trial.writing[1] - trial.waiting * trial.writing[0], 0.0) / prediction.shard_frames,
-        laying_out=trial.laying_out,
         sizes=(trial.fixed, trial.shard),
         failures=trial.failures,
         odds=trial.odds,

@@ -68,6 +68,17 @@ class Medium:
         """Depth of the bottom in m."""
         return self.environment.depth
 
+    @property
+    def mean_absorption(self) -> float:
+        """dB/m at the centre of the band: the mean over all depths."""
+        return self.absorption if isinstance(self.absorption, float) else self.absorption.mean
+
+    def absorbed(self, length: Floats, start: Floats, end: Floats) -> Floats:
+        """What is absorbed (path,) in dB, at the centre of the band, along paths of some length (path,) m from depths
+        start to end (path,) m."""
+        loss = self.absorption if isinstance(self.absorption, float) else self.absorption.between(start, end)
+        return np.asarray(loss * length)
+
 
 @dataclass(frozen=True, eq=False)
 class Receiver:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET
+from sonarsynth.conventions import NO_TARGET, depth
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Emission, FrameContext
@@ -21,7 +21,6 @@ from sonarsynth.tracing.expansion.coincident_paths import with_coincident_added
 from sonarsynth.tracing.facet_paths import FacetPaths, facet_paths, facet_paths_at_rest
 from sonarsynth.tracing.meetings import meetings, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
-from sonarsynth.tracing.path_absorption import path_loss
 from sonarsynth.tracing.receive_paths import Starts, rays_to_centre
 from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, directed, join, no_arrivals
 
@@ -121,8 +120,9 @@ def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) 
     legs = legs if meeting is None else received(legs, met, meeting, medium, receiver.centre)
     loud, turned = directed(snap, legs.departure)
     legs = legs.but(spreading=legs.spreading * loud, phase=legs.phase + turned)
+    loss = medium.absorbed(legs.length, depth(legs.point), depth(receiver.pose.position))
     direct = assemble(
-        legs, fronts.but(amplitude=amplitude), none_out, index, snap.time, path_loss(array, snap, legs),
+        legs, fronts.but(amplitude=amplitude), none_out, index, snap.time, loss,
         kind=Kind.DIRECT, target=none, facet=none, scattering=one, pulses=PulseResponse.plain(count),
         amplitude_error=error,
     )  # fmt: skip

@@ -33,7 +33,6 @@ from sonarsynth.tracing.expansion.amplitude_polynomials import variations
 from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
 from sonarsynth.tracing.expansion.scattering_points import delay_to_scattering_points, shift_to_scattering_points
 from sonarsynth.tracing.occlusion.ray_cones import hidden, overlapping
-from sonarsynth.tracing.path_absorption import path_loss
 from sonarsynth.tracing.pruning import EchoLevels, loud_of_all, loud_ones
 from sonarsynth.tracing.receive_paths import DOUBTFUL, ReceivePaths, may_face_receiver, usable
 from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arrivals, ordered, path_pairs
@@ -151,7 +150,9 @@ def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...
             legs = received(legs, block.carried, meeting, array.context.medium, receiver.centre)
         kinds, target, facet = array.met(out.facet, kind)
         amplitude, sign = _columns(block.groups, "amplitude", "sign")
-        scattered, loss = sign * amplitude, path_loss(array, snap, legs, out)
+        scattered, medium, met = sign * amplitude, array.context.medium, depth(legs.point)
+        loss = medium.absorbed(legs.length, met, depth(receiver.pose.position))
+        loss = loss + medium.absorbed(out.length, met, depth(snap.position))
         echo = assemble(
             legs, over.but(amplitude=variation), out, index, snap.time, loss, kind=kinds, target=target,
             facet=facet, scattering=scattered, pulses=block.pulses, amplitude_error=error,

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, depth
-from sonarsynth.equations.rays.ray_solutions import Water, water, within
+from sonarsynth.equations.rays.ray_solutions import Eigenrays, Water, water, within
 from sonarsynth.geometry import unit
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.propagation.ray_steps import ARRIVAL, END, EVENTS, FACET, LAUNCH, Rays, launch, reflect, step
+from sonarsynth.propagation.ray_steps import (
+    ARRIVAL,
+    BOTTOM,
+    END,
+    EVENTS,
+    FACET,
+    LAUNCH,
+    SURFACE,
+    TURN,
+    Rays,
+    launch,
+    reflect,
+    step,
+)
 from sonarsynth.scattering import FacetLaw
 from sonarsynth.scattering.components import size_at
 from sonarsynth.scattering.facet_geometry import patches
@@ -21,7 +35,10 @@ from sonarsynth.tracing.occlusion.ray_cones import hidden
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
 
-__all__ = ["EVENTS", "RayFan", "fan"]
+__all__ = ["EVENTS", "RayFan", "fan", "follow_eigenrays"]
+
+LEFT = 1e-9
+"""Of the travel time of an eigenray is left when it ends: a boundary at its very end is not met by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +106,48 @@ def fan(
                 coefficient=coefficient,
             )
             points += _follow(layers, (), onward, 0, spacing, sagitta, None, ARRIVAL)
+    return _sorted(points, coefficient)
+
+
+def follow_eigenrays(layers: Water, start: Floats, end: Floats, rays: Eigenrays, sagitta: float) -> RayFan:
+    """Eigenrays from start (pair, xyz) to end (pair, xyz), in the world, in m, followed until they arrive.
+
+    sagitta: largest distance (m) of an arc from its chord. Rounding of the launch, which a ray that bends little
+    carries to its end within 1e-9 of its length, is taken out there. Vertices at the very end are put there.
+    """
+    count, span = len(rays.pair), (end - start)[rays.pair]
+    distance = np.hypot(span[:, 0], span[:, 1])
+    ahead = np.divide(span[:, :2], distance[:, None], out=np.zeros((count, 2)), where=distance[:, None] > 0.0)
+    p, sine, zero = np.where(distance > 0.0, rays.slowness, 0.0), np.nan_to_num(rays.start_sine), np.zeros(count)
+    cosine = p * rays.start_speed
+    aim = np.column_stack([cosine[:, None] * ahead, sine])
+    until = (1.0 - LEFT) * rays.travel_time
+    leaving = launch(layers, np.arange(count), start[rays.pair], aim, zero, zero, until)
+    above = np.maximum(leaving.layer - 1, 0)  # of a jump, whose upper side the ray may leave
+    upper = (layers.depth[above] == depth(leaving.position)) & (layers.speed[above] == rays.start_speed)
+    leaving = leaving.but(phi=np.arctan2(-sine, cosine), p=p, layer=np.where(upper, above, leaving.layer))
+    level = (sine == 0.0) & (np.nan_to_num(rays.end_sine) == 0.0)  # all the way, or coincident
+    bending = leaving.select(~level)
+    points = [_points(leaving, LAUNCH), _points(leaving.select(level), ARRIVAL)]
+    points += _follow(layers, (), bending, sys.maxsize, np.inf, sagitta, None, ARRIVAL)
+    followed = _sorted(points, np.full(count, np.nan))
+    last = np.searchsorted(followed.ray, np.arange(count), side="right") - 1
+    followed.position[last], followed.length[last], followed.time[last] = end[rays.pair], rays.length, rays.travel_time
+    followed.direction[last] = np.column_stack([(p * rays.end_speed)[:, None] * ahead, rays.end_sine])
+    followed.direction[np.isnan(rays.start_sine)[followed.ray]] = np.nan
+    rows, events = [np.arange(len(followed.ray))], [followed.event]
+    for event, vertices in ((SURFACE, rays.surface), (BOTTOM, rays.bottom), (TURN, rays.turning)):
+        met = np.bincount(followed.ray[followed.event == event], minlength=count)
+        rows.append(np.repeat(last, np.maximum(vertices - met, 0)))
+        events.append(np.full(len(rows[-1]), event))
+    row, met_there = np.concatenate(rows), np.concatenate(events)
+    order = np.lexsort((met_there == ARRIVAL, row))
+    columns = {f.name: getattr(followed, f.name)[row[order]] for f in fields(RayFan) if f.name != "coefficient"}
+    return RayFan(**columns | {"event": met_there[order]}, coefficient=followed.coefficient)
+
+
+def _sorted(points: list[list[np.ndarray]], coefficient: Floats) -> RayFan:
+    """Points of rays as a fan."""
     columns = {f.name: np.concatenate(c) for f, c in zip(fields(RayFan), zip(*points, strict=True), strict=False)}
     order = np.argsort(columns["ray"], kind="stable")
     return RayFan(**{name: column[order] for name, column in columns.items()}, coefficient=coefficient)

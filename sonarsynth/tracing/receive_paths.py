@@ -23,7 +23,6 @@ from sonarsynth.propagation.images import family
 from sonarsynth.propagation.reflections import Reflections, reflections
 from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Medium, Receiver
-from sonarsynth.tracing.occlusion.ray_cones import max_launch_deviation
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
@@ -80,10 +79,6 @@ class ReceivePaths(Columns):
     def by(self, families: Iterable[int] | None) -> ReceivePaths:
         """The legs by some families (None: all)."""
         return self if families is None else self.select(np.flatnonzero(np.isin(self.family, list(families))))
-
-    def swerve(self, medium: Medium, receiver: Receiver, spread: Floats | float) -> Floats:
-        """As `swerve`."""
-        return swerve(self, self.point, medium, receiver, spread)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,26 +144,6 @@ def apart(row: Ints, travel_time: Floats, arrival: Floats) -> Bools:
     same = (np.diff(row) == 0) & (np.abs(np.diff(travel_time)) < COINCIDENCE_TIME)
     first[1:] = ~(same & (np.abs(np.diff(arrival, axis=0)) < 1e-9).all(axis=1))
     return first
-
-
-def swerve(
-    paths: Paths | ReceivePaths, start: Floats, medium: Medium, receiver: Receiver, spread: Floats | float
-) -> Floats:
-    """(path,) rad as `ray_cones.max_launch_deviation`, of paths from places (path, xyz) to within `spread` (m) of the
-    array centre."""
-    return max_launch_deviation(
-        medium.depth,
-        medium.profile,
-        start,
-        float(depth(receiver.pose.position)),
-        paths.departure,
-        paths.length,
-        spreading=paths.spreading,
-        surface=paths.surface,
-        bottom=paths.bottom,
-        turning=paths.turning,
-        spread=spread,
-    )
 
 
 def rays_to_centre(
@@ -251,9 +226,6 @@ def receive_paths(
 
     def chosen(paths: Paths) -> Bools:
         ahead = dot(rows_of(facets.normal, paths.pair), paths.departure) * paths.length
-        if slack and propagation.bends:
-            start = rows_of(facets.point, paths.pair)
-            ahead += swerve(paths, start, medium, receiver, slack) * (paths.length + slack)
         return np.asarray((ahead > -slack) | facets.sideless[paths.pair])
 
     return rays_to_centre(medium, facets.point, receiver, propagation, chosen)

@@ -10,15 +10,14 @@ import pytest
 from scipy.integrate import quad
 
 import sonarsynth as ss
-from sonarsynth.environment.absorption import ALIKE, DepthAbsorption
-from sonarsynth.environment.sea import Absorption, Profile
+from sonarsynth.environment.absorption import DepthAbsorption
+from sonarsynth.environment.sea import Absorption
 from sonarsynth.equations.water.seawater import francois_garrison
 from sonarsynth.planning import Choices, Plan, arrivals_of, plan
-from sonarsynth.propagation import Refracted
+from sonarsynth.propagation import Straight
 from sonarsynth.signals.direct_sum import relative_absorption
 
 COLD = Absorption(temperature=4.0, salinity=35.0, ph=8.0)
-FLAT = Profile(np.array([0.0]), np.array([1500.0]))
 
 
 def fg(frequency: float, depth: float) -> float:
@@ -112,65 +111,23 @@ def test_sources_far_apart_in_depth_are_noted_where_one_spectrum_does_not_serve_
     assert not any(said in note for note in planned["slant"].warnings)
 
 
-def test_reflected_straight_paths_pass_the_depths_of_their_images() -> None:
-    """Down to the bottom, up to the surface and back down: each leg by itself."""
-    bottom_depth, table = 3000.0, DepthAbsorption.of(COLD, 55e3, 3000.0)
-    z1, z2, level = 500.0, 900.0, 700.0
-    drop = (bottom_depth - z1) + bottom_depth + z2
-    climb = -drop / np.hypot(drop, level)
-    got = table.along(FLAT, np.array([z1]), np.array([z2]), np.array([climb]), np.array([2]))[0]
-    total = sum(quad(lambda z: fg(55e3, z), a, b)[0] for a, b in ((z1, bottom_depth), (0.0, bottom_depth), (0.0, z2)))
-    assert got == pytest.approx(total / drop, rel=2e-5)
-
-
-@pytest.mark.parametrize(("start", "degrees", "vertices"), [(800.0, -6.0, 0), (800.0, -12.0, 1), (200.0, 10.0, 2)])
-def test_bent_rays_pass_the_depths_of_their_arcs(start: float, degrees: float, vertices: int) -> None:
-    """In a constant gradient a ray is an arc of radius c/(g cos): integrated along its length, turning or reflected."""
-    c0, g, bottom_depth = 1480.0, 0.05, 4000.0
-    profile = Profile(np.array([0.0, bottom_depth]), np.array([c0, c0 + g * bottom_depth]))
-    angle = np.deg2rad(degrees)  # up positive; the ray bends upwards by g cos/c
-    radius = (c0 + g * start) / (g * np.cos(angle))
-    at_turn = start + radius * (1.0 - np.cos(angle))
-
-    def along(phi: float) -> float:
-        return at_turn - radius * (1.0 - np.cos(phi))  # depth where the ray climbs at phi
-
-    def piece(a: float, b: float) -> tuple[float, float]:
-        return radius * (b - a), radius * quad(lambda phi: fg(55e3, along(phi)), a, b)[0]
-
-    if vertices == 0:
-        end_angle = np.deg2rad(-1.0)
-        pieces = [piece(angle, end_angle)]
-    elif vertices == 1:
-        end_angle = np.deg2rad(5.0)
-        pieces = [piece(angle, end_angle)]
-    else:  # by the surface, then round below, and up again
-        top = float(np.arccos(1.0 - at_turn / radius))
-        end_angle = np.deg2rad(2.0)
-        pieces = [piece(angle, top), piece(-top, end_angle)]
-    length, absorbed = np.sum(pieces, axis=0)
-    table = DepthAbsorption.of(COLD, 55e3, bottom_depth)
-    ends = np.array([start]), np.array([along(end_angle)])
-    got = table.along(profile, *ends, np.array([np.sin(angle)]), np.array([vertices]))[0]
-    assert got == pytest.approx(absorbed / length, rel=3e-5)
-    assert Refracted().bends  # what makes such rays
+def test_reflected_paths_err_by_no_more_than_is_said() -> None:
+    """By surface and bottom of 300 m of water: those that pass it all lose other than what lies between their ends."""
+    recipe = scene(300.0, (500.0, 30.0, -60.0), (0.0, 0.0, -40.0), (480.0, -40.0, -50.0))
+    physics = replace(recipe.scene.physics, tracing=Straight(bounces=2))
+    made = plan(replace(recipe, scene=replace(recipe.scene, physics=physics)), ("signals",), Choices())
+    found = arrivals_of(made, made.recipe.frame(0)[1])
+    legs = {(0, 1): [(60.0, 300.0), (300.0, 40.0)], (1, 0): [(60.0, 0.0), (0.0, 40.0)]}
+    for (surface, bottom), pieces in legs.items():
+        (row,) = np.flatnonzero(found.direct & (found.surface == surface) & (found.bottom == bottom))
+        total, deep = (
+            sum(quad(f, *sorted(ends))[0] for ends in pieces) for f in (lambda z: fg(55e3, z), lambda z: 1.0)
+        )
+        exact = found.length[row] * total / deep
+        assert 0.0 < abs(found.absorption[row] - exact) <= made.absorption_error
+    assert made.absorption_error < 0.5
 
 
 def test_the_formula_at_no_absorption_is_nothing() -> None:
     table = DepthAbsorption.of(Absorption(formula="none"), 55e3, 100.0)
-    assert table.along(FLAT, np.array([1.0]), np.array([1.0]), np.zeros(1), np.zeros(1, np.int64))[0] == 0.0
-
-
-def test_rays_over_alike_depths_lose_as_much_as_those_that_are_followed() -> None:
-    """By `ALIKE` at most, whatever they pass: turning, reflected, short and long."""
-    bottom_depth, rng = 40.0, np.random.default_rng(5)
-    profile = Profile(np.array([0.0, 15.0, 20.0, bottom_depth]), np.array([1540.0, 1538.0, 1510.0, 1508.0]))
-    table = DepthAbsorption.of(COLD, 55e3, bottom_depth)
-    start, end = rng.uniform(0.0, bottom_depth, (2, 400))
-    rays = profile, start, end, rng.uniform(-0.5, 0.5, 400), rng.integers(0, 4, 400)
-    length = 10.0 ** rng.uniform(0.5, 3.5, 400)
-    off = np.abs(table.lost(length, *rays) - length * table.along(*rays))
-    alike = length * np.ptp(table.value) <= ALIKE
-    assert 50 < alike.sum() < 350
-    assert 0.01 * ALIKE < off[alike].max() <= ALIKE
-    assert (off[~alike] == 0.0).all()
+    assert table.between(np.array([1.0]), np.array([1.0]))[0] == table.mean == 0.0

@@ -111,22 +111,11 @@ def test_the_whole_chorus_is_as_loud_whatever_its_reach(made: Plan) -> None:
 
 @pytest.mark.parametrize("density", [1e-5, 1e-3, 3e-2])
 def test_snaps_are_told_apart_as_far_as_they_matter(made: Plan, density: float) -> None:
-    """Under 2 % of the power is from beyond the reach, or what is has next to no kurtosis and thirty snaps a ms."""
+    """Under 2 % of the power is from beyond the reach, or that is 3 km."""
     chorus = replace(made.scene.world.chorus, density=density, reach="auto")
-    other = plan(replace(made.recipe, scene=with_chorus(made, chorus)), ("signals",))
-    within, distant = other.chorus, other.distant_chorus
+    within = plan(replace(made.recipe, scene=with_chorus(made, chorus)), ("signals",)).chorus
     assert within is not None
-    if density < 3e-2:
-        assert within.beyond < 10.0 * np.log10(0.02) or within.reach == 3000.0
-    else:
-        assert distant is not None and distant.kurtosis < 0.1
-        assert density * np.pi * 3.0 * within.reach**2 >= 3e4
-        assert (
-            within.reach
-            < plan(
-                replace(made.recipe, scene=with_chorus(made, replace(chorus, distant=False))), ("signals",)
-            ).chorus.reach
-        )
+    assert within.beyond < 10.0 * np.log10(0.02) or within.reach == 3000.0
 
 
 def with_chorus(made: Plan, chorus: object) -> object:

@@ -20,7 +20,6 @@ from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
 from sonarsynth.tracing.facet_paths import bending
-from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation
 from sonarsynth.tracing.occlusion.ray_cones import hidden
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion, cells, rim
 from sonarsynth.tracing.receive_paths import ReceivePaths, facets_of, receive_paths
@@ -52,10 +51,6 @@ def seen_alone(view: Occlusion, legs: ReceivePaths, start: Floats, normal: Float
     ahead = legs.length[:, None] * legs.departure + image
     length = np.linalg.norm(ahead, axis=1)
     ahead /= length[:, None]
-    if not view.bending.profile.uniform:
-        where = view.bending, view.receiver, view.propagation
-        ahead += launch_deviation(legs, array[[sensor]], *where)[:, 0]
-        ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     end = np.broadcast_to(view.receiver.pose.position + offset, start.shape)
     ray = start, end, ahead, length
     how = {"bounces": legs.bounces, "turning": legs.turning}

@@ -12,8 +12,6 @@ from sonarsynth.receiver import Elements
 from sonarsynth.scattering import FacetLaw, Scatterers
 from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.targets.shapes import Box, Sphere
-from sonarsynth.tracing.expansion.probe_paths import image
-from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation
 from sonarsynth.tracing.occlusion.ray_cones import hidden
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion
 from sonarsynth.tracing.receive_paths import Facets, ReceivePaths, facets_of, receive_paths
@@ -71,45 +69,18 @@ def some_facets(seed: int) -> tuple[tuple[PlacedTarget, ...], Facets]:
 @BENT
 @pytest.mark.parametrize(("bounces", "seed"), [(0, 0), (0, 1), (2, 1), (2, 2)])
 def test_the_array_sees_what_each_hydrophone_sees(profile: Profile, bounces: int, seed: int) -> None:
+    """But for facets at the very limb: rays are taken to leave for the images of hydrophones, millimetres beside."""
     bodies, facets = some_facets(seed)
     rays = Refracted(bounces=bounces)
     found, hidden = seen_by_all(bodies, facets, rays, profile, ARRAY)
     assert (hidden.any(axis=1) & ~hidden.all(axis=1)).sum() > 100
+    odd = seen = 0
     for sensor in range(0, ARRAY.count, 4):
         place = SONAR.to_world(ARRAY.position[[sensor]])[0]
-        alone = np.sort(seen_by(bodies, facets, rays, profile, place))
-        np.testing.assert_array_equal(np.sort(found[~hidden[:, sensor]]), alone)
-
-
-@BENT
-def test_rays_leave_for_hydrophones_as_those_traced_from_them(profile: Profile) -> None:
-    """The directions themselves, and that they are within what is allowed for; towards the images they are not."""
-    _, facets = some_facets(1)
-    rays = Refracted(bounces=2)
-    water, receiver = Medium(WATER, profile), Receiver(SONAR, ARRAY)
-    legs = receive_paths(facets, water, receiver, rays, ARRAY.aperture)
-    swerve = launch_deviation(legs, ARRAY.position, water, receiver, rays)
-    size = np.linalg.norm(swerve, axis=2).max(axis=1)
-    bound = legs.swerve(water, receiver, ARRAY.aperture)
-    assert (size <= bound).all()
-    assert size.max() > 2e-4
-    away = image(legs, ARRAY.position, SONAR) + swerve
-    for sensor in (0, 17, 44):
-        pose = Pose(SONAR.to_world(ARRAY.position[[sensor]])[0], SONAR.orientation)
-        own = receive_paths(facets, water, Receiver(pose, ARRAY), rays, 2.0 * ARRAY.aperture)
-        _, first, second = np.intersect1d(names(legs), names(own), return_indices=True)
-        assert len(first) > 0.95 * len(legs.row)
-        np.testing.assert_allclose(away[first, sensor], own.departure[second], atol=1e-6)
-
-
-def test_straight_rays_leave_for_images() -> None:
-    _, facets = some_facets(1)
-    uniform = Medium(WATER, Profile(DEPTHS[[0, -1]], np.array([1500.0, 1500.0])))
-    rays, receiver = Refracted(bounces=2), Receiver(SONAR, ARRAY)
-    legs = receive_paths(facets, uniform, receiver, rays, ARRAY.aperture)
-    assert not legs.swerve(uniform, receiver, ARRAY.aperture).any()
-    found = launch_deviation(legs, ARRAY.position, uniform, receiver, rays)
-    np.testing.assert_allclose(found, 0.0, atol=1e-9)
+        alone = seen_by(bodies, facets, rays, profile, place)
+        odd += len(np.setxor1d(found[~hidden[:, sensor]], alone))
+        seen += len(alone)
+    assert odd <= 1e-3 * seen
 
 
 @pytest.mark.parametrize("far", [4.5, 20.0])  # 0.8 and 17 mm off the straight line in the middle

@@ -128,8 +128,8 @@ def test_a_frame_that_fails_is_named_and_the_others_serve(small_plan: Plan, monk
 
 
 def test_predictions_grow_as_they_must(prediction: schedule.Prediction) -> None:
-    quiet = replace(prediction, cores=4, waiting=1.0, writing_wait=0.0, prepared=2.0)
-    one = replace(quiet, stages={"trace": 0.1, "write": 0.01}, loading=1.0)  # on any machine
+    quiet = replace(prediction, cores=4, waiting=1.0, starting=2.0)
+    one = replace(quiet, stages={"trace": 0.1, "write": 0.01})  # on any machine
     times = [one.of(frames=n, workers=2).seconds for n in (8, 800, 8000)]
     assert times == sorted(times)
     large = [one.of(frames=80000, workers=n).seconds for n in (1, 2, 4)]

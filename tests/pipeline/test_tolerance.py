@@ -194,8 +194,7 @@ def test_parts_hold_every_element_once_about_their_middle(count: int) -> None:
 
 BENT = (
     "equations.rays.ray_chain", "equations.rays.ray_in_layer", "equations.rays.ray_arcs",
-    "ranging.location.refraction", "propagation.eigenrays", "propagation.ray_steps", "propagation.polylines",
-    "tracing.ray_fan",
+    "ranging.location.refraction", "propagation.eigenrays", "propagation.ray_steps", "tracing.ray_fan",
 )  # fmt: skip
 """Modules that solve, follow or invert rays that bend."""
 

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from sonarsynth.equations.bubble import bubble_collapse
 from sonarsynth.sources.snap_models import KellerMiksis
-from sonarsynth.validation.bubbles import bubble_accuracy, bubble_checks, bubbles_extreme
+from sonarsynth.validation.bubbles import bubble_accuracy, bubble_checks
 from sonarsynth.validation.bubbles.bubble_checks import described, equation_rows, exact, level_rows, tolerance_rows
 from sonarsynth.validation.bubbles.bubbles_logarithmic import logarithmic_rows
 from sonarsynth.validation.extremes import extreme_bubbles
@@ -61,11 +61,8 @@ def test_bubbles_have_the_numbers_of_tables_series_and_closed_forms() -> None:
 
 
 @pytest.mark.long
-def test_the_table_holds_and_says_what_is_solved_and_what_refused() -> None:
-    rows = bubble_accuracy(quick=True)
-    assert [row for row in rows if not row.ok] == []
-    notes = {row.note.split(":")[0].split(",")[0] for row in rows if row.quantity == "verdict"}
-    assert notes == {"solved", "refused"}
+def test_the_table_holds() -> None:
+    assert [row for row in bubble_accuracy(quick=True) if not row.ok] == []
 
 
 def test_a_bubble_that_is_wrong_fails_its_rows() -> None:
@@ -77,5 +74,6 @@ def test_a_bubble_that_is_wrong_fails_its_rows() -> None:
 
 def test_a_snap_that_may_be_fast_is_not_refused() -> None:
     slow, fast = KellerMiksis(gas_pressure=10.0), KellerMiksis(gas_pressure=10.0, largest_mach=3.0)
-    assert "largest_mach 0.5" in bubbles_extreme.verdict(slow, 5.0)
-    assert bubbles_extreme.verdict(fast, 5.0) == ""
+    with pytest.raises(ValueError, match=r"largest_mach 0\.5"):
+        slow.pulse(5.0, 110e3)
+    assert np.isfinite(fast.pulse(5.0, 110e3).strength).all()

@@ -37,9 +37,6 @@ HORIZON = 3e4
 """m: beyond, nothing is heard."""
 NEAREST = 1.0
 """m: the innermost ring, from the height of the array on outwards."""
-GAUSSIAN, CROWDED = 0.1, 3e4
-"""Excess kurtosis that snaps beyond an automatic reach may have, all together, to be Gaussian noise though they bring
-more; and how many of them a second (1/s) come from each ring at least: thirty in each ms."""
 BINS = 64
 """Frequencies of the band that moments are taken at."""
 
@@ -116,7 +113,7 @@ def _reach(chorus: Chorus, water: ChorusWater, absorption: tuple[float, ...]) ->
     square = np.array([m.square for m in rings])
     outside = np.append(np.cumsum(square[::-1])[::-1], 0.0) / square.sum()
     if chorus.reach == "auto":
-        reach = min(float(edges[int(np.argmax(outside <= BEYOND))]), FARTHEST, _crowded(chorus, edges, rings))
+        reach = min(float(edges[int(np.argmax(outside <= BEYOND))]), FARTHEST)
     else:
         reach = chorus.reach
     inner = np.append(edges[edges < reach], reach)
@@ -147,12 +144,3 @@ def _kurtosis(chorus: Chorus, rings: list[RingMoments]) -> Floats:
     """Excess kurtosis (ring,) that each ring brings, of all of them together."""
     square = sum(m.square for m in rings)
     return np.array([excess_kurtosis(chorus.rate, chorus.deviation, square, m.fourth) for m in rings])
-
-
-def _crowded(chorus: Chorus, edges: Floats, rings: list[RingMoments]) -> float:
-    """Distance (m) from which on snaps are so many that they are as well Gaussian noise."""
-    if not chorus.distant:
-        return np.inf
-    beyond = np.cumsum(_kurtosis(chorus, rings)[::-1])[::-1]
-    crowded = (beyond <= GAUSSIAN) & (chorus.rate * np.pi * np.diff(edges**2) >= CROWDED)
-    return float(edges[:-1][crowded][0]) if crowded.any() else np.inf

@@ -172,8 +172,6 @@ def chorus_arrivals(
     sign = np.where(np.floor(snaps.sign[snap] * 2.0 ** (4 + image % 40)) % 2.0, -1.0, 1.0)
     lost = 2.0 * np.pi * receiver.centre * bounced.delay_std > 1.0
     towards = np.column_stack([level, -climb * own.turns]) / length[:, None]
-    loss = medium.absorption
-    mean = loss if isinstance(loss, float) else float(np.trapezoid(loss.value, loss.depth) / medium.depth)
     used, number = np.unique(snap, return_inverse=True)
     chorus = ChorusArrivals(
         delay=delay,
@@ -186,7 +184,7 @@ def chorus_arrivals(
         width=snaps.width[snap],
         snap=number,
         boundaries=own.surface + own.bottom,
-        absorption=mean * length,
+        absorption=medium.mean_absorption * length,
         key=snaps.key[used],
         sound_speed=receiver.speed(medium),
     )

@@ -72,14 +72,13 @@ def ray_cones(
     *,
     bounces: Ints,
     turning: Ints,
-    swerve: Floats | float = 0.0,
 ) -> tuple[Floats, Floats, Floats]:
     """Cones that hold what `hidden` looks at of all rays to within `spread` (ray,) m of some: slope, and how far (m)
     along the departure bodies may be met, and surely would be if they close the cone, (ray,) each.
 
     Arguments as of `hidden`, for the rays to the middle; those beside them, unfolded, end within `spread` of them and
-    leave as straight rays to there would, but for `swerve` (ray,) rad. The slope is NaN where no cone is certain: of
-    reflected rays that may meet a body again.
+    leave as straight rays to there would. The slope is NaN where no cone is certain: of reflected rays that may meet a
+    body again.
     """
     longest, shortest = length + spread, length - spread
     bow = _curvature(medium.profile) * longest**2 / 8.0
@@ -89,9 +88,7 @@ def ray_cones(
     reach = np.where(full, longest, np.minimum(first, longest))
     with np.errstate(invalid="ignore", over="ignore"):  # where the speed jumps, rays bend by any angle
         far = 0.98 * np.where(full, shortest, np.minimum(first - 2.0 * (bow + spread), shortest))
-        angle = (
-            _subtended(spread, length) + 0.5 * _curvature_about(medium.profile, depth(start), reach) * reach + swerve
-        )
+        angle = _subtended(spread, length) + 0.5 * _curvature_about(medium.profile, depth(start), reach) * reach
     ahead = end - start
     distance = np.linalg.norm(ahead, axis=1)
     off = np.linalg.norm(np.cross(departure, ahead), axis=1) / np.maximum(distance, 1e-300)
@@ -104,45 +101,6 @@ def ray_cones(
         reach,
         far,
     )
-
-
-def max_launch_deviation(
-    bottom_depth: float,
-    profile: Profile,
-    start: Floats,
-    end: float,
-    departure: Floats,
-    length: Floats,
-    *,
-    spreading: Floats,
-    surface: Ints,
-    bottom: Ints,
-    turning: Ints,
-    spread: Floats | float,
-) -> Floats:
-    """By how much (ray,) rad rays to within `spread` (m) of the end of some leave beside where the ends of straight
-    rays are, at most; 0 in uniform water.
-
-    bottom_depth, end (m): depths, of the ends; spreading (ray,) 1/m; surface, bottom, turning (ray,): of the rays,
-    and of those beside them. A ray leaves within half of its length times its largest curvature of the straight line to
-    its end, unfolded at reflections. Where rays are nowhere nearly level, how far ends are apart for an angle at the
-    start varies slowly: twice what it is for the ray to the middle, by its spreading, and what it may vary by.
-    """
-    if profile.uniform:
-        return np.zeros(len(start))
-    z, speed = depth(start), profile.at(np.append(profile.depth[profile.depth < bottom_depth], bottom_depth))
-    slowest, fastest = float(speed.min()), float(speed.max())
-    top = np.where((surface > 0) | (turning > 0), 0.0, np.minimum(z, end - spread))
-    low = np.where((bottom > 0) | (turning > 0), bottom_depth, np.maximum(z, end + spread))
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        bend = _curvature_about(profile, 0.5 * (top + low), 0.5 * (low - top))
-        bound = bend * (length + spread) * length / np.maximum(length - spread, 0.0)
-        sine2 = 1.0 - (np.hypot(departure[:, 0], departure[:, 1]) / profile.at(z) * fastest) ** 2
-        apart, uneven = spread / length, fastest / slowest - 1.0
-        unlike = 2.0 * np.abs((spreading * length) ** 2 - 1.0) + uneven * (1.0 + 4.0 * apart / sine2**1.5)
-    nowhere_level = (turning == 0) & (sine2 > (8.0 * spread / np.maximum(length, 1e-300)) ** 2)
-    bound = np.fmin(np.nan_to_num(bound, nan=2.0), np.where(nowhere_level, apart * unlike, 2.0))
-    return np.asarray(np.minimum(bound, 2.0))
 
 
 def _subtended(radius: Floats, distance: Floats) -> Floats:

@@ -17,7 +17,6 @@ from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements
 from sonarsynth.state import Medium, Receiver, Tolerances
-from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation
 from sonarsynth.tracing.occlusion.ray_cones import hidden, ray_cones
 from sonarsynth.tracing.receive_paths import DOUBTFUL, SEEN, ReceivePaths, Starts
 
@@ -72,8 +71,7 @@ class Occlusion:
         centre = np.zeros(1, int)  # of those that stay open
         for kind, first in ((UNKNOWN, centre), (NO_CONE, np.append(centre, 1 + rim(self.elements)))):
             for rows in self._parts(legs, np.flatnonzero(certain == kind), len(first)):
-                swerve = self._swerve(legs.select(rows), first) if kind == NO_CONE else None
-                unseen = self._unseen(legs, starts, rows, first, swerve)
+                unseen = self._unseen(legs, starts, rows, first)
                 in_sight[rows] = ~unseen.all(axis=1)
                 mixed[rows] |= unseen.any(axis=1)
         pending = np.where(mixed & ~in_sight & (certain == UNKNOWN), DOUBTFUL, np.where(mixed, SEEN, 0))
@@ -106,27 +104,23 @@ class Occlusion:
         points, normal = self._points, starts.normal
         spread = np.full(len(legs.row), 1.001 * float(np.linalg.norm(points, axis=1).max()))
         middle = np.zeros((len(legs.row), 3))
-        swerve = legs.swerve(self.bending, self.receiver, spread)
         if normal is None:
-            return self._cones(legs, starts, middle, spread, None, swerve)
-        least, most = _within(legs, normal, spread, swerve)
+            return self._cones(legs, starts, middle, spread, None)
+        least, most = _within(legs, normal, spread)
         rows = np.flatnonzero((least <= 0.0) & (most >= 0.0))
         flip = np.where(legs.bounces[rows] % 2 == 1, -1.0, 1.0)  # of the mirrored array
         across = self.receiver.pose.turn_to_body(normal[rows] * np.column_stack([np.ones((len(rows), 2)), flip]))
         low, high = points.min(axis=0), points.max(axis=0)
         ahead = 0.5 * (least + most)[rows] + 0.5 * (across @ (low + high))
-        margin = 1e-9 * legs.length[rows] + (swerve * (legs.length + spread))[rows]
-        margin += 0.5 * (np.abs(across) @ (high - low))
+        margin = 1e-9 * legs.length[rows] + 0.5 * (np.abs(across) @ (high - low))
         least[rows], most[rows] = ahead - margin, ahead + margin
-        return self._cones(legs, starts, middle, spread, (least, most), swerve)
+        return self._cones(legs, starts, middle, spread, (least, most))
 
     def _cones(
-        self, legs: ReceivePaths, starts: Starts, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None,
-        swerve: Floats,
-    ) -> Ints:  # fmt: skip
+        self, legs: ReceivePaths, starts: Starts, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None
+    ) -> Ints:
         """(leg,) as `_certain`, of the hydrophones within `spread` (leg,) of places beside the centre (leg, xyz); ahead
-        (leg,): how far (m) they are on the outer side of the facet, at least and at most; swerve (leg,) rad: by how
-        much rays to them leave beside their images, at most."""
+        (leg,): how far (m) they are on the outer side of the facet, at least and at most."""
         away, length = _towards(legs, offset)
         verdict, rows = np.full(len(away), UNKNOWN), np.arange(len(away))
         if ahead is not None:
@@ -142,7 +136,6 @@ class Occlusion:
             spread[rows],
             bounces=legs.bounces[rows],
             turning=legs.turning[rows],
-            swerve=swerve[rows],
         )
         sure = np.flatnonzero(np.isfinite(slope))
         verdict[rows], leaving, along, slope = NO_CONE, leaving.select(sure), away[rows[sure]], slope[sure]
@@ -153,7 +146,6 @@ class Occlusion:
         """(row, 1 + sensor) from where some legs are hidden: the array centre, each hydrophone. Parts of the array that
         see alike are looked at together."""
         every = np.arange(len(self._points))
-        swerve = self._swerve(legs.select(rows), every)
         array_cells = cells(self.elements)
         row, cell = np.repeat(rows, len(array_cells.radius)), np.tile(np.arange(len(array_cells.radius)), len(rows))
         repeated, places, offset, spread = (
@@ -162,23 +154,11 @@ class Occlusion:
             self.receiver.pose.turn_to_world(array_cells.centre)[cell],
             array_cells.radius[cell],
         )
-        beside = np.zeros(len(row))
-        if swerve is not None:
-            order = np.argsort(array_cells.cell, kind="stable")
-            first = np.searchsorted(array_cells.cell[order], np.arange(len(array_cells.radius)))
-            beside = np.maximum.reduceat(np.sqrt(dot(swerve, swerve))[:, order], first, axis=1).ravel()
-        ahead = None if places.normal is None else _within(repeated, places.normal, spread, beside, offset)
-        verdict = self._cones(repeated, places, offset, spread, ahead, beside)
+        ahead = None if places.normal is None else _within(repeated, places.normal, spread, offset)
+        verdict = self._cones(repeated, places, offset, spread, ahead)
         verdict = verdict.reshape(len(rows), len(array_cells.radius))[:, array_cells.cell]
-        unseen = self._unseen(legs, starts, rows, every, swerve, verdict >= UNKNOWN)
+        unseen = self._unseen(legs, starts, rows, every, verdict >= UNKNOWN)
         return np.asarray((verdict == CLOSED) | unseen)
-
-    def _swerve(self, legs: ReceivePaths, point: Ints) -> Floats | None:
-        """(leg, point, xyz) as `launch_deviation`, of the centre, or the hydrophones from 1; None where rays are
-        straight."""
-        if self.propagation.straight(self.bending.profile) or self.elements is None:
-            return None
-        return launch_deviation(legs, self._points[point], self.bending, self.receiver, self.propagation)
 
     def _straight(self, legs: ReceivePaths) -> bool:
         """Whether legs are straight lines from end to end."""
@@ -189,15 +169,13 @@ class Occlusion:
         most = STRAIGHT_RAYS if self._straight(legs) else RAYS
         return np.array_split(rows, max(1, len(rows) * points // most))
 
-    def _unseen(
-        self, legs: ReceivePaths, starts: Starts, rows: Ints, point: Ints, swerve: Floats | None,
-        look: Bools | None = None,
-    ) -> Bools:  # fmt: skip
+    def _unseen(self, legs: ReceivePaths, starts: Starts, rows: Ints, point: Ints, look: Bools | None = None) -> Bools:
         """(row, point) which of some legs leave the back of their facets, or meet a body, on the way to some points:
         the centre, or the hydrophones from 1. Of those to look at, if not all.
 
         To each point a ray leaves for where it is beside the image of the array centre, which is exact for straight
-        rays; bent ones off that by `swerve` (row, point, xyz).
+        rays. Bent ones leave off that by the size of the array over the distance, times what their spreading differs
+        from that of straight ones: by 3e-4 rad in gradients of 3 per second, far less than diffraction blurs shadows.
         """
         look = np.ones((len(rows), len(point)), bool) if look is None else look
         normal = starts.normal
@@ -211,9 +189,6 @@ class Occlusion:
         leg, offset = rows[row], self.receiver.pose.turn_to_world(self._points[point])[column]
         beside, unseen = legs.select(leg), np.zeros(len(leg), bool)
         ahead, length = _towards(beside, offset)
-        if swerve is not None:
-            ahead += swerve[row, column]
-            ahead /= np.linalg.norm(ahead, axis=1)[:, None]
         if normal is not None:
             unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
         ray = np.flatnonzero(~unseen)
@@ -234,15 +209,12 @@ def _towards(legs: ReceivePaths, offset: Floats) -> tuple[Floats, Floats]:
     return ahead / np.maximum(length, 1e-300)[:, None], length
 
 
-def _within(
-    legs: ReceivePaths, normal: Floats, spread: Floats, swerve: Floats, offset: Floats | None = None
-) -> tuple[Floats, Floats]:
+def _within(legs: ReceivePaths, normal: Floats, spread: Floats, offset: Floats | None = None) -> tuple[Floats, Floats]:
     """(leg,) how far (m) on the outer side of a facet what is within `spread` (leg,) of a place beside the centre is,
-    at least and at most, where rays to there leave beside its image by `swerve` (leg,) rad at most."""
+    at least and at most."""
     away, length = (legs.departure, legs.length) if offset is None else _towards(legs, offset)
     ahead = np.einsum("ij,ij->i", normal, away) * length
-    room = spread + swerve * (length + spread)
-    return ahead - room, ahead + room
+    return ahead - spread, ahead + spread
 
 
 class Cells(NamedTuple):

@@ -99,8 +99,6 @@ def scattered_paths(
     factor = (
         factor * _reflected(medium, out, sine_in, receiver.centre) * _reflected(medium, back, sine_out, receiver.centre)
     )
-    loss = medium.absorption
-    mean = loss if isinstance(loss, float) else float(np.trapezoid(loss.value, loss.depth) / medium.depth)
     return ScatteredPaths(
         delay=delay + r2 * back.slowness,
         leaving=leaving,
@@ -108,7 +106,7 @@ def scattered_paths(
         out=r1,
         back=r2,
         amplitude=factor / (np.maximum(r1, NEAREST) * np.maximum(r2, NEAREST)),
-        absorbed=10.0 ** (-0.1 * mean * (r1 + r2)),
+        absorbed=10.0 ** (-0.1 * medium.mean_absorption * (r1 + r2)),
         angles=Angles(sine_in, sine_out, np.clip(forward, -1.0, 1.0)),
     )
 

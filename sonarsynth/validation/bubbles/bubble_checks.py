@@ -1,8 +1,8 @@
 """Bubbles that collapse, against power series of many digits and published levels.
 
 Keller-Miksis and Rayleigh-Plesset against their power series; published levels; error against run
-time over the solver's tolerance; the logarithmic bubble; extremes, each solved or refused. What is conserved, and
-Rayleigh's closed form, are in the table of extremes.
+time over the solver's tolerance; the logarithmic bubble. What is conserved, what is refused, and Rayleigh's closed
+form are in the table of extremes.
 """
 
 from __future__ import annotations
