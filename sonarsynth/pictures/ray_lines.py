@@ -198,7 +198,8 @@ def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays, start: Floats
     for boundary, count, c in met:
         effect = bounces(boundary, np.arccos(np.minimum(rays.slowness * c, 1.0)), count, c, frequency)
         factor *= effect.modulus * np.exp(-0.5 * (2.0 * np.pi * frequency * effect.delay_std) ** 2)
-    lost = plan.medium.absorbed(rays.length, start[rays.pair], end[rays.pair])
+    climb, ends = np.nan_to_num(rays.start_sine), (start[rays.pair], end[rays.pair])
+    lost = plan.medium.absorbed(rays.length, *ends, climb, rays.surface + rays.bottom)
     with np.errstate(divide="ignore"):
         return np.asarray(-20.0 * np.log10(factor) + lost)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, depth
+from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.geometry import Pose, turned
 from sonarsynth.geometry.motion import Track
@@ -73,11 +73,11 @@ class Medium:
         """dB/m at the centre of the band: the mean over all depths."""
         return self.absorption if isinstance(self.absorption, float) else self.absorption.mean
 
-    def absorbed(self, length: Floats, start: Floats, end: Floats) -> Floats:
-        """What is absorbed (path,) in dB, at the centre of the band, along paths of some length (path,) m from depths
-        start to end (path,) m."""
-        loss = self.absorption if isinstance(self.absorption, float) else self.absorption.between(start, end)
-        return np.asarray(loss * length)
+    def absorbed(self, length: Floats, start: Floats, end: Floats, climb: Floats, bounces: Ints) -> Floats:
+        """What is absorbed (path,) in dB, at the centre of the band, along paths of some length (path,) m; the rest as
+        of `DepthAbsorption.along`."""
+        loss = self.absorption
+        return np.asarray(length * (loss if isinstance(loss, float) else loss.along(start, end, climb, bounces)))
 
 
 @dataclass(frozen=True, eq=False)

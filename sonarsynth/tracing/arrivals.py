@@ -120,7 +120,8 @@ def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) 
     legs = legs if meeting is None else received(legs, met, meeting, medium, receiver.centre)
     loud, turned = directed(snap, legs.departure)
     legs = legs.but(spreading=legs.spreading * loud, phase=legs.phase + turned)
-    loss = medium.absorbed(legs.length, depth(legs.point), depth(receiver.pose.position))
+    ends = depth(legs.point), depth(receiver.pose.position)
+    loss = medium.absorbed(legs.length, *ends, legs.departure[:, 2], legs.bounces)
     direct = assemble(
         legs, fronts.but(amplitude=amplitude), none_out, index, snap.time, loss,
         kind=Kind.DIRECT, target=none, facet=none, scattering=one, pulses=PulseResponse.plain(count),

@@ -151,8 +151,8 @@ def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...
         kinds, target, facet = array.met(out.facet, kind)
         amplitude, sign = _columns(block.groups, "amplitude", "sign")
         scattered, medium, met = sign * amplitude, array.context.medium, depth(legs.point)
-        loss = medium.absorbed(legs.length, met, depth(receiver.pose.position))
-        loss = loss + medium.absorbed(out.length, met, depth(snap.position))
+        loss = medium.absorbed(legs.length, met, depth(receiver.pose.position), legs.departure[:, 2], legs.bounces)
+        loss += medium.absorbed(out.length, met, depth(snap.position), -out.arrival[:, 2], out.bounces)
         echo = assemble(
             legs, over.but(amplitude=variation), out, index, snap.time, loss, kind=kinds, target=target,
             facet=facet, scattering=scattered, pulses=block.pulses, amplitude_error=error,

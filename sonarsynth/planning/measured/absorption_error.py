@@ -67,8 +67,7 @@ def _mean(absorption: Absorption, depths: bytes, lengths: bytes, frequencies: by
 def shape_error(
     absorption: Absorption, passed: StraightPaths, band: tuple[float, float], bottom: float, bounces: int
 ) -> float:
-    """Largest error (dB) in a band (Hz) of any path: its loss at the centre is its own, its spectrum that of the mean;
-    of reflected ones, that at the centre is the mean too.
+    """Largest error (dB) in a band (Hz) of any path: its loss at the centre is its own, its spectrum that of the mean.
 
     bottom (m): where paths are reflected, at most `bounces` times: as long a path close to the surface or to the bottom
     counts then, and one through all of the water so many times.
@@ -79,12 +78,9 @@ def shape_error(
         return 0.0
     per_depth = absorption_db_per_m(absorption, frequency[:, None, None], passed.depth)
     own = np.einsum("fps,ps->pf", per_depth, passed.length)
-    centre = own[:, -1:]
     if bounces:
         longest = float(passed.length.sum(axis=1).max())
         column = absorption_db_per_m(absorption, frequency, bottom * (0.5 + 0.5 * _X)[:, None])
         ends = absorption_db_per_m(absorption, frequency, np.array([[0.0], [bottom]]))
-        deep = np.hypot(longest, bounces * bottom)
-        own = np.concatenate([own, ends * longest, (0.5 * _W @ column)[None] * deep])
-        centre = np.concatenate([centre, mean[-1] * np.array([[longest], [longest], [deep]])])
-    return float(np.abs(own - centre * (mean / mean[-1])).max())
+        own = np.concatenate([own, ends * longest, (0.5 * _W @ column)[None] * np.hypot(longest, bounces * bottom)])
+    return float(np.abs(own - own[:, -1:] * (mean / mean[-1])).max())
