@@ -27,6 +27,9 @@ from numba.core.targetconfig import ConfigStack
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+anew: list[str] = []
+"""Names of the kernels that this process compiled, of which nothing was kept."""
+
 
 @overload
 def compiled(function: F, /) -> F: ...
@@ -70,6 +73,11 @@ class _Cache(FunctionCache):
         rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled."""
+        anew.append(self._py_func.__name__)
+        super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
     def _index_key(self, *types_and_processor: Any) -> tuple[Any, ...]:
         made_of = [_digest(__file__), *sorted(set(_made_of(self._py_func, {self._py_func})))]

@@ -10,7 +10,17 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+)
+from rich.text import Text
 
 from sonarsynth.conventions import counted, format_bytes
 
@@ -52,10 +62,11 @@ def progress(waiting: str = "starting workers") -> Iterator[Report]:
 
 @contextmanager
 def planning(activity: str = "planning") -> Iterator[None]:
-    """Shows that something is being made: a spinner on a terminal, else a line now and then."""
+    """Shows that something is being made: a spinner on a terminal, else a line now and then; and that kernels are
+    compiled, where they are."""
     began, done = time.monotonic(), threading.Event()
     if sys.stderr.isatty():
-        columns = SpinnerColumn(), TextColumn(activity), TimeElapsedColumn()
+        columns = SpinnerColumn(), _Activity(), TimeElapsedColumn()
         with Progress(*columns, console=console(stderr=True), transient=True) as bar:
             bar.add_task(activity, total=None)
             yield
@@ -63,7 +74,7 @@ def planning(activity: str = "planning") -> Iterator[None]:
 
     def say() -> None:
         while not done.wait(SECONDS_BETWEEN_LINES):
-            sys.stderr.write(f"{activity}, {time.monotonic() - began:.0f} s\n")
+            sys.stderr.write(f"{activity}{_compiling()}, {time.monotonic() - began:.0f} s\n")
             sys.stderr.flush()
 
     thread = threading.Thread(target=say, daemon=True)
@@ -73,6 +84,18 @@ def planning(activity: str = "planning") -> Iterator[None]:
     finally:
         done.set()
         thread.join()
+
+
+class _Activity(ProgressColumn):
+    def render(self, task: Task) -> Text:
+        """The activity, as it is now."""
+        return Text(f"{task.description}{_compiling()}")
+
+
+def _compiling() -> str:
+    """What takes the first call of a machine long: kernels are compiled, and kept."""
+    anew = getattr(sys.modules.get("sonarsynth.compiling"), "anew", [])
+    return f" ({counted(len(anew), 'kernel')} compiled so far, once for this machine)" if anew else ""
 
 
 def overwrite(text: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import runpy
 import signal
 import subprocess
 import sys
@@ -14,8 +15,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from sonarsynth import pipeline, planning, schedule, store
-from sonarsynth.cli import app
+from sonarsynth import compiling, pipeline, planning, schedule, store
+from sonarsynth.cli import app, printing
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import frame_numbers, product_names
 from sonarsynth.recipe import reading
@@ -255,3 +256,25 @@ def test_signals_end_a_build_and_its_workers_in_10_s_and_it_goes_on(
     assert all(any(words in problem.what for words in left) for problem in report.problems)
     again = schedule.build(reading.load(small_file), path, frames=range(len(there) + 1), workers=0)
     assert again.ok and set(there) <= set(store.frames_there(path))
+
+
+def test_a_first_call_says_that_kernels_are_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Minutes on a new machine, which passed for planning."""
+    kernel = tmp_path / "added.py"
+    kernel.write_text(
+        "from sonarsynth.compiling import compiled\n\n\n@compiled\ndef one_more(x):\n    return x + 1.0\n"
+    )
+    monkeypatch.setattr(printing, "SECONDS_BETWEEN_LINES", 0.01)
+    monkeypatch.setattr(compiling, "anew", [])
+    said: list[str] = []
+
+    def lines(text: str) -> bool:
+        said.append(capfd.readouterr().err)
+        return text in "".join(said)
+
+    with printing.planning():
+        wait_until(lambda: lines("planning, 0 s"))
+        assert runpy.run_path(str(kernel))["one_more"](3.0) == 4.0
+        wait_until(lambda: lines("planning (1 kernel compiled so far, once for this machine), "))

@@ -55,9 +55,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
             )
         )
     if environment.absorption.formula != "none":
-        bound = (
-            f"{plan.absorption_error:.1g} dB on any path within the band; none at its centre if rays are straight"
-        )
+        bound = f"{plan.absorption_error:.1g} dB on any path within the band; none at its centre if rays are straight"
         rows.append(
             Omission("depth dependence of the absorption spectrum", "one absorption spectrum for all paths", bound)
         )
