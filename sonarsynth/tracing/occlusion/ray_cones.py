@@ -88,7 +88,7 @@ def ray_cones(
     reach = np.where(full, longest, np.minimum(first, longest))
     with np.errstate(invalid="ignore", over="ignore"):  # where the speed jumps, rays bend by any angle
         far = 0.98 * np.where(full, shortest, np.minimum(first - 2.0 * (bow + spread), shortest))
-        angle = _subtended(spread, length) + 0.5 * _curvature_about(medium.profile, depth(start), reach) * reach
+        angle = _subtended(spread, length) + 0.5 * _curvature(medium.profile) * reach
     ahead = end - start
     distance = np.linalg.norm(ahead, axis=1)
     off = np.linalg.norm(np.cross(departure, ahead), axis=1) / np.maximum(distance, 1e-300)
@@ -106,24 +106,6 @@ def ray_cones(
 def _subtended(radius: Floats, distance: Floats) -> Floats:
     """Half of the angle (rad) that a ball is seen under; a right angle from within."""
     return np.asarray(np.arcsin(np.minimum(radius / np.maximum(distance, 1e-300), 1.0)))
-
-
-def _curvature_about(profile: Profile, middle: Floats, reach: Floats) -> Floats:
-    """Largest curvature (1/m) of rays within `reach` (m) of some depths (ray,)."""
-    if profile.uniform or len(profile.depth) < 2:
-        return np.full(len(middle), _curvature(profile))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        bend = np.nan_to_num(np.abs(np.diff(profile.speed)) / np.diff(profile.depth), posinf=np.inf)
-    bend /= float(profile.speed.min())
-    first = np.clip(np.searchsorted(profile.depth, middle - reach, "right") - 1, 0, len(bend) - 1)
-    last = np.clip(np.searchsorted(profile.depth, middle + reach, "left"), first + 1, len(bend))
-    maxima, step, level = [bend], 1, np.frexp(last - first)[1] - 1  # largest of 1, 2, 4, ... layers from each on
-    while 2 * step <= len(bend):
-        maxima.append(np.maximum(maxima[-1], np.append(maxima[-1][step:], np.zeros(min(step, len(bend))))))
-        step *= 2
-    level = np.minimum(level, len(maxima) - 1)
-    table = np.stack(maxima)
-    return np.asarray(np.maximum(table[level, first], table[level, last - (1 << level)]))
 
 
 def overlapping(bodies: tuple[PlacedTarget, ...]) -> list[tuple[int, tuple[PlacedTarget, ...]]]:

@@ -101,20 +101,9 @@ class Occlusion:
 
     def _certain(self, legs: ReceivePaths, starts: Starts) -> Ints:
         """(leg,) EMPTY where all hydrophones see it, CLOSED where none does; elsewhere UNKNOWN or NO_CONE."""
-        points, normal = self._points, starts.normal
-        spread = np.full(len(legs.row), 1.001 * float(np.linalg.norm(points, axis=1).max()))
-        middle = np.zeros((len(legs.row), 3))
-        if normal is None:
-            return self._cones(legs, starts, middle, spread, None)
-        least, most = _within(legs, normal, spread)
-        rows = np.flatnonzero((least <= 0.0) & (most >= 0.0))
-        flip = np.where(legs.bounces[rows] % 2 == 1, -1.0, 1.0)  # of the mirrored array
-        across = self.receiver.pose.turn_to_body(normal[rows] * np.column_stack([np.ones((len(rows), 2)), flip]))
-        low, high = points.min(axis=0), points.max(axis=0)
-        ahead = 0.5 * (least + most)[rows] + 0.5 * (across @ (low + high))
-        margin = 1e-9 * legs.length[rows] + 0.5 * (np.abs(across) @ (high - low))
-        least[rows], most[rows] = ahead - margin, ahead + margin
-        return self._cones(legs, starts, middle, spread, (least, most))
+        spread = np.full(len(legs.row), 1.001 * float(np.linalg.norm(self._points, axis=1).max()))
+        ahead = None if starts.normal is None else _within(legs, starts.normal, spread)
+        return self._cones(legs, starts, np.zeros((len(legs.row), 3)), spread, ahead)
 
     def _cones(
         self, legs: ReceivePaths, starts: Starts, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None
