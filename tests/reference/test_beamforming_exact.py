@@ -16,6 +16,7 @@ from sonarsynth.equations.arrays.gates import (
     frequency_spacing,
     gate_samples,
     gate_taper,
+    gated_energy,
     gated_spectra,
 )
 from sonarsynth.imaging.delay_and_sum.lattice_beams import LatticeBeams
@@ -149,6 +150,17 @@ def test_spectra_are_those_of_numpy_and_obey_parseval():
     expected = (np.sum(cut.astype(float) ** 2, axis=1) - lost / length) / rate
     energy = 2 * frequency_spacing(count, rate) / rate**2 * np.sum(np.abs(spectra.astype(complex)) ** 2, axis=-1)
     np.testing.assert_allclose(energy, expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize("count", [731, 900])
+@pytest.mark.parametrize(("begin", "stop"), [(60, 90), (300, 301), (0, 900), (50, 58), (0, 57), (420, 420)])
+def test_energy_of_short_sounds_is_that_of_their_spectra(count, begin, stop):
+    """In the middle of a gate, where it begins, all over it and out of it; of lengths odd and even."""
+    pressure = np.zeros((3, 1000), np.float32)
+    pressure[:, begin:stop] = np.random.default_rng(1).normal(size=(3, stop - begin))
+    gate = pressure, 196e3, 57, count, (25e3, 85e3)
+    _, spectra, _ = gated_spectra(*gate)
+    assert gated_energy(*gate) == pytest.approx(np.sum(np.abs(spectra.astype(complex)) ** 2), rel=1e-6)
 
 
 def test_band_edges_belong_to_the_band():

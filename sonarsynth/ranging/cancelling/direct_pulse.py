@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.equations.arrays.gates import frequency_spacing, gate_samples, gated_spectra
+from sonarsynth.equations.arrays.gates import frequency_spacing, gate_samples, gated_energy
 from sonarsynth.products import EnergyImage, Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
@@ -132,5 +132,5 @@ def _energy(signals: Signals, sonar: Sonar, start: float, stop: float) -> float:
     """Energy in band of all sensors from start to stop (s), tapered as for an image; in units of its own."""
     rate = signals.sampling_frequency
     first, count = gate_samples(start, stop, signals.start, rate, signals.pressure.shape[1])
-    spectra = gated_spectra(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))[1]
-    return float(np.sum(np.abs(spectra) ** 2, dtype=float)) * frequency_spacing(count, rate)
+    energy = gated_energy(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
+    return energy * frequency_spacing(count, rate)
