@@ -224,9 +224,9 @@ class Sonar:
     """Ranges of range images, which it then listens for; left out: there are none."""
     assumed_sound_speed: WaterSoundSpeed = 1540.0
     """The sound speed that the sonar uses to steer and to range."""
-    sound_speed_error: Annotated[MetresPerSecond, Ge(0)] = 0.0
-    """Standard error that the sonar ascribes to it: enters the predicted errors only, so give what the water differs
-    by."""
+    sound_speed_error: Annotated[MetresPerSecond, Ge(0)] = 0.1
+    """Standard error that the sonar ascribes to it: enters the predicted errors only, which are too large where the
+    water differs by less; left out: about that of formulas for sea water (Mackenzie 1981: 0.07 m/s)."""
     mesh_sound_speed: WaterSoundSpeed | None = None
     """Sound speed by which meshes of laws that sum phases are fine enough; left out: the assumed one, the slowest where
     sequences assume several, so that all have the same meshes."""

@@ -43,8 +43,6 @@ one on the bottom."""
 OTHER_WATER = 2.0
 """A speed of sound so many standard errors from the water's is taken for another: with what else errs, places are then
 past three predicted errors in more than one of twenty frames."""
-LEAST_OFF = 0.1
-"""Error (m/s) of the assumed speed below which nothing is said: 0.2 m/s is 3 mm of 20 m, what errs else."""
 OBLIQUE = 45
 """Angle (deg) off the axis of a plane array of which the note on the speed of sound says by how much it errs."""
 LOBE = 0.1
@@ -116,9 +114,8 @@ def assumed_speed_notes(looks: Sequence[SampledScene]) -> list[str]:
     for look in looks:
         sonar, depth = look.scene.sonar, -float(look.frames[0].sonar_pose.position[2])
         assumed, error, speed = sonar.assumed_sound_speed, sonar.sound_speed_error, float(look.profile.at(depth))
-        off = abs(speed - assumed) / max(error, LEAST_OFF)
-        if off > worst:
-            worst = off
+        if abs(speed - assumed) > worst * error:
+            worst = abs(speed - assumed) / max(error, 1e-9)
             lines = [
                 f"the sonar assumes sound at {assumed:g} m/s, good to {error:g} m/s, and the water about it has "
                 f"{speed:.5g} m/s: directions {OBLIQUE} deg off the axis of a plane array err by "
