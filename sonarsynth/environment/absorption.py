@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.environment.sea import Absorption
+from sonarsynth.equations.rays import path_means
 from sonarsynth.equations.water import seawater
 from sonarsynth.equations.water.formula_ranges import noted
 
@@ -26,8 +27,6 @@ def absorption_db_per_m(absorption: Absorption, frequency: npt.ArrayLike, depth:
 
 NODES = 513
 """Depths that absorption is taken at: linear in between, it errs by 4e-6 of itself in 12 km of water."""
-LEVEL = 1e-4
-"""m: over less depth a ray has the absorption where it starts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,26 +46,12 @@ class DepthAbsorption:
         """Mean (path,) in dB/m along straight rays from depths start to end (path,) m, exact between the nodes.
 
         climb (path,): upward component of the unit vector in which each leaves; bounces (path,): how often it is
-        reflected, at bottom and surface in turn: in water that is mirrored at both it goes straight on. Bent rays are
-        taken to pass the depths of straight ones.
+        reflected, at bottom and surface in turn. Bent rays are taken to pass the depths of straight ones.
         """
-        bottom, odd = self.depth[-1], bounces % 2
-        mirrored = (1 - 2 * odd) * end + bottom * (np.where(climb < 0.0, 1, -1) * bounces + odd)
-        deep = mirrored - start
-        level = np.abs(deep) < LEVEL
-        mean = (self._above(mirrored) - self._above(start)) / np.where(level, 1.0, deep)
-        return np.asarray(np.where(level, np.interp(start, self.depth, self.value), mean))
-
-    def _above(self, depth: Floats) -> Floats:
-        """Integral (path,) in dB of the value from the surface down, through water mirrored at surface and bottom."""
-        layer = np.floor(depth / self.depth[-1])
-        down, whole = layer % 2 == 0, self._integral[-1]
-        inside = np.abs(depth - self.depth[-1] * (layer + ~down))
-        cell = np.clip(np.searchsorted(self.depth, inside) - 1, 0, NODES - 2)
-        into, step = inside - self.depth[cell], self.depth[1]
-        steeper = 0.5 * into * (self.value[cell + 1] - self.value[cell]) / step
-        above = self._integral[cell] + into * (self.value[cell] + steeper)
-        return np.asarray(layer * whole + np.where(down, above, whole - above))
+        out = np.empty(len(start))
+        ends = np.broadcast_to(start, out.shape), np.broadcast_to(end, out.shape)
+        path_means.straight_means(*ends, climb, bounces, self.value, self._integral, float(self.depth[1]), out)
+        return out
 
     @cached_property
     def _integral(self) -> Floats:
