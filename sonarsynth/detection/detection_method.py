@@ -14,8 +14,8 @@ from sonarsynth.detection.sonar_view import SonarView
 class Region(NamedTuple):
     """Beams that belong together, and how sure it is that they are an object."""
 
-    rows: np.ndarray  # (beam,) along elevation
-    columns: np.ndarray  # (beam,) along azimuth
+    rows: np.ndarray  # (some,) along elevation: the box is about the first and the last
+    columns: np.ndarray  # (some,) along azimuth
     score: float
 
 
@@ -39,7 +39,8 @@ def detections_of(view: SonarView, method: DetectionMethod) -> list[dict[str, An
     """
     found = []
     for region in method.regions(view):
-        returned(method, "regions", region, np.asarray(getattr(region, "columns", ())).shape, "rows")
+        for name in ("rows", "columns"):
+            returned(method, "regions", region, (max(np.size(getattr(region, name, ())), 1),), name)
         returned(method, "regions", region, (), "score")
         found.append(_detection(view, region))
     return found

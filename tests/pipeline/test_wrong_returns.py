@@ -99,7 +99,8 @@ def test_it_is_named_with_what_was_expected(
 @pytest.mark.parametrize(
     ("region", "said"),
     [
-        (Region(np.array([1]), np.array([1, 2]), 1.0), r"shape \(1,\) as rows, not an array of shape \(2,\)"),
+        (Region(np.array([1]), np.array([[1, 2]]), 1.0), r"shape \(1, 2\) as columns, not an array of shape \(2,\)"),
+        (Region(np.zeros(0, int), np.array([1]), 1.0), r"shape \(0,\) as rows, not an array of shape \(1,\)"),
         (Region(np.array([1]), np.array([2]), np.nan), "NaN as score"),
         ((1, 2), "a tuple as rows"),
     ],
