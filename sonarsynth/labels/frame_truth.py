@@ -15,7 +15,7 @@ from sonarsynth.labels.oriented_box import oriented_box
 from sonarsynth.labels.views.appearance import Appearance, Connect, appearance, lit_fraction
 from sonarsynth.labels.views.beam_cells import beam_views
 from sonarsynth.labels.views.box_in_view import box_in_view, pixel_box, truncation
-from sonarsynth.labels.views.hearing import as_heard, hearing, mean_motion
+from sonarsynth.labels.views.hearing import as_heard, hearing, mean_motion, met_at
 from sonarsynth.products import Truth, View
 from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import BeamGrid
@@ -48,10 +48,12 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     seen = [(a.corners, b.mesh.faces, a.boxes, a.full_box) for b, a in zip(heard, appearances, strict=True)]
     nearest = beam_views(seen, beams)
     way, turn = mean_motion(sonar_track, when)
-    lit = [
-        [lit_fraction(b, a.visible, bodies, snap, medium, bent) for b, a in zip(bodies, appearances, strict=True)]
-        for snap in context.snaps
-    ]
+    lit = []
+    for snap, times in zip(context.snaps, met, strict=True):
+        there = met_at(bodies, times) if sonar_track else bodies
+        lit.append(
+            [lit_fraction(b, a.visible, there, snap, medium, bent) for b, a in zip(there, appearances, strict=True)]
+        )
     return Truth(
         sonar_position=sonar_pose.position,
         sonar_orientation=sonar_pose.orientation,

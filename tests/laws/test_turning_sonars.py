@@ -146,6 +146,15 @@ def test_what_a_sonar_sees_is_of_when_it_hears_and_not_of_the_instant_of_the_fra
             label(context_of(made, made.frame(at)), made.propagation, np.zeros(1))
             for made, at in ((sooner, index + 1), (later, index))
         )
-        for name in ("box", "box_orientation", "yaw", "image_box", "true_image_box", "full_box", "beam_range"):
+        for name in (
+            "box",
+            "box_orientation",
+            "yaw",
+            "image_box",
+            "true_image_box",
+            "full_box",
+            "beam_range",
+            "lit_fraction",
+        ):
             np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), rtol=0, atol=1e-5, err_msg=name)
         np.testing.assert_array_equal(found.beam_target, wanted.beam_target)

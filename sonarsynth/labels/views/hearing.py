@@ -46,23 +46,28 @@ def hearing(context: FrameContext, met: Floats, snap_level: Floats) -> Hearing |
     return Hearing(times, heard, track)
 
 
+def met_at(bodies: tuple[PlacedTarget, ...], times: Floats) -> tuple[PlacedTarget, ...]:
+    """Bodies where they are at times (body,) s of the frame; at the instant of the frame where these are NaN."""
+    return tuple(
+        body if np.isnan(time) else body.later(time) for body, time in zip(bodies, times.tolist(), strict=True)
+    )
+
+
 def as_heard(bodies: tuple[PlacedTarget, ...], when: Hearing | None) -> tuple[PlacedTarget, ...]:
     """Bodies where sound met them, as far and in the direction that the array then has them, from its place at the
     instant of the frame."""
     if when is None:
         return bodies
-    times = zip(when.met.tolist(), when.heard.tolist(), strict=True)
-    return tuple(_heard(body, *of, when.sonar) for body, of in zip(bodies, times, strict=True))
-
-
-def _heard(body: PlacedTarget, met: float, heard: float, sonar: Track) -> PlacedTarget:
-    placed = body.later(met)
-    if sonar.still:
-        return placed
-    then, now = sonar.later(heard).pose, sonar.pose
-    turn = quaternion_product(now.orientation, _inverse(then.orientation))
-    pose = Pose(now.to_world(then.to_body(placed.pose.position)), quaternion_product(turn, placed.pose.orientation))
-    return replace(placed, pose=pose)
+    there, now = met_at(bodies, when.met), when.sonar.pose
+    if when.sonar.still:
+        return there
+    heard = []
+    for body, time in zip(there, when.heard.tolist(), strict=True):
+        then, place = when.sonar.later(time).pose, body.pose
+        turn = quaternion_product(now.orientation, _inverse(then.orientation))
+        carried = Pose(now.to_world(then.to_body(place.position)), quaternion_product(turn, place.orientation))
+        heard.append(replace(body, pose=carried))
+    return tuple(heard)
 
 
 def mean_motion(sonar: Track | None, when: Hearing | None) -> tuple[Floats, Floats]:

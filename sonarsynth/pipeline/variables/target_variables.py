@@ -157,7 +157,7 @@ TARGETS = group_of(
         "1",
         "share of the area that the array sees that the direct sound of the emission meets",
         attributes=comment(
-            "facing the snap, and past all bodies, at the instant of the frame; 0 of what is heard but lights nothing; "
+            "facing the snap, and past all bodies, where its sound meets them; 0 of what is heard but lights nothing; "
             "NaN where the target is hidden from the array"
         ),
     ),
