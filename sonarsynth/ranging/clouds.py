@@ -116,7 +116,7 @@ def true_directions(beam: Floats, mach: Floats, normal: Floats | None) -> Floats
 
 def range_error(solution: Solution, echoes: PickedEchoes, estimates: SourceEstimates, sonar: Sonar) -> Floats:
     """Predicted standard error (echo,) in m of the range of where an echo was made: direction, clock, snap position,
-    sound speed.
+    sound speed, and what placing itself leaves out.
 
     The same delay means another range in another direction (dr/dpsi, psi the angle between beam and source).
     """
@@ -126,7 +126,7 @@ def range_error(solution: Solution, echoes: PickedEchoes, estimates: SourceEstim
     g = solution.by_source
     snap = np.einsum("bi,ij,bj->b", g, estimates.position_covariance[0], g)
     speed = solution.by_speed * sonar.sound_speed_error
-    return np.asarray(np.sqrt(beside**2 + clock**2 + np.maximum(snap, 0.0) + speed**2))
+    return np.asarray(np.sqrt(beside**2 + clock**2 + np.maximum(snap, 0.0) + speed**2 + solution.model_error**2))
 
 
 def _angle_error(echoes: PickedEchoes, source: Floats) -> Floats:

@@ -51,6 +51,9 @@ FAMILIES = {
     "water that bends rays": Family(
         PING, gradient=-0.5, sonar=UNSURE, processing=TOLD | {"placing": ss.RefractedPlacing()}
     ),
+    "straight placing in water that bends rays": Family(
+        PING, gradient=-0.5, processing=TOLD | {"placing": ss.AutoPlacing()}
+    ),
     "one echo a beam": Family(PING, processing=TOLD | {"picking": ss.BeamAxis()}),
     "the first echo": Family(PING, processing=TOLD | {"picking": ss.FirstEcho()}),
 }

@@ -23,8 +23,10 @@ class AutoPlacing(Method):
 
     def resolve(self, demand: Demand) -> tuple[IsovelocityPlacing | RefractedPlacing, float]:
         """The closed form where bent rays make its ranges wrong by no more than is allowed (m)."""
-        method, error = IsovelocityPlacing().resolve(demand)
-        return (method, error) if error <= (0.0 if demand.exact else demand.allowed) else (self.exact(), 0.0)
+        _, error = IsovelocityPlacing().resolve(demand)
+        if error > (0.0 if demand.exact else demand.allowed):
+            return self.exact(), 0.0
+        return IsovelocityPlacing(bending_error=float(f"{error:.1e}")), error
 
     def exact(self) -> RefractedPlacing:
         """Along rays."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, NonNegativeMetres
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, Method
 from sonarsynth.environment.sea import Profile
@@ -20,6 +21,8 @@ class IsovelocityPlacing(Method):
     (`equations.arrays.bistatic_range`)."""
 
     kind: Literal["isovelocity"] = "isovelocity"
+    bending_error: NonNegativeMetres = 0.0
+    """Standard error of its ranges in water that bends rays: enters the predicted errors only. `auto` measures it."""
 
     def resolve(self, demand: Demand) -> tuple[IsovelocityPlacing, float]:
         """Itself, and by how much (m) bent rays make its ranges wrong."""
@@ -33,4 +36,5 @@ class IsovelocityPlacing(Method):
         self, delay: Floats, beam: Floats, source: Floats, sonar: Sonar, sonar_pose: Pose, profile: Profile
     ) -> Solution:
         """See `PlacingMethod`."""
-        return isovelocity_solution(delay, beam, source, sonar.assumed_sound_speed)
+        solution = isovelocity_solution(delay, beam, source, sonar.assumed_sound_speed)
+        return replace(solution, model_error=self.bending_error)

@@ -21,6 +21,7 @@ class Solution:
     by_angle: Floats  # (echo,) m/rad
     by_source: Floats  # (echo, xyz) dr/dS
     by_speed: Floats  # (echo,) s: dr/dc, c the sound speed that places are computed with; 0 where that is the water's
+    model_error: float = 0.0  # m: standard error of ranges by what places are computed with, beside its speed
 
     def as_array_moves(self, source: Floats, shift: Floats) -> Solution:
         """Of an array that has moved between the direct arrival and the echo, so that the source (xyz) m, sonar frame,
