@@ -17,6 +17,31 @@ from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.shapes import Remus100, Sphere
 from sonarsynth.targets.target import Target
 
+SWIMMING = """
+title: A ball that circles before a crate that swings, before a sonar that turns as it goes
+seed: 3
+scene:
+  world:
+    environment: {depth: 12 m, sound_speed: {kind: isovelocity, speed: 1530 m/s}}
+    targets:
+      - name: ball
+        shape: {kind: sphere, radius: 0.4 m, edge: 8 cm}
+        motion: {kind: circle, centre: [14, 0, -5], radius: 1.5 m, speed: 6 m/s}
+      - name: crate
+        shape: {kind: box, size: [1.2 m, 0.6 m, 0.5 m], edge: 8 cm}
+        motion: {kind: hover, position: [17, -3, -6], heading: 40 deg, pitch: 20 deg, yaw: 60 deg, period: 2 s}
+    sources: [{kind: snapping_shrimp, position: [12, -6], source_level: 188 dB}]
+  sonar:
+    array: {kind: planar_lattice, columns: 16, rows: 12, pitch: 4 cm}
+    assumed_sound_speed: 1530 m/s
+    beams: {azimuth_span: 40 deg, azimuths: 41, elevation_span: 30 deg, elevations: 31}
+  trajectory:
+    frames: 16
+    interval: 0.3 s
+    sonar: {kind: hover, position: [0, 0, -6], heading: 90 deg, surge: 1 m, yaw: 20 deg, period: 4 s}
+"""
+"""A recipe of bodies that move and turn, before a sonar that does."""
+
 
 def remus(frames: int = 2, **sonar: Any) -> Recipe:
     """The remus scene, small: a coarse hull and few frames; the vehicle moves to the right as in the whole one."""

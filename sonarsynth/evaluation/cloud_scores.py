@@ -45,9 +45,9 @@ def figures_of(to_surface: Floats, to_point: Floats) -> dict[str, Any]:
 def cloud_scores(tree: xr.DataTree, frames: np.ndarray) -> dict[str, Any]:
     """Figures (`figures_of`) of the clouds of some frames together.
 
-    The surface is what the array sees: where the beams of the truth first meet a target. The distance
-    of a point that is an echo of a target is that from its mesh when sound met it, of others that from the nearest such
-    place, which is no less. Raises KeyError for a store without a cloud.
+    The surface is what the array sees: where the beams of the truth first meet a target. The distance of a point that
+    is an echo of a target is that from its mesh when sound met it, of others that from the nearest such place, which is
+    no less. Raises KeyError for a store without a cloud.
     """
     to_surface, to_point = [np.zeros(0)], [np.zeros(0)]
     for start in range(0, len(frames), BLOCK):

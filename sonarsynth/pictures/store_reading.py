@@ -90,7 +90,6 @@ class StoredFrame:
 
     index: int
     time: float  # s since the start of the trajectory
-    sonar: Pose
     energy: Floats | None  # (elevation, azimuth) Pa2 s; None where there is no image or the frame has none
     points: Floats  # (point, xyz) m
     range_error: Floats  # (point,) m: range less true range of direct echoes of targets; NaN elsewhere
@@ -133,7 +132,6 @@ def _stored(tree: xr.DataTree, index: int, cloud: Mapping[str, Floats]) -> Store
     return StoredFrame(
         index=index,
         time=float("nan") if time is None else float(time),
-        sonar=pose,
         energy=None if energy is None or not np.isfinite(energy).any() else energy.astype(float),
         points=np.stack([cloud["x"], cloud["y"], cloud["z"]], axis=-1),
         range_error=cloud["range_error"],

@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sonarsynth.conventions import Floats
+from sonarsynth.description.method import returned
 from sonarsynth.labels import echo_levels, label, link_budget, path_powers
 from sonarsynth.labels.estimate_labels import Direct
 from sonarsynth.pipeline.echo_image import image_of, image_without_clock
@@ -164,14 +165,15 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
     processing, windows, elements = plan.scene.processing, plan.windows, known_elements(plan, frame)
     receiver = replace(receiver_of(plan, frame), elements=elements)
     survey = survey_of(plan, frame)
-    estimates = locator(plan.scene).located(signals, receiver, survey, plan.sizes["estimate"])
+    estimates = locator(plan.scene).checked_estimates(signals, receiver, survey, plan.sizes["estimate"])
     estimates = light_first(estimates, signals, elements, plan.scene.sonar, *windows.echo)
     mark_stage("locate")
     imaged, beams = signals, None
     if in_record(estimates, signals, *windows.echo)[:1].any():
         start, stop = (float(estimates.time[0]) + late for late in windows.echo)
         if processing.cancelling is not None:
-            imaged = processing.cancelling.cancelled(signals, estimates, receiver, survey, (start, stop))
+            rest = processing.cancelling.cancel(signals, estimates, receiver, survey, (start, stop))
+            imaged = returned(processing.cancelling, "cancel", rest, signals.pressure.shape, "pressure")
         imaged, beams, image = image_of(plan, elements, imaged, estimates, (start, stop))
     else:  # no direct pulse was found, or an echo was taken for it
         image = image_without_clock(plan, elements, signals)

@@ -41,7 +41,7 @@ class PathModel(Method):
         """
         raise NotImplementedError(f"{type(self).__name__} connects no points")
 
-    def joined(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
+    def checked_paths(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
         """What `connect` returns, once it has the shape of paths."""
         wide, known = {"departure": (3,), "arrival": (3,)}, ("travel_time", "length", "spreading")
         found = self.connect(profile, environment_depth, start, end)

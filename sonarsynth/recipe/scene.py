@@ -245,7 +245,7 @@ class Scene:
         loose = list[Scatterers]()
         for i, field in enumerate(self.world.scatterers):
             try:
-                loose.append(field.placed(bottom, stream(seed, "scatterers", key, i)))
+                loose.append(field.checked_scatterers(bottom, stream(seed, "scatterers", key, i)))
             except ValueError as error:
                 raise FieldError(("scene", "world", "scatterers", i), str(error)) from None
         return WorldState(time, bodies, tuple(snaps), scatterers=tuple(loose))

@@ -181,7 +181,7 @@ def _bins(sampling_frequency: float, samples: int) -> Floats:
 def _made(model: PulseModel, stamp: Stamp | None, highest: float) -> Pulse:
     if model.at_depth(0.0) != model:
         raise ValueError(f"a {model.kind} snap needs the depth of its source")
-    return model.made(0.0, highest)
+    return model.checked_pulse(0.0, highest)
 
 
 def _pulse(waveform: Waveform, highest: float) -> Pulse:

@@ -23,7 +23,7 @@ class PulseModel(Method):
         """
         raise NotImplementedError(f"{type(self).__name__} has no pulse")
 
-    def made(self, depth: float, highest: float) -> Pulse:
+    def checked_pulse(self, depth: float, highest: float) -> Pulse:
         """What `pulse` returns, once it has the shape of a pulse."""
         found, known = self.pulse(depth, highest), ("time", "strength")
         pulse: Pulse = returned_rows(self, "pulse", found, Pulse, "time", known, {})

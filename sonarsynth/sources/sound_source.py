@@ -73,7 +73,7 @@ class SoundSource(Method):
         """Where it is (xyz) in m, over a bottom at this depth (m), at a time (s) since the start of the motions."""
         raise NotImplementedError(f"{type(self).__name__} is nowhere")
 
-    def placed(self, bottom: float, time: float = 0.0) -> Floats:
+    def checked_position(self, bottom: float, time: float = 0.0) -> Floats:
         """What `position_at` returns, once it is a place."""
         return np.asarray(returned(self, "position_at", self.position_at(bottom, time), (3,)))
 
@@ -118,4 +118,6 @@ class SoundSource(Method):
         """What it emits `time` (s) after the instant of a frame, gain times as loud and width times as long."""
         now, model = start + time, self.model(bottom)
         motion = self.velocity(now), self.directivity(now)
-        return Emission(self.placed(bottom, now), time, model, self.level, gain, width, *motion, self.illuminates)
+        return Emission(
+            self.checked_position(bottom, now), time, model, self.level, gain, width, *motion, self.illuminates
+        )

@@ -250,7 +250,7 @@ def _ways_to_facets(array: FacetPaths, snap: Emission) -> TransmitPaths:
     medium, bodies, facets = array.context.medium, array.context.bodies, array.facets
     row = np.flatnonzero(may_face_receiver(facets, snap.position, array.propagation.bounces, medium))
     start = alike(snap.position, len(row))
-    paths = array.propagation.joined(medium.profile, medium.depth, start, rows_of(facets.point, row))
+    paths = array.propagation.checked_paths(medium.profile, medium.depth, start, rows_of(facets.point, row))
     paths = paths.select(picked(usable(paths) & facets.lit(row[paths.pair], paths.arrival)))
     bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
     out = TransmitPaths.of(paths, bounced, row[paths.pair], snap, float(medium.profile.at(depth(snap.position))))

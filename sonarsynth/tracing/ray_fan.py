@@ -211,7 +211,7 @@ def _send_on(
     """Rays about to leave the facets where they landed for a point; writes their coefficients (ray,)."""
     rays = landed.rays
     end = np.broadcast_to(np.asarray(towards, float), rays.position.shape)
-    paths = propagation.joined(medium.profile, medium.depth, rays.clear, end)
+    paths = propagation.checked_paths(medium.profile, medium.depth, rays.clear, end)
     row, first = np.unique(paths.pair, return_index=True)  # the earliest: paths are sorted by time
     going, time = paths.departure[first], paths.travel_time[first]
     strength = np.zeros(len(row))

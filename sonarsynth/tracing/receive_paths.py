@@ -157,7 +157,7 @@ def rays_to_centre(
         ends, path = (float(down.min()), float(down.max())), ("scene", "trajectory", "sonar")
         _require_between(path, "the array, where it hears sound,", *ends, medium.depth)
     end = alike(receiver.pose.position, len(point))
-    paths = propagation.joined(medium.profile, medium.depth, point, end)
+    paths = propagation.checked_paths(medium.profile, medium.depth, point, end)
     paths = paths.select(picked(usable(paths) & chosen(paths)))
     start = rows_of(point, paths.pair)
     bounced: Reflections = reflections(medium.environment, medium.profile, paths, receiver.centre)

@@ -13,6 +13,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.export import write_points
 from sonarsynth.geometry import Pose
 from sonarsynth.recipe.reading import load, loads
+from tests.scenes import SWIMMING
 
 
 @pytest.fixture(scope="module")
@@ -51,31 +52,6 @@ def test_points_of_a_moving_hull_fall_together_on_it(crossing: Path) -> None:
     assert np.abs(place[:, 0]).max() < 0.9 and np.abs(place[:, 1:]).max() < 0.2
     world = ss.points(crossing, relative_to="world")["position"].values[own]
     assert np.ptp(world[:, 1]) > 5.0 > 3.0 * np.ptp(place[:, 0]), "it crossed 9 m of water"
-
-
-SWIMMING = """
-title: A ball that circles before a crate that swings, before a sonar that turns as it goes
-seed: 3
-scene:
-  world:
-    environment: {depth: 12 m, sound_speed: {kind: isovelocity, speed: 1530 m/s}}
-    targets:
-      - name: ball
-        shape: {kind: sphere, radius: 0.4 m, edge: 8 cm}
-        motion: {kind: circle, centre: [14, 0, -5], radius: 1.5 m, speed: 6 m/s}
-      - name: crate
-        shape: {kind: box, size: [1.2 m, 0.6 m, 0.5 m], edge: 8 cm}
-        motion: {kind: hover, position: [17, -3, -6], heading: 40 deg, pitch: 20 deg, yaw: 60 deg, period: 2 s}
-    sources: [{kind: snapping_shrimp, position: [12, -6], source_level: 188 dB}]
-  sonar:
-    array: {kind: planar_lattice, columns: 16, rows: 12, pitch: 4 cm}
-    assumed_sound_speed: 1530 m/s
-    beams: {azimuth_span: 40 deg, azimuths: 41, elevation_span: 30 deg, elevations: 31}
-  trajectory:
-    frames: 16
-    interval: 0.3 s
-    sonar: {kind: hover, position: [0, 0, -6], heading: 90 deg, surge: 1 m, yaw: 20 deg, period: 4 s}
-"""
 
 
 def test_points_are_on_hulls_that_move_and_turn_before_a_sonar_that_does(tmp_path: Path) -> None:

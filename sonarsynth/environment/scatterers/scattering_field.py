@@ -20,7 +20,7 @@ class ScatteringField(Method):
         """All of them; bottom: its depth in m, positive down; random: a stream of their own in each sequence."""
         raise NotImplementedError(f"{type(self).__name__} has no scatterers")
 
-    def placed(self, bottom: float, random: np.random.Generator) -> Scatterers:
+    def checked_scatterers(self, bottom: float, random: np.random.Generator) -> Scatterers:
         """What `scatterers` returns, once it has the shape of that."""
         made, known = self.scatterers(bottom, random), ("position", "normal", "area", "sign")
         wide = {"position": (3,), "normal": (3,)}

@@ -76,7 +76,7 @@ def _changes_within_band(plan: Plan) -> float:
     for owner, law in (("bottom", described.bottom), ("surface", described.surface)) if described else ():
         if law is None:
             continue
-        own = [law.scattered(back, site_of(owner, plan.medium, f)) for f in (band.low, band.centre, band.high)]
+        own = [law.checked_strength(back, site_of(owner, plan.medium, f)) for f in (band.low, band.centre, band.high)]
         if own[1].min() > 0.0:
             worst = max(worst, *(float(np.abs(10.0 * np.log10(x / own[1])).max()) for x in (own[0], own[2])))
     return worst

@@ -127,7 +127,7 @@ def check_shrimp(scene: Scene) -> None:
     """Every source must be in the water, and its pulse one that can be made and heard."""
     bottom_depth = scene.world.environment.depth
     for i, source in enumerate(scene.sources):
-        position = source.placed(bottom_depth, scene.trajectory.start)
+        position = source.checked_position(bottom_depth, scene.trajectory.start)
         if not np.abs(position).max() <= FARTHEST:
             raise FieldError(
                 ("scene", "world", "sources", i, "position"), f"is more than {FARTHEST:g} m from the origin"
@@ -278,7 +278,7 @@ def _check_pulse(source: SoundSource, bottom_depth: float, sonar: Sonar) -> None
     gain, longest = source.largest_scales
     if fault := model.fault(longest, LONGEST_SNAP):
         raise ValueError(fault)
-    pulse = model.made(0.0, 0.0)
+    pulse = model.checked_pulse(0.0, 0.0)
     if not longest * (pulse.end - pulse.start) <= LONGEST_SNAP:
         raise ValueError(f"lasts {longest * (pulse.end - pulse.start):.3g} s; a snap is over in {LONGEST_SNAP:g} s")
     level = float(20.0 * np.log10(gain * pulse.peak / REFERENCE_PRESSURE))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sonarsynth.description.method import FrameSize, Method, returned
+from sonarsynth.description.method import FrameSize, Method
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.state import Receiver, Survey
 
@@ -24,19 +24,6 @@ class CancellingMethod(Method):
         whole multiples of it where something is.
         """
         raise NotImplementedError(f"{type(self).__name__} cancels nothing")
-
-    def cancelled(
-        self,
-        signals: Signals,
-        estimates: SourceEstimates,
-        receiver: Receiver,
-        survey: Survey,
-        window: tuple[float, float],
-    ) -> Signals:
-        """What `cancel` returns, once it has the shape of the signals."""
-        rest = self.cancel(signals, estimates, receiver, survey, window)
-        left: Signals = returned(self, "cancel", rest, signals.pressure.shape, "pressure")
-        return left
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`."""

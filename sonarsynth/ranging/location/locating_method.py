@@ -17,7 +17,7 @@ class LocatingMethod(Method):
         """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found."""
         raise NotImplementedError(f"{type(self).__name__} locates nothing")
 
-    def located(self, signals: Signals, receiver: Receiver, survey: Survey, snaps: int) -> SourceEstimates:
+    def checked_estimates(self, signals: Signals, receiver: Receiver, survey: Survey, snaps: int) -> SourceEstimates:
         """What `locate` returns, once it has the shape of that."""
         found = self.locate(signals, receiver, survey, snaps)
         wide = {"position": (3,), "position_covariance": (3, 3)}

@@ -31,6 +31,6 @@ class BoundaryLaw(Method):
         """Cross-section (...) per m2 and sr. Raises ValueError in one line where the site is not what it needs."""
         raise NotImplementedError(f"{type(self).__name__} has no strength")
 
-    def scattered(self, angles: Angles, site: BoundarySite) -> Floats:
+    def checked_strength(self, angles: Angles, site: BoundarySite) -> Floats:
         """What `strength` returns, once it is of each pair of angles."""
         return np.asarray(returned(self, "strength", self.strength(angles, site), np.shape(angles.sine_in)))

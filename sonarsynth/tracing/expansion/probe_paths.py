@@ -136,7 +136,7 @@ def _searched(
     """Time, spreading (leg, probe) and departure of the rays nearest in time among all; NaN where there is none."""
     count, sensors = predicted.shape
     start, end = np.repeat(legs.point, sensors, axis=0), np.tile(position, (count, 1))
-    paths = geometry.propagation.joined(geometry.medium.profile, geometry.medium.depth, start, end)
+    paths = geometry.propagation.checked_paths(geometry.medium.profile, geometry.medium.depth, start, end)
     same = (paths.surface == legs.surface[paths.pair // sensors]) & (paths.bottom == legs.bottom[paths.pair // sensors])
     nearest = pick_branch(paths, predicted, tolerance, same)
     missing = nearest < 0

@@ -129,7 +129,7 @@ def strength(described: Reverberation, owner: str, paths: ScatteredPaths, medium
         return np.full(len(paths.delay), 10.0 ** ((described.volume or 0.0) / 10.0))
     law = described.bottom if owner == "bottom" else described.surface
     site = site_of(owner, medium, frequency)
-    return np.zeros(len(paths.delay)) if law is None else law.scattered(paths.angles, site)
+    return np.zeros(len(paths.delay)) if law is None else law.checked_strength(paths.angles, site)
 
 
 def site_of(owner: str, medium: Medium, frequency: float) -> BoundarySite:
