@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.columns import picked
 from sonarsynth.conventions import NO_TARGET, Bools, Ints
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.environment.sea import Profile
@@ -157,24 +156,27 @@ def facet_paths(
     count = 0
     straight = propagation.layered and not propagation.bounces and medium.profile.uniform
     families = None if ways is None else {on for _, on in ways}
-    lights = [snap.position for snap in (context.snaps if snaps is None else snaps) if snap.illuminates]
+    lights = [snap.position for snap in snaps or () if snap.illuminates]
 
     def chosen(number: int, rows: Ints) -> Ints:
-        if owners is not None and number not in owners:
+        if (owners is not None and number not in owners) or (snaps is not None and not lights):
             return rows[:0]
         rows = rows[rows % tolerances.every == 0] if tolerances.every > 1 else rows
         if not straight:
             return rows
-        of, eye = context.scattering[number], receiver.pose.position
-        seen_by = of.pose.to_body([eye, *([eye] if snaps is None else lights)])
+        of = context.scattering[number]
+        seen_by = of.pose.to_body([receiver.pose.position, *lights])
         return in_front(rows, of.position, of.normal, seen_by[0], slack, seen_by[1:])
 
     for block in in_blocks(sum(map(len, context.scattering))):
         every = facets_of(context.scattering, block, chosen)
         if propagation.layered and not straight:
             facing = may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack)
-            every = every.select(picked(facing))
+            every = every.select(facing)
         leaving = receive_paths(every, medium, receiver, propagation, slack).by(families)
+        if lights and propagation.layered and propagation.bounces:
+            lit = [may_face_receiver(every, light, 0, medium) for light in lights]
+            leaving = _useful(leaving, np.concatenate(lit), propagation.bounces)
         leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
         first = np.diff(leaving.row, prepend=-1) > 0
         reached = leaving.row[first]
@@ -184,6 +186,11 @@ def facet_paths(
     legs, facets = concatenate(columns[0]), concatenate(columns[1])
     over = expansion_source(legs, facets.owner[legs.row], bent, receiver, propagation)
     return FacetPaths(legs, over, facets, context, propagation, owners=owners, ways=ways)
+
+
+def _useful(legs: ReceivePaths, lit: Ints, bounces: int) -> ReceivePaths:
+    """The legs that paths of so many reflections go on by: with all of them, of facets (row) that have direct light."""
+    return legs.select(np.flatnonzero((legs.bounces < bounces) | np.isin(legs.row, lit)))
 
 
 def bending(medium: Medium, propagation: Propagation, receiver: Receiver) -> Medium:

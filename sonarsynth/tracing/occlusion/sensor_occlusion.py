@@ -167,9 +167,9 @@ class Occlusion:
         if normal is not None:
             unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
         ray = np.flatnonzero(~unseen)
-        leaving, towards, turns = starts.select(leg[ray]), ahead[ray], (beside.bounces[ray], beside.turning[ray])
-        away = leaving.point, self.receiver.pose.position + offset[ray], towards, length[ray]
-        unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=turns[0], turning=turns[1])
+        leaving, turns = starts.select(leg[ray]), {"bounces": beside.bounces[ray], "turning": beside.turning[ray]}
+        away = leaving.point, self.receiver.pose.position + offset[ray], ahead[ray], length[ray]
+        unseen[ray] = hidden(self.bodies, self.bending, *away, **turns, facets=(leaving.owner, leaving.facet))
         look[row, column] = unseen
         return look
 
