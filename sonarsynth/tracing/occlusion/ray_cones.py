@@ -47,8 +47,8 @@ def hidden(
     if medium.profile.uniform and (bounces is None or not bounces.any()):
         return occluded(bodies, start, end, *facets)
     times, turns = (np.zeros(len(start), np.int64) if of is None else of for of in (bounces, turning))
-    how = {"bounces": times, "turning": turns, "facets": facets}
-    verdict = certain(bodies, medium, start, end, departure, length, np.zeros(len(start)), **how)
+    ray = start, end, departure, length, np.zeros(len(start))
+    verdict = certain(bodies, medium, *ray, bounces=times, turning=turns, facets=facets)
     blocked[verdict == CLOSED] = True
     left = np.flatnonzero(verdict >= UNKNOWN)
     blocked[left] = _followed(
@@ -94,8 +94,8 @@ def certain(
     cones = folded_rays.ray_cones(start, end, departure, length, spread, bounces, turning, *limits, *spheres(bodies))
     verdict, sure = np.full(len(start), NO_CONE), picked(np.isfinite(cones[0]))
     slope, reach, far = (column[sure] for column in cones)
-    own = tuple(None if of is None else of[sure] for of in facets)
-    verdict[sure] = classify_cones(bodies, start[sure], departure[sure], slope, reach, far, own)
+    owner, facet = (None if of is None else of[sure] for of in facets)
+    verdict[sure] = classify_cones(bodies, start[sure], departure[sure], slope, reach, far, (owner, facet))
     return verdict
 
 

@@ -167,9 +167,10 @@ class Occlusion:
         if normal is not None:
             unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
         ray = np.flatnonzero(~unseen)
-        leaving, turns = starts.select(leg[ray]), {"bounces": beside.bounces[ray], "turning": beside.turning[ray]}
+        leaving, (bounces, turning) = starts.select(leg[ray]), (beside.bounces[ray], beside.turning[ray])
         away = leaving.point, self.receiver.pose.position + offset[ray], ahead[ray], length[ray]
-        unseen[ray] = hidden(self.bodies, self.bending, *away, **turns, facets=(leaving.owner, leaving.facet))
+        own = leaving.owner, leaving.facet
+        unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=bounces, turning=turning, facets=own)
         look[row, column] = unseen
         return look
 
