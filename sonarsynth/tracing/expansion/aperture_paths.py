@@ -91,16 +91,19 @@ class ExpansionSource:
         for members, model in self.families:
             first, last = np.searchsorted(members, (block.start, block.stop))
             rows = members[first:last] - block.start
-            if model is None:
-                samples.put(rows, traced(legs.select(rows), self.place).known)
-            elif isinstance(model, _FacetInterpolant):
+            if isinstance(model, _FacetInterpolant):
                 samples.put(rows, model.at(legs.point[rows]))
-            else:
+            elif model is not None:  # of spheres there is what there is room for
                 samples.put(rows, {name: value[first:last] for name, value in model.known.items()})
-        varying = [name for name in ("phase", "delay_variance") if getattr(samples, name).any()]
-        varying += ["delay"] if not straight or samples.delay.any() else []
+        varying = [name for name in ("phase", "delay_variance") if self._varies(name)]
+        varying += ["delay"] if not straight or self._varies("delay") else []
         over = spheres.but(error=samples.error, **{name: getattr(samples, name) for name in varying})
         return AperturePaths(over, legs, self.place, samples.departure, samples.gain)
+
+    def _varies(self, name: str) -> bool:
+        """Whether a quantity of any leg does."""
+        models = [model for _, model in self.families if model is not None]
+        return any(name in m.columns if isinstance(m, _FacetInterpolant) else getattr(m, name).any() for m in models)
 
 
 def aperture_paths(

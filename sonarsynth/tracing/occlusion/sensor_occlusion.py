@@ -105,7 +105,7 @@ class Occlusion:
         xyz)."""
         away, length, end = legs.departure, legs.length, alike(self.receiver.pose.position, len(spread))
         if offset is not None:
-            (away, length), end = _towards(legs, offset), end + offset
+            (away, length), end = _towards(length, away, legs.bounces, offset), end + offset
         verdict, rows = np.full(len(away), UNKNOWN), np.arange(len(away))
         if starts.normal is not None:
             ahead = dot(starts.normal, away) * length  # m on the outer side of the facet
@@ -162,24 +162,24 @@ class Occlusion:
             return look & ~seen
         row, column = np.nonzero(look)
         leg, offset = rows[row], self.receiver.pose.turn_to_world(self._points[point])[column]
-        beside, unseen = legs.select(leg), np.zeros(len(leg), bool)
-        ahead, length = _towards(beside, offset)
+        bounces, unseen = legs.bounces[leg], np.zeros(len(leg), bool)
+        ahead, length = _towards(legs.length[leg], legs.departure[leg], bounces, offset)
         if normal is not None:
-            unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
+            unseen = dot(ahead, normal[leg]) <= 0.0
         ray = np.flatnonzero(~unseen)
-        leaving, (bounces, turning) = starts.select(leg[ray]), (beside.bounces[ray], beside.turning[ray])
+        leaving, turning = starts.select(leg[ray]), legs.turning[leg[ray]]
         away = leaving.point, self.receiver.pose.position + offset[ray], ahead[ray], length[ray]
         own = leaving.owner, leaving.facet
-        unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=bounces, turning=turning, facets=own)
+        unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=bounces[ray], turning=turning, facets=own)
         look[row, column] = unseen
         return look
 
 
-def _towards(legs: ReceivePaths, offset: Floats) -> tuple[Floats, Floats]:
-    """Unit vectors (leg, xyz) and distances (leg,) from the starts of legs to the images of places beside the centre
-    (leg, xyz)."""
-    ahead = legs.length[:, None] * legs.departure + offset
-    odd = np.asarray(legs.bounces % 2 == 1)
+def _towards(length: Floats, departure: Floats, bounces: Ints, offset: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors (leg, xyz) and distances (leg,) from the starts of legs of some length and departure to the images
+    of places beside the centre (leg, xyz)."""
+    ahead = length[:, None] * departure + offset
+    odd = np.asarray(bounces % 2 == 1)
     ahead[odd, 2] -= 2.0 * offset[odd, 2]  # of the mirrored array
     length = np.sqrt(dot(ahead, ahead))
     return ahead / np.maximum(length, 1e-300)[:, None], length
