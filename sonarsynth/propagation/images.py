@@ -52,10 +52,3 @@ def family(surface: Ints, bottom: Ints, falls: Bools) -> Ints:
     bounces = surface + bottom
     down = np.where(bounces % 2 == 1, bottom > surface, falls)
     return np.asarray(np.maximum(2 * bounces - down, 0))
-
-
-def order(time: Floats) -> Ints:
-    """Indices that sort the paths of all pairs, family after family with times (family, pair), by pair, then by travel
-    time; paths of one time stay as they are."""
-    family = np.argsort(time.T, axis=1, kind="stable")
-    return np.asarray((family * time.shape[1] + np.arange(time.shape[1])[:, None]).ravel())
