@@ -73,6 +73,6 @@ def _indices(keep: Bools | Ints | Sequence[int] | slice) -> Ints | slice:
 def _taken(column: np.ndarray, rows: Ints | slice) -> np.ndarray:
     if isinstance(rows, slice):
         return column[rows]
-    if column.strides[0] == 0 and len(rows) <= len(column):
-        return column[: len(rows)]
+    if column.strides[0] == 0 and len(column):
+        return column[: len(rows)] if len(rows) <= len(column) else alike(column[0], len(rows))
     return column.take(rows, axis=0)

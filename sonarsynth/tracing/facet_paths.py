@@ -170,10 +170,10 @@ def facet_paths(
         if propagation.layered and not straight:
             facing = may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack)
             every = every.select(facing)
-        leaving = receive_paths(every, medium, receiver, propagation, slack).by(families)
+        lit = None
         if lights and propagation.layered and propagation.bounces:
-            lit = [may_face_receiver(every, light, 0, medium) for light in lights]
-            leaving = _useful(leaving, np.concatenate(lit), propagation.bounces)
+            lit = np.concatenate([may_face_receiver(every, light, 0, medium) for light in lights])
+        leaving = receive_paths(every, medium, receiver, propagation, slack, lit).by(families)
         leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
         first = np.diff(leaving.row, prepend=-1) > 0
         reached = leaving.row[first]
@@ -189,11 +189,6 @@ def _in_front(surface: Scatterers, rows: Ints, receiver: Receiver, slack: float,
     """Those of some elements (row,) that the array may see and some of these places light, as of `in_front`."""
     eye, *seen_by = surface.pose.to_body([receiver.pose.position, *lights])
     return np.asarray(in_front(rows, surface.position, surface.normal, eye, slack, np.reshape(seen_by, (-1, 3))))
-
-
-def _useful(legs: ReceivePaths, lit: Ints, bounces: int) -> ReceivePaths:
-    """The legs that paths of so many reflections go on by: with all of them, of facets (row) that have direct light."""
-    return legs.select(np.flatnonzero((legs.bounces < bounces) | np.isin(legs.row, lit)))
 
 
 def bending(medium: Medium, propagation: Propagation, receiver: Receiver) -> Medium:

@@ -220,16 +220,21 @@ def facets_of(
 
 
 def receive_paths(
-    facets: Facets, medium: Medium, receiver: Receiver, propagation: Propagation, slack: float = 0.0
-) -> ReceivePaths:
+    facets: Facets, medium: Medium, receiver: Receiver, propagation: Propagation, slack: float = 0.0,
+    lit: Ints | None = None,
+) -> ReceivePaths:  # fmt: skip
     """Facet to array: rays that leave a facet on its outer side, whether or not a body stands in them; rows are facets.
 
-    Or that may on their way to a point within `slack` (m) of the array centre.
+    Or that may on their way to a point within `slack` (m) of the array centre. lit (row,): facets that have direct
+    light; of others no rays with all reflections are wanted. None: of all.
     """
+    direct = np.full(len(facets.facet), lit is None)
+    direct[[] if lit is None else lit] = True
 
     def chosen(paths: Paths) -> Bools:
         ahead = dot(rows_of(facets.normal, paths.pair), paths.departure) * paths.length
-        return np.asarray((ahead > -slack) | facets.sideless[paths.pair])
+        seen = np.asarray((ahead > -slack) | facets.sideless[paths.pair])
+        return seen & (direct[paths.pair] | (paths.surface + paths.bottom < propagation.bounces))
 
     return rays_to_centre(medium, facets.point, receiver, propagation, chosen)
 
