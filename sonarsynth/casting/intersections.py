@@ -40,20 +40,9 @@ def distance_to_facet(o: Floats, d: Floats, vertices: Floats, faces: Int32s, fac
 
 @compiled
 def confirm(
-    origin: Floats,
-    direction: Floats,
-    near: Floats,
-    far: Floats,
-    proposed: Ints,
-    vertices: Floats,
-    faces: Int32s,
-    first: Int32s,
-    around: Int32s,
-    size: float,
-    facet: Ints,
-    distance: Floats,
-    any_hit: bool = False,
-) -> None:
+    origin: Floats, direction: Floats, near: Floats, far: Floats, proposed: Ints, vertices: Floats, faces: Int32s,
+    first: Int32s, around: Int32s, size: float, facet: Ints, distance: Floats, any_hit: bool = False,
+) -> None:  # fmt: skip
     """The nearest hit in [near, far] among each proposed facet and those that share a corner with it; -1, NaN for none.
 
     first, around: facets round each vertex, around[first[v] : first[v + 1]]; any_hit: that of the proposed one, where
@@ -80,16 +69,9 @@ def confirm(
 
 @compiled
 def search(
-    origin: Floats,
-    direction: Floats,
-    near: Floats,
-    far: Floats,
-    vertices: Floats,
-    faces: Int32s,
-    size: float,
-    facet: Ints,
-    distance: Floats,
-) -> None:
+    origin: Floats, direction: Floats, near: Floats, far: Floats, vertices: Floats, faces: Int32s, size: float,
+    facet: Ints, distance: Floats,
+) -> None:  # fmt: skip
     """The nearest hit in [near, far] among all facets: slow and exact."""
     tolerance = EDGE * size * size
     for i in range(len(origin)):

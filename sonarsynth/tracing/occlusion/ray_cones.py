@@ -22,24 +22,16 @@ NO_CONE = 3
 
 
 def hidden(
-    bodies: tuple[PlacedTarget, ...],
-    medium: Medium,
-    start: Floats,
-    end: Floats,
-    departure: Floats,
-    length: Floats,
-    *,
-    bounces: Ints | None = None,
-    turning: Ints | None = None,
+    bodies: tuple[PlacedTarget, ...], medium: Medium, start: Floats, end: Floats, departure: Floats, length: Floats,
+    *, bounces: Ints | None = None, turning: Ints | None = None,
     facets: tuple[Ints | None, Ints | None] = (None, None),
-) -> Bools:
+) -> Bools:  # fmt: skip
     """Whether a body stands in rays (ray, xyz) that leave start in direction departure and end after length (m) at end.
 
     bounces, turning (ray,): their reflections from surface and bottom, and turning points; facets: the body (ray,) and
     the facet of it (ray,) in whose middle rays start, where they do (`ray_casting.occluded`). Straight rays and
     reflections in uniform water are exact; bent rays are followed by chords within `SAGITTA_TOLERANCE`, but only where
-    they may pass a body: no ray is farther from the straight line between its ends, unfolded at its reflections, than
-    its largest curvature allows.
+    no narrow cone that holds them tells (`certain`).
     """
     blocked = np.zeros(len(start), bool)
     if not bodies or not len(start):
@@ -51,32 +43,7 @@ def hidden(
     verdict = certain(bodies, medium, *ray, bounces=times, turning=turns, facets=facets)
     blocked[verdict == CLOSED] = True
     left = np.flatnonzero(verdict >= UNKNOWN)
-    blocked[left] = _followed(
-        bodies, medium, start[left], end[left], departure[left], length[left], times[left], turns[left]
-    )
-    return blocked
-
-
-def _followed(
-    bodies: tuple[PlacedTarget, ...], medium: Medium, start: Floats, end: Floats, departure: Floats, length: Floats,
-    times: Ints, turning: Ints,
-) -> Bools:  # fmt: skip
-    """`hidden` of rays that no cone tells of, each followed."""
-    blocked = np.zeros(len(start), bool)
-    bow = _curvature(medium.profile) * length**2 / 8.0
-    broken = (bow > SAGITTA_TOLERANCE) | (times > 0)
-    straight = np.flatnonzero(~broken)
-    blocked[straight] = occluded(bodies, start[straight], end[straight])
-    bent = np.flatnonzero(broken)
-    ray = start[bent], end[bent], departure[bent, 2] > 0, times[bent]
-    full, first = may_meet(bodies, medium.depth, *ray, bow[bent])
-    full |= (times[bent] > 0) & (turning[bent] > 0)  # which boundary comes first, a turn may have changed
-    for rays, followed in ((bent[full], length[bent[full]]), (bent[~full], np.minimum(first, length[bent])[~full])):
-        leaves = np.flatnonzero(followed > 0.0)
-        rows = rays[leaves]
-        blocked[rows] = _along_chords(
-            bodies, medium, start[rows], end[rows], departure[rows], followed[leaves], length[rows]
-        )
+    blocked[left] = _along_chords(bodies, medium, start[left], end[left], departure[left], length[left])
     return blocked
 
 
@@ -130,30 +97,15 @@ def _curvature(profile: Profile) -> float:
     return float(np.nanmax(gradient, initial=0.0)) / float(profile.speed.min())
 
 
-def may_meet(
-    bodies: tuple[PlacedTarget, ...], bottom: float, start: Floats, end: Floats, up: Bools, bounces: Ints, bow: Floats
-) -> tuple[Bools, Floats]:
-    """As `folded_rays.may_meet`, of bodies."""
-    found: tuple[Bools, Floats] = folded_rays.may_meet(start, end, up, bounces, bottom, bow, *spheres(bodies))
-    return found
-
-
 def _along_chords(
-    bodies: tuple[PlacedTarget, ...],
-    medium: Medium,
-    start: Floats,
-    end: Floats,
-    departure: Floats,
-    followed: Floats,
-    length: Floats,
+    bodies: tuple[PlacedTarget, ...], medium: Medium, start: Floats, end: Floats, departure: Floats, length: Floats
 ) -> Bools:
-    """Whether a body stands in a chord of the first `followed` (ray,) m of each ray."""
+    """Whether a body stands in a chord of each ray."""
     blocked = np.zeros(len(start), bool)
     if not len(start):
         return blocked
-    ray, points = chords(medium, start, departure, followed)
-    last = np.flatnonzero(np.diff(ray, append=-1))
-    points[last] = np.where((followed < length)[:, None], points[last], end)
+    ray, points = chords(medium, start, departure, length)
+    points[np.flatnonzero(np.diff(ray, append=-1))] = end
     points[np.flatnonzero(np.diff(ray, prepend=-1))] = start
     pieces = np.flatnonzero(ray[1:] == ray[:-1])
     hits = occluded(bodies, points[pieces], points[pieces + 1])
@@ -162,11 +114,7 @@ def _along_chords(
 
 
 def chords(
-    medium: Medium,
-    start: Floats,
-    departure: Floats,
-    length: Floats,
-    sagitta: float = SAGITTA_TOLERANCE,
+    medium: Medium, start: Floats, departure: Floats, length: Floats, sagitta: float = SAGITTA_TOLERANCE
 ) -> tuple[np.ndarray, Floats]:
     """Polylines that keep within `sagitta` (m) of rays from start (ray, xyz): ray of each node, node (node, xyz)."""
     layers = water(medium.profile.depth, medium.profile.speed, medium.depth)
