@@ -57,9 +57,12 @@ def picked(mask: Bools) -> Ints | slice:
 
 
 def rows_of(column: np.ndarray, keep: Bools | Ints | Sequence[int] | slice) -> np.ndarray:
-    """The rows of a column (row, ...) that a mask, indices or a slice pick; wide ones are copied whole, to be fast. Of
-    one value for all nothing is copied."""
-    return _taken(column, _indices(keep))
+    """The rows of a column (row, ...) that a mask, indices or a slice pick, to be read only: of all in order, and of
+    one value for all, nothing is copied."""
+    rows = _indices(keep)
+    if not isinstance(rows, slice) and len(rows) == len(column) > 0 and rows[0] == 0 and (np.diff(rows) == 1).all():
+        return column
+    return _taken(column, rows)
 
 
 def _indices(keep: Bools | Ints | Sequence[int] | slice) -> Ints | slice:
@@ -73,6 +76,6 @@ def _indices(keep: Bools | Ints | Sequence[int] | slice) -> Ints | slice:
 def _taken(column: np.ndarray, rows: Ints | slice) -> np.ndarray:
     if isinstance(rows, slice):
         return column[rows]
-    if column.strides[0] == 0 and len(rows) <= len(column):
-        return column[: len(rows)]
+    if column.strides[0] == 0 and len(column):
+        return column[: len(rows)] if len(rows) <= len(column) else alike(column[0], len(rows))
     return column.take(rows, axis=0)

@@ -12,10 +12,11 @@ import math
 import numpy as np
 
 from sonarsynth.casting.facet_tree import LEVELS
+from sonarsynth.casting.intersections import over_horizon
 from sonarsynth.casting.ray_casting import casting_mesh
 from sonarsynth.casting.shadows import nearest_first
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Floats, Int32s, Ints
+from sonarsynth.conventions import NO_TARGET, Floats, Int32s, Ints
 from sonarsynth.geometry.placed_target import PlacedTarget
 
 EMPTY, CLOSED, UNKNOWN = range(3)
@@ -223,38 +224,52 @@ def _look(
 
 @compiled
 def look(
-    apex: Floats, axis: Floats, slope: Floats, reach: Floats, far: Floats, nodes: Floats, order: Int32s,
-    vertices: Floats, faces: Int32s, first: Int32s, around: Int32s, verdict: Ints,
+    apex: Floats, axis: Floats, slope: Floats, reach: Floats, far: Floats, facet: Ints, normal: Floats, horizon: Floats,
+    rotation: Floats, position: Floats, size: float, nodes: Floats, order: Int32s, vertices: Floats, faces: Int32s,
+    first: Int32s, around: Int32s, verdict: Ints,
 ) -> None:  # fmt: skip
-    """Write what is certain of cones (cone,) with apex and axis (cone, xyz) up to `reach`: EMPTY, CLOSED by a surface
-    nearer than `far`, or UNKNOWN, as those may be already; first, around: facets round each vertex."""
+    """Write what is certain of cones (cone,) with apex and axis (cone, xyz), world, up to `reach` (m): EMPTY, CLOSED by
+    a surface nearer than `far` (m), or UNKNOWN, as those may be already; first, around: facets round each vertex.
+
+    facet (cone,): that the apex is off, -1: none; above the horizon (facet,) of it there is nothing. rotation (xyz,
+    xyz), position (xyz) m: of the frame that the mesh is in, about its centre, in units of `size` (m).
+    """
     stack, patch = np.empty(LEVELS, np.int64), np.empty(PATCH, np.int64)
-    corner, frame = np.empty((3, 3)), np.empty((4, 3))
+    corner, frame, start, along = np.empty((3, 3)), np.empty((4, 3)), np.empty(3), np.empty(3)
     for i in range(len(apex)):
-        _frame(axis[i], frame)
+        if verdict[i] == CLOSED:
+            continue
+        for x in range(3):
+            start[x] = along[x] = 0.0
+            for y in range(3):
+                start[x] += rotation[y, x] * (apex[i, y] - position[y]) / size
+                along[x] += rotation[y, x] * axis[i, y]
+        if facet[i] >= 0 and over_horizon(along, slope[i], facet[i], normal, horizon):
+            continue
+        _frame(along, frame)
         verdict[i] = _look(
-            apex[i], frame, slope[i], reach[i], far[i], nodes, order, vertices, faces, first, around, stack, patch,
-            corner, verdict[i],
+            start, frame, slope[i], reach[i] / size, far[i] / size, nodes, order, vertices, faces, first, around, stack,
+            patch, corner, verdict[i],
         )  # fmt: skip
 
 
 def classify_cones(
-    bodies: tuple[PlacedTarget, ...], apex: Floats, axis: Floats, slope: Floats, reach: Floats, far: Floats
-) -> Ints:
+    bodies: tuple[PlacedTarget, ...], apex: Floats, axis: Floats, slope: Floats, reach: Floats, far: Floats,
+    facets: tuple[Ints | None, Ints | None] = (None, None),
+) -> Ints:  # fmt: skip
     """What is certain of cones (cone,) among bodies: EMPTY of them up to `reach` (m) along the axis, CLOSED by one of
     them nearer than `far` (m), or UNKNOWN.
 
-    apex, axis: (cone, xyz) world, axes of unit length; slope (cone,): radius of the cone over the distance along it.
+    apex, axis: (cone, xyz) world, axes of unit length; slope (cone,): radius of the cone over the distance along it;
+    facets: the body (cone,) and the facet of it (cone,) that an apex is off, in the middle (`ray_casting.occluded`).
     Holds for any line that stays in the cone, bent or not, from its apex to where it ends.
     """
-    verdicts = np.full(len(apex), EMPTY)
+    verdicts, (owner, facet) = np.full(len(apex), EMPTY), facets
     for rows, number in nearest_first(bodies, apex):
-        body, open_cones = bodies[number], rows.start + np.flatnonzero(verdicts[rows] != CLOSED)
-        mesh = casting_mesh(body.mesh)
-        start = (body.pose.to_body(apex[open_cones]) - mesh.centre) / mesh.size
-        verdict = verdicts[open_cones]
-        tree, towards = mesh.tree, np.ascontiguousarray(body.pose.turn_to_body(axis[open_cones]))
-        limits = slope[open_cones], reach[open_cones] / mesh.size, far[open_cones] / mesh.size
-        look(start, towards, *limits, *tree, mesh.vertices, mesh.faces, *mesh.around, verdict)
-        verdicts[open_cones] = verdict
+        body, mesh = bodies[number], casting_mesh(bodies[number].mesh)
+        own = np.full(len(apex), NO_TARGET) if facet is None else np.where(owner == number, facet, NO_TARGET)
+        horizon = np.empty(0) if facet is None else mesh.horizon
+        place = body.pose.rotation, body.pose.to_world(mesh.centre), mesh.size
+        cones = apex[rows], axis[rows], slope[rows], reach[rows], far[rows], own[rows], body.mesh.normal, horizon
+        look(*cones, *place, *mesh.tree, mesh.vertices, mesh.faces, *mesh.around, verdicts[rows])
     return verdicts

@@ -40,20 +40,9 @@ def distance_to_facet(o: Floats, d: Floats, vertices: Floats, faces: Int32s, fac
 
 @compiled
 def confirm(
-    origin: Floats,
-    direction: Floats,
-    near: Floats,
-    far: Floats,
-    proposed: Ints,
-    vertices: Floats,
-    faces: Int32s,
-    first: Int32s,
-    around: Int32s,
-    size: float,
-    facet: Ints,
-    distance: Floats,
-    any_hit: bool = False,
-) -> None:
+    origin: Floats, direction: Floats, near: Floats, far: Floats, proposed: Ints, vertices: Floats, faces: Int32s,
+    first: Int32s, around: Int32s, size: float, facet: Ints, distance: Floats, any_hit: bool = False,
+) -> None:  # fmt: skip
     """The nearest hit in [near, far] among each proposed facet and those that share a corner with it; -1, NaN for none.
 
     first, around: facets round each vertex, around[first[v] : first[v + 1]]; any_hit: that of the proposed one, where
@@ -80,16 +69,9 @@ def confirm(
 
 @compiled
 def search(
-    origin: Floats,
-    direction: Floats,
-    near: Floats,
-    far: Floats,
-    vertices: Floats,
-    faces: Int32s,
-    size: float,
-    facet: Ints,
-    distance: Floats,
-) -> None:
+    origin: Floats, direction: Floats, near: Floats, far: Floats, vertices: Floats, faces: Int32s, size: float,
+    facet: Ints, distance: Floats,
+) -> None:  # fmt: skip
     """The nearest hit in [near, far] among all facets: slow and exact."""
     tolerance = EDGE * size * size
     for i in range(len(origin)):
@@ -141,13 +123,14 @@ def to_sphere(o: Floats, d: Floats) -> float:
 
 
 @compiled(borrows=True)
-def over_horizon(direction: Floats, facet: int, normal: Floats, horizon: Floats) -> bool:
-    """Whether a ray, of a direction of any length, leaves a facet above all of its mesh; horizon (facet,):
-    `horizons`."""
+def over_horizon(direction: Floats, slope: float, facet: int, normal: Floats, horizon: Floats) -> bool:
+    """Whether all of a cone of rays, along a direction of any length, leaves a facet above all of its mesh; slope: its
+    radius over the distance along it, 0 of a ray; horizon (facet,): `horizons`."""
     square = along = 0.0
     for x in range(3):
         square, along = square + direction[x] ** 2, along + direction[x] * normal[facet, x]
-    return bool(along > (horizon[facet] + CLEAR) * math.sqrt(square))
+    lowest = along - slope * math.sqrt(max(square - along * along, 0.0)) if slope > 0.0 else along
+    return bool(lowest > (horizon[facet] + CLEAR) * math.sqrt(square * (1.0 + slope * slope)))
 
 
 @compiled
@@ -160,7 +143,7 @@ def off_facets(
     which they are. Returns how many. centre (xyz) and size (m): of its sphere."""
     count = 0
     for i in range(len(facet)):
-        if over_horizon(direction[i], facet[i], normal, horizon):
+        if over_horizon(direction[i], 0.0, facet[i], normal, horizon):
             continue
         for x in range(3):
             origin[count, x] = (centroid[facet[i], x] + offset * normal[facet[i], x] - centre[x]) / size
@@ -191,49 +174,8 @@ def into_mesh(
                 o += rotation[y, x] * (start[i, y] - position[y])
                 d += rotation[y, x] * (end[i, y] - start[i, y])
             origin[count, x], heading[count, x] = (o - centre[x]) / size, d / size
-        if facet[i] >= 0 and over_horizon(heading[count], facet[i], normal, horizon):
+        if facet[i] >= 0 and over_horizon(heading[count], 0.0, facet[i], normal, horizon):
             continue
         far[count], segment[count] = to_sphere(origin[count], heading[count]), i
         count += far[count] > 0.0
     return count
-
-
-@compiled
-def folded_pass_near(
-    start: Floats, end: Floats, up: Bools, bounces: Ints, bottom: float, skip: Floats, reach: Floats, centre: Floats,
-    radius: float, near: Bools,
-) -> None:  # fmt: skip
-    """Write whether straight rays from start to end (ray, xyz) with bounces come within radius + reach of a point.
-
-    bounces (ray,): reflections from the surface z = 0 and the bottom z = -bottom (m); up: launched upwards; skip
-    (ray,): m along the ray from its start that do not count; reach (ray,) m.
-    """
-    for i in range(len(start)):
-        x0, y0, z0 = start[i, 0], start[i, 1], start[i, 2]
-        n, rising = bounces[i], 1.0 if up[i] else -1.0
-        climb = end[i, 2] - z0
-        if n > 0:
-            last_above = (n % 2 == 1) == up[i]
-            climb = (
-                (-z0 if up[i] else bottom + z0) + (n - 1) * bottom + (-end[i, 2] if last_above else bottom + end[i, 2])
-            )
-        dx, dy = end[i, 0] - x0, end[i, 1] - y0
-        length = math.sqrt(dx * dx + dy * dy + climb * climb)
-        within = (radius + reach[i]) ** 2
-        near[i] = False
-        done, z, sense = 0.0, z0, rising if n > 0 else 1.0
-        for k in range(n + 1):  # piece by piece between boundaries, fraction: of the whole path
-            edge = 0.0 if sense > 0.0 else -bottom
-            fraction = 1.0 if k == n or climb == 0.0 else min(done + abs(edge - z) / climb, 1.0)
-            z_after = end[i, 2] if k == n else edge
-            first = max(done, min(fraction, skip[i] / length if length > 0.0 else 1.0))
-            if fraction > first or (k == n and first == done):
-                along = (first - done) / (fraction - done) if fraction > done else 0.0
-                ax, ay, az = x0 + first * dx, y0 + first * dy, z + along * (z_after - z)
-                sx, sy, sz = (fraction - first) * dx, (fraction - first) * dy, z_after - az
-                cx, cy, cz = centre[0] - ax, centre[1] - ay, centre[2] - az
-                square = sx * sx + sy * sy + sz * sz
-                t = min(max((cx * sx + cy * sy + cz * sz) / square, 0.0), 1.0) if square > 0.0 else 0.0
-                ex, ey, ez = cx - t * sx, cy - t * sy, cz - t * sz
-                near[i] = near[i] or ex * ex + ey * ey + ez * ez <= within
-            done, z, sense = fraction, z_after, -sense

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.columns import picked
 from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
 from sonarsynth.equations.water import boundary_reflection, formula_ranges
@@ -42,16 +41,17 @@ def bounces(
     both = np.broadcast_arrays(np.asarray(count), np.asarray(grazing, float))
     shape, (times, angle) = both[0].shape, (column.reshape(-1) for column in both)
     modulus, (phase, spread) = np.ones(times.size), np.zeros((2, times.size))
-    met = picked(times > 0)
-    times, q = times[met], angle[met]
-    once = coefficient(boundary, q, frequency) + 0.0  # no negative zeros: the phase of -1 is pi
-    none = np.where(np.isnan(q), np.nan, 1.0)
-    modulus[met], phase[met] = none * np.abs(once) ** times, none * np.angle(once) * times
-    if rms_height(boundary) != 0.0:
-        speed = np.broadcast_to(sound_speed, shape).reshape(-1)[met]
-        spread[met] = none * (np.sqrt(times) * delay_std(boundary, q, speed))
-    else:
-        spread[met] = 0.0 * none
+    met = np.flatnonzero(times > 0)
+    if len(met):
+        times, q = times[met], angle[met]
+        once = coefficient(boundary, q, frequency) + 0.0  # no negative zeros: the phase of -1 is pi
+        size, turn, none = np.abs(once), np.angle(once), 0.0 * q  # NaN of what is NaN
+        if times.max() > 1:
+            size, turn = size**times, turn * times
+        modulus[met], phase[met], spread[met] = size + none, turn + none, none
+        if rms_height(boundary) != 0.0:
+            speed = np.broadcast_to(sound_speed, shape).reshape(-1)[met]
+            spread[met] += np.sqrt(times) * delay_std(boundary, q, speed)
     return Bounces(*(column.reshape(shape) for column in (modulus, phase, spread)))
 
 

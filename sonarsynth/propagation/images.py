@@ -41,8 +41,8 @@ def images(start: Floats, end: Floats, bottom_depth: float, bounces: int) -> lis
 def lengths(start: Floats, end: Floats, bottom_depth: float, bounces: int) -> Floats:
     """Lengths (family, pair) m of all of `images` between points (pair, xyz) of the world."""
     level = np.linalg.norm((end - start)[:, :2], axis=1)
-    ways = images(depth(start), depth(end), bottom_depth, bounces)
-    reflected = [np.hypot(level, way.climb) for way in ways[1:]]
+    ways = images(depth(start), depth(end), bottom_depth, bounces)[1:] if bounces else []
+    reflected = [np.hypot(level, way.climb) for way in ways]
     return np.stack([np.linalg.norm(end - start, axis=1), *reflected])
 
 
@@ -52,10 +52,3 @@ def family(surface: Ints, bottom: Ints, falls: Bools) -> Ints:
     bounces = surface + bottom
     down = np.where(bounces % 2 == 1, bottom > surface, falls)
     return np.asarray(np.maximum(2 * bounces - down, 0))
-
-
-def order(time: Floats) -> Ints:
-    """Indices that sort the paths of all pairs, family after family with times (family, pair), by pair, then by travel
-    time; paths of one time stay as they are."""
-    family = np.argsort(time.T, axis=1, kind="stable")
-    return np.asarray((family * time.shape[1] + np.arange(time.shape[1])[:, None]).ravel())

@@ -14,7 +14,7 @@ from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, GOOD, mean_slowness, water, within
 from sonarsynth.products import Paths
 from sonarsynth.propagation.bounces import Bounces
-from sonarsynth.propagation.images import images, order
+from sonarsynth.propagation.images import images
 from sonarsynth.propagation.path_model import PathModel
 from sonarsynth.propagation.refracted import Refracted
 
@@ -58,41 +58,26 @@ class Straight(PathModel):
         level = np.asarray(end, float)[:, :2] - np.asarray(start, float)[:, :2]
         if not np.isfinite(level).all():
             raise ValueError("paths need finite ends")
-        speed = profile.speed[0]
+        ways = images(z1, z2, environment_depth, self.bounces)
+        climb = np.array([image.climb for image in ways])
+        mean = np.broadcast_to(1.0 / profile.speed[0], climb.shape)
         if not profile.uniform:
             top, bottom = np.minimum(z1, z2), np.maximum(z1, z2)
             ends = ((0.0 * top, top), (top, bottom), (bottom, 0.0 * bottom + environment_depth))
-            slowness = [mean_slowness(layers, a, b) for a, b in ends]
-        columns = []
-        for image in images(z1, z2, environment_depth, self.bounces):
-            length, departure, spreading = straight_rays(level, image.climb)
-            mean, height, none = 1.0 / speed, np.abs(image.climb), alike(0, len(length))
-            if not profile.uniform:
-                heights = (image.above, image.between, image.below)
-                crossed = sum(h * s for h, s in zip(heights, slowness, strict=True))
-                mean = np.divide(crossed, height, out=slowness[1].copy(), where=height > 0)
-            missing = grazing = alike(np.nan, len(length))
-            if image.surface or image.bottom:
-                grazing = np.arcsin(np.divide(height, length, out=missing.copy(), where=length > 0))
-            columns.append(
-                {
-                    "pair": np.arange(len(length)),
-                    "travel_time": length * mean,
-                    "length": length,
-                    "departure": departure,
-                    "arrival": departure if image.turns > 0 else departure * [1.0, 1.0, -1.0],
-                    "spreading": spreading,
-                    "surface": alike(image.surface, len(length)),
-                    "bottom": alike(image.bottom, len(length)),
-                    "turning": none,
-                    "caustics": none,
-                    "surface_grazing": grazing if image.surface else missing,
-                    "bottom_grazing": grazing if image.bottom else missing,
-                    "flag": np.where(length > 0, GOOD, COINCIDENT),
-                }
-            )
-        if len(columns) == 1:
-            return Paths(**columns[0])
-        joined = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
-        rows = order(joined["travel_time"].reshape(len(columns), -1))
-        return Paths(**joined).select(rows)
+            over, own, under = (mean_slowness(layers, a, b) for a, b in ends)
+            crossed = [image.above * over + image.between * own + image.below * under for image in ways]
+            height = np.abs(climb)
+            mean = np.divide(crossed, height, out=np.tile(own, (len(ways), 1)), where=height > 0)
+        surface, bounced = (np.array(n) for n in zip(*((w.surface, w.bottom) for w in ways), strict=True))
+        family, time, length, departure, arrival, spreading, grazing = straight_rays(
+            level, climb, mean, (surface + bounced) % 2
+        )
+        pair, none, missing = np.arange(len(z1)), alike(0, len(length)), alike(np.nan, len(length))
+        met = {"surface": none, "bottom": none, "surface_grazing": missing, "bottom_grazing": missing}
+        if self.bounces:
+            pair, counts = np.repeat(pair, len(ways)), (surface[family], bounced[family])
+            met = dict(zip(met, (*counts, *(np.where(n > 0, grazing, np.nan) for n in counts)), strict=True))
+        return Paths(
+            pair=pair, travel_time=time, length=length, departure=departure, arrival=arrival, spreading=spreading,
+            turning=none, caustics=none, flag=np.where(length > 0, GOOD, COINCIDENT), **met,
+        )  # fmt: skip

@@ -41,8 +41,8 @@ OcclusionPoint = Literal["centre", "sensors"]
 TravelTime = Callable[[Floats, Floats], Floats]
 """Travel times (pair,) in s from points (pair, xyz) to points (pair, xyz) of the world; NaN where no sound arrives."""
 
-MEETINGS, MET = 20, 1e-9
-"""Rounds of solving for when sound meets what moves, at most; s: enough. Each round leaves v/c of the error."""
+MEETINGS, MET = 20, 1e-7
+"""Rounds of solving for when sound meets what moves, at most; s: the last change that is enough: v/c of it is left."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,8 +56,6 @@ class _EchoBlock:
     leg: Ints  # (pair,)
     factor: Floats  # (pair,) what the ways do to amplitudes
     few: Floats  # (echo, FEW) amplitudes of the law at the first probes
-    gain: Floats  # (echo, FEW) of the legs there
-    terms: ArrayExpansion  # (echo,) but for amplitudes
     pulses: PulseResponse  # (echo,)
     carried: MotionTerms | None  # (pair,); None: nothing moves
     legs: ReceivePaths | None = None  # (pair,) with the hydrophones that do not hear it; None: not looked at
@@ -78,8 +76,8 @@ class _EchoBlock:
         groups = [g.but(row=rows) for g, rows in zip(groups, number, strict=True)]
         out, leg, factor = self.out.select(row), self.leg[row], self.factor[row]
         carried, kept = None if self.carried is None else self.carried.select(row), np.flatnonzero(loud)
-        few, gain, terms, pulses = rows_of(self.few, kept), self.gain[kept], self.terms[kept], self.pulses.select(kept)
-        return _EchoBlock(self.array, groups, out, leg, factor, few, gain, terms, pulses, carried)
+        few, pulses = rows_of(self.few, kept), self.pulses.select(kept)
+        return _EchoBlock(self.array, groups, out, leg, factor, few, pulses, carried)
 
     @property
     def amplitude(self) -> Floats:
@@ -99,11 +97,12 @@ class _EchoBlock:
 
     def over(self, few: int | None) -> tuple[Floats, Floats]:
         """Amplitude of the law (echo, probe) at all probes or the first few, and the gain of the legs there."""
-        if few is not None:
-            return self.few, self.gain
         (row,) = _columns(self.groups, "row")
+        gain = self.array.fronts.gain(self.leg[row], few)
+        if few is not None:
+            return self.few, gain
         more = np.concatenate([g.over(self.towards_probes(g, MORE)) for g in self.groups])
-        return np.concatenate([self.few, more], axis=1), self.array.fronts.gain(self.leg[row])
+        return np.concatenate([self.few, more], axis=1), gain
 
     def towards_probes(self, group: EchoBatch, some: slice = slice(None)) -> Floats:
         """Where some probes are seen from the facets of a group (echo, probe, xyz), as `_towards_probes`."""
@@ -193,7 +192,7 @@ def _loudest(array: FacetPaths, snap: Emission, components: tuple[tuple[Componen
 
 def _all_echoes(array: FacetPaths, snap: Emission, components: tuple[tuple[Component, ...], ...]) -> _EchoBlock:
     """All echoes of a snap from the facets of the legs."""
-    out, fronts = _ways_to_facets(array, snap), array.fronts
+    out = _ways_to_facets(array, snap)
     way, leg = path_pairs(out, array.legs, len(array.facets.facet), array.propagation.bounces)
     if array.ways is not None:
         wanted = np.zeros((2 * array.propagation.bounces + 1,) * 2, bool)
@@ -207,9 +206,7 @@ def _all_echoes(array: FacetPaths, snap: Emission, components: tuple[tuple[Compo
     groups = echo_batches(array, out, leg, components, carried, factor)
     few = np.concatenate([g.over(_towards_probes(array, leg, carried, g, FEW)) for g in groups])
     pulses = PulseResponse.join([g.pulses(array.context.receiver.centre) for g in groups])
-    rows = leg[_columns(groups, "row")[0]]
-    gain, over = fronts.gain(rows, QUADRATIC_PROBES), fronts.expansion[rows]
-    return _EchoBlock(array, groups, out, leg, factor, few, gain, over, pulses, carried)
+    return _EchoBlock(array, groups, out, leg, factor, few, pulses, carried)
 
 
 def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -> tuple[TransmitPaths, MotionTerms]:
@@ -248,7 +245,7 @@ def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:
 def _ways_to_facets(array: FacetPaths, snap: Emission) -> TransmitPaths:
     """Ways from a snap to the lit side of facets that no body hides; of facets in one place, the first body's."""
     medium, bodies, facets = array.context.medium, array.context.bodies, array.facets
-    row = np.flatnonzero(may_face_receiver(facets, snap.position, array.propagation.bounces, medium))
+    row = may_face_receiver(facets, snap.position, array.propagation.bounces, medium)
     start = alike(snap.position, len(row))
     paths = array.propagation.checked_paths(medium.profile, medium.depth, start, rows_of(facets.point, row))
     paths = paths.select(picked(usable(paths) & facets.lit(row[paths.pair], paths.arrival)))
@@ -285,7 +282,8 @@ def _with_reflection_phases(block: _EchoBlock, strongest: float) -> ArrayExpansi
     is as strong as the strongest. Where the coefficient passes near 0 its phase leaps: there all sensors have that of
     the centre.
     """
-    over, array = block.terms, block.array
+    array, (row,) = block.array, _columns(block.groups, "row")
+    over = array.fronts.expansion[block.leg[row]]
     if not any(g.turns for g in block.groups):
         return over
     shift = np.concatenate([g.turned(block.towards_probes(g)) for g in block.groups])

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.columns import picked
-from sonarsynth.conventions import NO_TARGET, Bools, Ints
+from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.kernels.placing import in_front
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Kind
+from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.doppler import Meeting, Ways
 from sonarsynth.tracing.expansion.aperture_paths import AperturePaths, ExpansionSource, expansion_source
@@ -157,24 +157,23 @@ def facet_paths(
     count = 0
     straight = propagation.layered and not propagation.bounces and medium.profile.uniform
     families = None if ways is None else {on for _, on in ways}
-    lights = [snap.position for snap in (context.snaps if snaps is None else snaps) if snap.illuminates]
+    lights = [snap.position for snap in snaps or () if snap.illuminates]
 
     def chosen(number: int, rows: Ints) -> Ints:
-        if owners is not None and number not in owners:
+        if (owners is not None and number not in owners) or (snaps is not None and not lights):
             return rows[:0]
         rows = rows[rows % tolerances.every == 0] if tolerances.every > 1 else rows
-        if not straight:
-            return rows
-        of, eye = context.scattering[number], receiver.pose.position
-        seen_by = of.pose.to_body([eye, *([eye] if snaps is None else lights)])
-        return in_front(rows, of.position, of.normal, seen_by[0], slack, seen_by[1:])
+        return _in_front(context.scattering[number], rows, receiver, slack, lights) if straight else rows
 
     for block in in_blocks(sum(map(len, context.scattering))):
         every = facets_of(context.scattering, block, chosen)
         if propagation.layered and not straight:
             facing = may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack)
-            every = every.select(picked(facing))
-        leaving = receive_paths(every, medium, receiver, propagation, slack).by(families)
+            every = every.select(facing)
+        lit = None
+        if lights and propagation.layered and propagation.bounces:
+            lit = np.concatenate([may_face_receiver(every, light, 0, medium) for light in lights])
+        leaving = receive_paths(every, medium, receiver, propagation, slack, lit).by(families)
         leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
         first = np.diff(leaving.row, prepend=-1) > 0
         reached = leaving.row[first]
@@ -184,6 +183,12 @@ def facet_paths(
     legs, facets = concatenate(columns[0]), concatenate(columns[1])
     over = expansion_source(legs, facets.owner[legs.row], bent, receiver, propagation)
     return FacetPaths(legs, over, facets, context, propagation, owners=owners, ways=ways)
+
+
+def _in_front(surface: Scatterers, rows: Ints, receiver: Receiver, slack: float, lights: list[Floats]) -> Ints:
+    """Those of some elements (row,) that the array may see and some of these places light, as of `in_front`."""
+    eye, *seen_by = surface.pose.to_body([receiver.pose.position, *lights])
+    return np.asarray(in_front(rows, surface.position, surface.normal, eye, slack, np.reshape(seen_by, (-1, 3))))
 
 
 def bending(medium: Medium, propagation: Propagation, receiver: Receiver) -> Medium:

@@ -34,7 +34,7 @@ def loud_ones(levels: EchoLevels, negligible: float) -> Bools:
     """Which (path,) are kept: all but the faintest of each target, re what is heard of it for certain."""
     strength, coherent, owner, heard, _ = levels
     keep = np.ones(len(strength), bool)
-    for number, exponent in product(np.unique(owner), (1, 2)):
+    for number, exponent in product(np.flatnonzero(np.bincount(owner)), (1, 2)):
         rows = np.flatnonzero((owner == number) & (coherent == (exponent == 1)))
         loudest = strength[rows].max(initial=0.0)
         size = (strength[rows] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared

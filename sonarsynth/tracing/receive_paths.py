@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import OFFSET
+from sonarsynth.casting.ray_casting import OFFSET, enclosing
 from sonarsynth.columns import Columns, alike, picked, rows_of
 from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth
 from sonarsynth.description import FieldError
-from sonarsynth.equations.kernels.placing import placed
+from sonarsynth.equations.kernels.placing import in_front, placed
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, TOLERANCE
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.mesh import in_blocks
@@ -141,8 +141,8 @@ def apart(row: Ints, travel_time: Floats, arrival: Floats) -> Bools:
     """Which rays (ray,) do not coincide with the one before, of the same row: one from a point on the bottom does with
     the one from its image there."""
     first = np.ones(len(row), bool)
-    same = (np.diff(row) == 0) & (np.abs(np.diff(travel_time)) < COINCIDENCE_TIME)
-    first[1:] = ~(same & (np.abs(np.diff(arrival, axis=0)) < 1e-9).all(axis=1))
+    same = np.flatnonzero((np.diff(row) == 0) & (np.abs(np.diff(travel_time)) < COINCIDENCE_TIME))
+    first[1 + same] = (np.abs(arrival[1 + same] - arrival[same]) >= 1e-9).any(axis=1)
     return first
 
 
@@ -186,6 +186,9 @@ def rays_to_centre(
 def require_in_water(bodies: tuple[PlacedTarget, ...], bottom: float) -> None:
     """Raises FieldError for a body that reaches out of water of that depth (m)."""
     for number, body in enumerate(bodies):
+        middle, radius = enclosing(body)
+        if radius <= -middle[2] <= bottom - radius:
+            continue
         highest, deepest = bottom, 0.0
         for rows in in_blocks(len(body.mesh.vertices)):
             down = depth(body.pose.to_world(body.mesh.vertices[rows]))
@@ -217,29 +220,35 @@ def facets_of(
 
 
 def receive_paths(
-    facets: Facets, medium: Medium, receiver: Receiver, propagation: Propagation, slack: float = 0.0
-) -> ReceivePaths:
+    facets: Facets, medium: Medium, receiver: Receiver, propagation: Propagation, slack: float = 0.0,
+    lit: Ints | None = None,
+) -> ReceivePaths:  # fmt: skip
     """Facet to array: rays that leave a facet on its outer side, whether or not a body stands in them; rows are facets.
 
-    Or that may on their way to a point within `slack` (m) of the array centre.
+    Or that may on their way to a point within `slack` (m) of the array centre. lit (row,): facets that have direct
+    light; of others no rays with all reflections are wanted. None: of all.
     """
+    direct = np.full(len(facets.facet), lit is None)
+    direct[[] if lit is None else lit] = True
 
     def chosen(paths: Paths) -> Bools:
         ahead = dot(rows_of(facets.normal, paths.pair), paths.departure) * paths.length
-        return np.asarray((ahead > -slack) | facets.sideless[paths.pair])
+        seen = np.asarray((ahead > -slack) | facets.sideless[paths.pair])
+        return seen & (direct[paths.pair] | (paths.surface + paths.bottom < propagation.bounces))
 
     return rays_to_centre(medium, facets.point, receiver, propagation, chosen)
 
 
-def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Medium, slack: float = 0.0) -> Bools:
-    """(facet,) which may have a ray on their outer side to a point (xyz), or within `slack` (m) of it; exactly so in
-    uniform water, unreflected.
+def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Medium, slack: float = 0.0) -> Ints:
+    """Those (facet,) that may have a ray on their outer side to a point (xyz), or within `slack` (m) of it; exactly so
+    in uniform water, unreflected.
 
     A ray rises and falls by (bounces + 2) bottom depths at most over its distance, so somewhere it has that slope or
     less, and by Snell's law its cosine is nowhere less than there times the ratio of the extreme sound speeds.
     """
     if not bounces and medium.profile.uniform:
-        return np.asarray((dot(facets.normal, position - facets.point) > -slack) | facets.sideless)
+        every = np.arange(len(facets.facet))
+        return np.asarray(in_front(every, facets.point, facets.normal, position, slack, np.empty((0, 3))))
     level = position[:2] - facets.point[:, :2]
     distance = np.hypot(level[:, 0], level[:, 1])
     flattest = distance / np.hypot(distance, (bounces + 2) * medium.depth)
@@ -247,4 +256,4 @@ def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Me
     ahead = np.einsum("ij,ij->i", facets.normal[:, :2], level) / np.maximum(distance, 1e-300)
     steepest = np.abs(facets.normal[:, 2]) * np.sqrt((1.0 - cosine) * (1.0 + cosine))
     margin = 1e-9 + slack / np.maximum(distance, 1e-300)
-    return np.asarray((ahead >= -margin) | (ahead * cosine + steepest > -margin))
+    return np.flatnonzero((ahead >= -margin) | (ahead * cosine + steepest > -margin))

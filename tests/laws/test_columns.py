@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sonarsynth.columns import Columns, alike, picked
+from sonarsynth.columns import Columns, alike, picked, rows_of
 from sonarsynth.conventions import Floats
 
 
@@ -40,6 +40,14 @@ def test_rows_are_those_that_numpy_picks(keep: Any) -> None:
     for found, column in ((rows.value, value), (rows.same, same.copy()), (rows.inner.place, place)):
         np.testing.assert_array_equal(found, column[keep])
     assert rows.name == "all"
+    np.testing.assert_array_equal(rows_of(place, keep), place[keep])
+
+
+def test_rows_in_another_order_are_not_taken_for_all() -> None:
+    place = np.arange(27.0).reshape(9, 3)
+    assert rows_of(place, np.arange(9)) is place
+    for rows in (np.arange(9)[::-1], np.append(np.arange(8), 3), np.repeat(0, 9)):
+        np.testing.assert_array_equal(rows_of(place, rows), place[rows])
 
 
 def test_one_value_for_all_is_not_copied_and_neither_are_all_rows() -> None:

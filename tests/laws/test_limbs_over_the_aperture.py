@@ -24,6 +24,7 @@ from sonarsynth.state import Emission, FrameContext, Medium, OcclusionPoint, Rec
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.tracing.arrivals import trace
+from sonarsynth.tracing.facet_paths import facet_paths
 from tests.echoes import EAST, PROFILE, ROMANIS, C
 from tests.laws.test_synthesis import some_of
 
@@ -125,3 +126,13 @@ def test_facets_with_a_diffuse_floor_are_heard_where_the_centre_does_not_see_the
     for sensor in FAR:
         seen = ~found.hidden(ARRAY.count)[:, sensor]
         assert set(found.facet[seen]) == set(alone(law, int(sensor)).facet)
+
+
+def test_paths_that_serve_any_snap_serve_those_that_are_known() -> None:
+    """Facets that only hydrophones beside the centre face are among them: reflected sound may light them."""
+    ball = PlacedTarget("ball", BALL, Pose(PLACE + [8.0, 0.3, 0.2], EAST), np.zeros(3))
+    receiver, law = Receiver(Pose(PLACE, EAST), ARRAY, SONAR), (MirrorLobe(),)
+    medium, sees = Medium(WATER, PROFILE), Tolerances(occlusion="sensors")
+    context = FrameContext(0.0, (ball,), (SNAP,), medium, receiver, law, sees)
+    known, every = (facet_paths(context, AutoTracing(), snaps=snaps) for snaps in ((SNAP,), None))
+    assert set(known.facets.facet) < set(every.facets.facet)

@@ -20,7 +20,7 @@ from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
 from sonarsynth.tracing.facet_paths import bending
-from sonarsynth.tracing.occlusion.ray_cones import hidden
+from sonarsynth.tracing.occlusion.ray_cones import chords, hidden
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion, cells, rim
 from sonarsynth.tracing.receive_paths import ReceivePaths, facets_of, receive_paths
 
@@ -151,6 +151,42 @@ def test_cones_that_are_certain_are_so_for_any_ray_in_them(seed: int) -> None:
     alike = blocked.all(axis=0) | ~blocked.any(axis=0)
     assert (found == CLOSED).sum() > 20
     assert (found[alike] == UNKNOWN).mean() < 0.2  # and little else is uncertain
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_cones_above_the_horizon_of_their_facet_are_empty_of_its_body(seed: int) -> None:
+    rng, bodies = np.random.default_rng(seed), some_bodies(seed)
+    facets = facets_of(tuple(Scatterers.of_body(body, FacetLaw()) for body in bodies), slice(0, 10**9))
+    facets = facets.select(rng.choice(len(facets.facet), 3000))
+    axis = rng.normal(size=(3000, 3)) + 2.0 * facets.normal
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    cones = facets.clear, axis, 10.0 ** rng.uniform(-4.0, -0.5, 3000), *np.full((2, 3000), 9.0)
+    known, unknown = (classify_cones(bodies, *cones, of) for of in ((facets.owner, facets.facet), (None, None)))
+    assert ((known == unknown) | (known == EMPTY)).all()
+    for angle in np.linspace(0.0, 2.0 * np.pi, 7):
+        one, other = np.cross(axis, facets.normal), np.cross(axis, np.cross(axis, facets.normal))
+        across = np.cos(angle) * one + np.sin(angle) * other
+        across *= (cones[2] / np.linalg.norm(across, axis=1))[:, None]
+        blocked = occluded(bodies, facets.clear, facets.clear + 9.0 * (axis + across))
+        assert not blocked[known == EMPTY].any()
+    assert (known == EMPTY).sum() > 500
+
+
+@pytest.mark.parametrize("water", [UNIFORM, THERMOCLINE])
+def test_rays_are_hidden_where_their_chords_meet_a_body(water: Profile) -> None:
+    medium, bodies = Medium(WATER, water), some_bodies(1)
+    facets = facets_of(tuple(Scatterers.of_body(body, FacetLaw()) for body in bodies), slice(0, 10**9))
+    receiver = Receiver(SONAR, array_of(61))
+    legs = receive_paths(facets, medium, receiver, Refracted(bounces=2))
+    own = facets.owner[legs.row], facets.facet[legs.row]
+    ray = facets.clear[legs.row], np.broadcast_to(SONAR.position, legs.point.shape), legs.departure, legs.length
+    blocked = hidden(bodies, medium, *ray, bounces=legs.bounces, turning=legs.turning, facets=own)
+    ray_of, points = chords(medium, ray[0], legs.departure, legs.length)
+    piece = np.flatnonzero(np.diff(ray_of) == 0)
+    met = np.zeros(len(legs.row), bool)
+    met[ray_of[piece[occluded(bodies, points[piece], points[piece + 1])]]] = True
+    assert (met != blocked).mean() < 1e-3  # chords are beside rays by a little
+    assert 0.05 < met.mean() < 0.95
 
 
 def test_parts_of_an_array_hold_all_of_it() -> None:

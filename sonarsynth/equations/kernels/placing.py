@@ -11,13 +11,14 @@ from sonarsynth.conventions import Floats, Ints
 @compiled
 def in_front(rows: Ints, position: Floats, normal: Floats, eye: Floats, slack: float, lights: Floats) -> Ints:
     """Those of some elements (row,) that have an eye (xyz), or what is within `slack` (m) of it, on their outer side,
-    and one of some lights (light, xyz) as well, or have no normal; all in one frame."""
+    and one of some lights (light, xyz), where there are any, as well, or have no normal; all in one frame."""
     kept, count = np.empty(len(rows), np.int64), 0
     for row in rows:
         x, y, z = position[row, 0], position[row, 1], position[row, 2]
         nx, ny, nz = normal[row, 0], normal[row, 1], normal[row, 2]
         keep = nx == 0.0 and ny == 0.0 and nz == 0.0
         if not keep and nx * (eye[0] - x) + ny * (eye[1] - y) + nz * (eye[2] - z) > -slack:
+            keep = len(lights) == 0
             for n in range(len(lights)):
                 keep = keep or nx * (lights[n, 0] - x) + ny * (lights[n, 1] - y) + nz * (lights[n, 2] - z) > 0.0
         if keep:

@@ -7,20 +7,37 @@ import math
 import numpy as np
 
 from sonarsynth.compiling import compiled
-from sonarsynth.conventions import Bools, Floats
+from sonarsynth.conventions import Bools, Floats, Ints
 
 
 @compiled
-def straight_rays(level: Floats, climb: Floats) -> tuple[Floats, Floats, Floats]:
-    """Lengths (ray,) m of ways so far over ground (ray, xy) m and up (ray,) m, unit vectors (ray, xyz) along them, NaN
-    of none, and one over the lengths."""
-    length, towards, inverse = np.empty(len(climb)), np.empty((len(climb), 3)), np.empty(len(climb))
-    for i in range(len(climb)):
-        x, y, z = level[i, 0], level[i, 1], climb[i]
-        length[i] = math.sqrt(x * x + y * y + z * z)
-        inverse[i] = 1.0 / length[i]
-        towards[i, 0], towards[i, 1], towards[i, 2] = x / length[i], y / length[i], z / length[i]
-    return length, towards, inverse
+def straight_rays(
+    level: Floats, climb: Floats, mean: Floats, odd: Ints
+) -> tuple[Ints, Floats, Floats, Floats, Floats, Floats, Floats]:
+    """Ways so far over ground (pair, xy) m and up (family, pair) m at a mean slowness (family, pair) s/m, sorted by
+    pair, then by travel time: family, travel times, lengths, unit vectors along them (ray, xyz) where they begin, NaN
+    of none, and where they end, there upside down of odd (family,) ones, one over the lengths, and grazing angles."""
+    families, count = climb.shape
+    family, first = np.empty(families * count, np.int64), 0
+    time, length, inverse, grazing = np.empty((4, families * count))
+    departure, arrival = np.empty((2, families * count, 3))
+    for i in range(count):
+        x, y = level[i, 0], level[i, 1]
+        for n in range(families):
+            far = math.sqrt(x * x + y * y + climb[n, i] * climb[n, i])
+            late, k = far * mean[n, i], first + n
+            while k > first and time[k - 1] > late:
+                time[k], length[k], family[k] = time[k - 1], length[k - 1], family[k - 1]
+                k -= 1
+            time[k], length[k], family[k] = late, far, n
+        for k in range(first, first + families):
+            far, z = length[k], climb[family[k], i]
+            inverse[k] = 1.0 / far
+            departure[k, 0], departure[k, 1], departure[k, 2] = x / far, y / far, z / far
+            arrival[k, 0], arrival[k, 1], arrival[k, 2] = x / far, y / far, -z / far if odd[family[k]] else z / far
+            grazing[k] = math.asin(abs(z) / far) if family[k] > 0 else math.nan
+        first += families
+    return family, time, length, departure, arrival, inverse, grazing
 
 
 @compiled

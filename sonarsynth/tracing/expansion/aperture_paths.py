@@ -91,16 +91,19 @@ class ExpansionSource:
         for members, model in self.families:
             first, last = np.searchsorted(members, (block.start, block.stop))
             rows = members[first:last] - block.start
-            if model is None:
-                samples.put(rows, traced(legs.select(rows), self.place).known)
-            elif isinstance(model, _FacetInterpolant):
+            if isinstance(model, _FacetInterpolant):
                 samples.put(rows, model.at(legs.point[rows]))
-            else:
+            elif model is not None:  # of spheres there is what there is room for
                 samples.put(rows, {name: value[first:last] for name, value in model.known.items()})
-        varying = [name for name in ("phase", "delay_variance") if getattr(samples, name).any()]
-        varying += ["delay"] if not straight or samples.delay.any() else []
+        varying = [name for name in ("phase", "delay_variance") if self._varies(name)]
+        varying += ["delay"] if not straight or self._varies("delay") else []
         over = spheres.but(error=samples.error, **{name: getattr(samples, name) for name in varying})
         return AperturePaths(over, legs, self.place, samples.departure, samples.gain)
+
+    def _varies(self, name: str) -> bool:
+        """Whether a quantity of any leg does."""
+        models = [model for _, model in self.families if model is not None]
+        return any(name in m.columns if isinstance(m, _FacetInterpolant) else getattr(m, name).any() for m in models)
 
 
 def aperture_paths(
@@ -123,16 +126,18 @@ def expansion_source(
     if straight and not legs.bounces.any():
         return ExpansionSource(legs, geometry, (), True)
     families: list[tuple[Ints, ApertureSamples | _FacetInterpolant | None]] = []
-    for members in _families(legs, group):
-        if straight and not legs.bounces[members[0]]:
-            families.append((members, None))
-            continue
-        chosen = members[_spread(legs.point[members])]
-        exact = traced(legs.select(chosen), geometry)
-        model: ApertureSamples | _FacetInterpolant | None = exact
-        if len(chosen) < len(members):
-            model = _over_body(legs.point[members], legs.point[chosen], exact, 2.0 * np.pi * receiver.band[1])
-        families.append((members, model or traced(legs.select(members), geometry)))
+    every = _families(legs, group) if len(legs.row) > 2 * SAMPLES else [np.arange(len(legs.row))]
+    reflected = legs.bounces > 0
+    chosen = [of[_spread(legs.point[of])] if not straight or reflected[of].any() else of[:0] for of in every]
+    exact, last = traced(legs.select(np.concatenate(chosen)), geometry), 0
+    for members, some in zip(every, chosen, strict=True):
+        known: ApertureSamples | _FacetInterpolant | None = None
+        if len(some):
+            of_some, last = exact.select(slice(last, last + len(some))), last + len(some)
+            point, rate = legs.point[members], 2.0 * np.pi * receiver.band[1]
+            known = of_some if len(some) == len(members) else _over_body(point, legs.point[some], of_some, rate)
+            known = known or traced(legs.select(members), geometry)
+        families.append((members, known))
     return ExpansionSource(legs, geometry, tuple(families), False)
 
 
@@ -178,7 +183,8 @@ class _FacetInterpolant:
 def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: float) -> _FacetInterpolant | None:
     """Legs from points (point, xyz) of a body from those of a sample of them, by cubics; None if they err too much;
     rate (rad/s): of the upper edge of the band."""
-    middle, half = 0.5 * (point.min(axis=0) + point.max(axis=0)), np.maximum(0.5 * np.ptp(point, axis=0), 1e-9)
+    low, high = np.transpose([(x.min(), x.max()) for x in np.array(point.T, order="C")])
+    middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-9)
     at = aperture_terms((sample - middle) / half, 1.0)
     values = {name: value.reshape(len(sample), -1) for name, value in exact.known.items() if name != "error"}
     if not all(np.isfinite(value).all() for value in values.values()):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.columns import rows_of
+from sonarsynth.columns import Columns, rows_of
 from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.equations.kernels.unit_vectors import to_images
 from sonarsynth.geometry import Pose
@@ -32,7 +32,7 @@ class ReceiverGeometry:
 
 
 @dataclass(frozen=True, eq=False)
-class ApertureSamples:
+class ApertureSamples(Columns):
     """Legs at the probes."""
 
     delay: Floats  # (leg, term) as of `ArrayExpansion`, and the next two

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sonarsynth.casting.cones import CLOSED, UNKNOWN, classify_cones
+from sonarsynth.casting.cones import CLOSED, UNKNOWN
 from sonarsynth.casting.shadows import hide
 from sonarsynth.columns import alike, picked
 from sonarsynth.conventions import Bools, Floats, Ints
@@ -17,7 +17,7 @@ from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements
 from sonarsynth.state import Medium, Receiver, Tolerances
-from sonarsynth.tracing.occlusion.ray_cones import hidden, ray_cones
+from sonarsynth.tracing.occlusion.ray_cones import NO_CONE, certain, hidden
 from sonarsynth.tracing.receive_paths import DOUBTFUL, SEEN, ReceivePaths, Starts
 
 if TYPE_CHECKING:
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 
 RAYS, STRAIGHT_RAYS = 30_000, 500_000
 """Rays that are looked at together; of straight ones little is held."""
-NO_CONE = 3
-"""Rays that are in no narrow cone for certain, by `ray_cones.ray_cones`: of these the centre and the rim of the array
-are looked at, and where they do not see alike every hydrophone; what only those within the rim see is not found."""
 PARTS = 32
 """Parts of the array that are looked at as one where the whole does not see alike."""
 
@@ -66,15 +63,15 @@ class Occlusion:
             of = starts.owner, starts.facet
             hides = hidden(self.bodies, self.bending, *ray, bounces=legs.bounces, turning=legs.turning, facets=of)
             return legs.select(picked(~hides))
-        certain = self._certain(legs, starts)
-        in_sight, mixed = certain != CLOSED, certain == UNKNOWN
+        verdict = self._certain(legs, starts)
+        in_sight, mixed = verdict != CLOSED, verdict == UNKNOWN
         centre = np.zeros(1, int)  # of those that stay open
         for kind, first in ((UNKNOWN, centre), (NO_CONE, np.append(centre, 1 + rim(self.elements)))):
-            for rows in self._parts(legs, np.flatnonzero(certain == kind), len(first)):
+            for rows in self._parts(legs, np.flatnonzero(verdict == kind), len(first)):
                 unseen = self._unseen(legs, starts, rows, first)
                 in_sight[rows] = ~unseen.all(axis=1)
                 mixed[rows] |= unseen.any(axis=1)
-        pending = np.where(mixed & ~in_sight & (certain == UNKNOWN), DOUBTFUL, np.where(mixed, SEEN, 0))
+        pending = np.where(mixed & ~in_sight & (verdict == UNKNOWN), DOUBTFUL, np.where(mixed, SEEN, 0))
         rows = np.flatnonzero(in_sight | (pending == DOUBTFUL))
         none = np.zeros((len(rows), 1 + self.elements.count // 8), np.uint8)
         return legs.select(rows).seen(none, pending[rows])
@@ -101,34 +98,24 @@ class Occlusion:
 
     def _certain(self, legs: ReceivePaths, starts: Starts) -> Ints:
         """(leg,) EMPTY where all hydrophones see it, CLOSED where none does; elsewhere UNKNOWN or NO_CONE."""
-        spread = np.full(len(legs.row), 1.001 * float(np.linalg.norm(self._points, axis=1).max()))
-        ahead = None if starts.normal is None else _within(legs, starts.normal, spread)
-        return self._cones(legs, starts, np.zeros((len(legs.row), 3)), spread, ahead)
+        return self._cones(legs, starts, np.full(len(legs.row), 1.001 * np.linalg.norm(self._points, axis=1).max()))
 
-    def _cones(
-        self, legs: ReceivePaths, starts: Starts, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None
-    ) -> Ints:
-        """(leg,) as `_certain`, of the hydrophones within `spread` (leg,) of places beside the centre (leg, xyz); ahead
-        (leg,): how far (m) they are on the outer side of the facet, at least and at most."""
-        away, length = _towards(legs, offset)
+    def _cones(self, legs: ReceivePaths, starts: Starts, spread: Floats, offset: Floats | None = None) -> Ints:
+        """(leg,) as `_certain`, of the hydrophones within `spread` (leg,) of the centre or of places beside it (leg,
+        xyz)."""
+        away, length, end = legs.departure, legs.length, alike(self.receiver.pose.position, len(spread))
+        if offset is not None:
+            (away, length), end = _towards(length, away, legs.bounces, offset), end + offset
         verdict, rows = np.full(len(away), UNKNOWN), np.arange(len(away))
-        if ahead is not None:
-            verdict[ahead[1] < 0.0] = CLOSED
-            rows = np.flatnonzero(ahead[0] > 0.0)
-        end = (self.receiver.pose.position + offset)[rows]
+        if starts.normal is not None:
+            ahead = dot(starts.normal, away) * length  # m on the outer side of the facet
+            verdict[ahead < -spread] = CLOSED
+            rows = np.flatnonzero(ahead > spread)
         leaving = starts.select(rows)
-        ray = leaving.point, end, away[rows], length[rows]
-        slope, reach, far = ray_cones(
-            self.bodies,
-            self.bending,
-            *ray,
-            spread[rows],
-            bounces=legs.bounces[rows],
-            turning=legs.turning[rows],
-        )
-        sure = np.flatnonzero(np.isfinite(slope))
-        verdict[rows], leaving, along, slope = NO_CONE, leaving.select(sure), away[rows[sure]], slope[sure]
-        verdict[rows[sure]] = classify_cones(self.bodies, leaving.point, along, slope, reach[sure], far[sure])
+        verdict[rows] = certain(
+            self.bodies, self.bending, leaving.point, end[rows], away[rows], length[rows], spread[rows],
+            bounces=legs.bounces[rows], turning=legs.turning[rows], facets=(leaving.owner, leaving.facet),
+        )  # fmt: skip
         return verdict
 
     def _dark(self, legs: ReceivePaths, starts: Starts, rows: Ints) -> Bools:
@@ -143,8 +130,7 @@ class Occlusion:
             self.receiver.pose.turn_to_world(array_cells.centre)[cell],
             array_cells.radius[cell],
         )
-        ahead = None if places.normal is None else _within(repeated, places.normal, spread, offset)
-        verdict = self._cones(repeated, places, offset, spread, ahead)
+        verdict = self._cones(repeated, places, spread, offset)
         verdict = verdict.reshape(len(rows), len(array_cells.radius))[:, array_cells.cell]
         unseen = self._unseen(legs, starts, rows, every, verdict >= UNKNOWN)
         return np.asarray((verdict == CLOSED) | unseen)
@@ -176,34 +162,27 @@ class Occlusion:
             return look & ~seen
         row, column = np.nonzero(look)
         leg, offset = rows[row], self.receiver.pose.turn_to_world(self._points[point])[column]
-        beside, unseen = legs.select(leg), np.zeros(len(leg), bool)
-        ahead, length = _towards(beside, offset)
+        bounces, unseen = legs.bounces[leg], np.zeros(len(leg), bool)
+        ahead, length = _towards(legs.length[leg], legs.departure[leg], bounces, offset)
         if normal is not None:
-            unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
+            unseen = dot(ahead, normal[leg]) <= 0.0
         ray = np.flatnonzero(~unseen)
-        leaving, towards, turns = starts.select(leg[ray]), ahead[ray], (beside.bounces[ray], beside.turning[ray])
-        away = leaving.point, self.receiver.pose.position + offset[ray], towards, length[ray]
-        unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=turns[0], turning=turns[1])
+        leaving, turning = starts.select(leg[ray]), legs.turning[leg[ray]]
+        away = leaving.point, self.receiver.pose.position + offset[ray], ahead[ray], length[ray]
+        own = leaving.owner, leaving.facet
+        unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=bounces[ray], turning=turning, facets=own)
         look[row, column] = unseen
         return look
 
 
-def _towards(legs: ReceivePaths, offset: Floats) -> tuple[Floats, Floats]:
-    """Unit vectors (leg, xyz) and distances (leg,) from the starts of legs to the images of places beside the centre
-    (leg, xyz)."""
-    ahead = legs.length[:, None] * legs.departure + offset
-    odd = np.asarray(legs.bounces % 2 == 1)
+def _towards(length: Floats, departure: Floats, bounces: Ints, offset: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors (leg, xyz) and distances (leg,) from the starts of legs of some length and departure to the images
+    of places beside the centre (leg, xyz)."""
+    ahead = length[:, None] * departure + offset
+    odd = np.asarray(bounces % 2 == 1)
     ahead[odd, 2] -= 2.0 * offset[odd, 2]  # of the mirrored array
     length = np.sqrt(dot(ahead, ahead))
     return ahead / np.maximum(length, 1e-300)[:, None], length
-
-
-def _within(legs: ReceivePaths, normal: Floats, spread: Floats, offset: Floats | None = None) -> tuple[Floats, Floats]:
-    """(leg,) how far (m) on the outer side of a facet what is within `spread` (leg,) of a place beside the centre is,
-    at least and at most."""
-    away, length = (legs.departure, legs.length) if offset is None else _towards(legs, offset)
-    ahead = np.einsum("ij,ij->i", normal, away) * length
-    return ahead - spread, ahead + spread
 
 
 class Cells(NamedTuple):

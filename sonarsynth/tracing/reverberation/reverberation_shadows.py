@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonarsynth.casting.folded_rays import may_meet
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver.subarrays import subarrays
 from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.tracing.facet_paths import of_one_speed
 from sonarsynth.tracing.meetings import family_times
-from sonarsynth.tracing.occlusion.ray_cones import hidden, may_meet
+from sonarsynth.tracing.occlusion.ray_cones import hidden, spheres
 
 PART = 32
 """Hydrophones of a part of the array, at most: all of them see what its middle sees."""
@@ -54,7 +55,8 @@ class Shadows:
         array = np.column_stack([position[:, :2] - way[:, :2], np.full(count, receiver.pose.position[2])])
         up, reach = way[:, 2] > 0.0, np.full(count, receiver.elements.aperture)
         times = np.full(count, bounces)
-        far, first = may_meet(self.met[number], self.medium.depth, array, position, up, times, reach)
+        bodies = spheres(self.met[number])
+        far, first = may_meet(array, position, up, times, self.medium.depth, reach, *bodies)
         rows = np.flatnonzero(far | (first > 0.0))
         found = np.zeros((count, len(self.parts)), bool)
         start, on = (array[rows, None] + self.middle).reshape(-1, 3), (way[rows, None] - self.middle).reshape(-1, 3)
