@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,7 +16,7 @@ from sonarsynth.equations.arrays.noise_peaks import peak_level
 from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond
+from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond, suspects
 from sonarsynth.ranging.picking.peak_kernels import beside, farthest, local_maxima, over_lobes, power_centres
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
 from sonarsynth.ranging.range_profiles import (
@@ -39,6 +38,8 @@ NOISE_WIDTHS = 3.0
 """Beam widths on either side of a beam whose noise is taken for its own."""
 NOISE_ADDED = 2.0
 """Amplitude of noise, in units of its root mean square, that may be in a peak."""
+FOLLOWED = 12
+"""Peaks that are followed beyond the grid at once: what is found there of the likeliest explains most of the others."""
 LOBE_BINS = 48
 """Frequencies that lobes are summed over."""
 LOBE_STEPS, LOBE_ERROR = 128, 4e-4
@@ -133,17 +134,15 @@ def _once(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, t: In
 
 def _energies(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, height: Floats) -> Floats:
     """Energies (peak,) in Pa2 s: of a peak h exp(-(sharpness t)^2), as a share of all that is in its beam."""
-    beams, beam = np.unique(b, return_inverse=True)
-    beam_energy = profiles.step * profiles.power[beams].sum(axis=1, dtype=float)
-    share = height * np.sqrt(np.pi) / axes.sharpness[2] / beam_energy[beam]
+    share = height * np.sqrt(np.pi) / axes.sharpness[2] / (profiles.step * profiles.total[b])
     return np.asarray(np.minimum(share, 1.0) * window.image.energy[profiles.row[b], profiles.column[b]])
 
 
 def _cut(power: npt.NDArray[np.float32], b: Ints, t: Ints, end: int) -> Bools:
     """Whether peaks (peak,) are what the window left of a louder echo, whose own peak is at its end or beyond."""
     own, last = power[b, t], power.shape[1] - 1
-    early = (t < 2 * end) & (power[:, :end].max(axis=1)[b] > own)
-    late = (last - t < 2 * end) & (power[:, -end:].max(axis=1)[b] > own)
+    early = (t < 2 * end) & (power[b, :end].max(axis=1) > own)
+    late = (last - t < 2 * end) & (power[b, -end:].max(axis=1) > own)
     return np.asarray(early | late)
 
 
@@ -213,13 +212,15 @@ def noise_power(profiles: Profiles, image: EnergyImage) -> Floats:
     """
     end = min(int(pulse_times.PULSE_HALF / profiles.step), profiles.power.shape[1] // 4)
     powers = profiles.power[:, end : profiles.power.shape[1] - end : OVERSAMPLING]
-    level, filled = np.zeros(image.energy.shape), np.zeros(image.energy.shape)
-    powers, half = np.sort(powers, axis=1), (powers.shape[1] - 1) / 2  # a fifth of the time of np.median
-    median = 0.5 * (powers[:, math.floor(half)] + powers[:, math.ceil(half)])
-    level[profiles.row, profiles.column] = median / np.log(2.0)
-    filled[profiles.row, profiles.column] = 1.0
+    half = powers.shape[1] // 2  # bits are in order as powers are, and twice as fast
+    parted = np.partition(powers.view(np.int32), half, axis=1).view(np.float32)
+    before = parted[:, :half].max(axis=1) if powers.shape[1] % 2 == 0 else parted[:, half]
+    median = 0.5 * (before + parted[:, half])
+    place = profiles.row - profiles.row.min(), profiles.column - profiles.column.min()
+    level, filled = np.zeros((2, place[0].max() + 1, place[1].max() + 1))
+    level[place], filled[place] = median / np.log(2.0), 1.0
     cells = [2 * int(NOISE_WIDTHS * 2 * profiles.width / step) + 1 if step else 1 for step in _steps(image)]
-    around, of = (uniform_filter(x, cells, mode="constant")[profiles.row, profiles.column] for x in (level, filled))
+    around, of = (uniform_filter(x, cells, mode="constant")[place] for x in (level, filled))
     return np.asarray(np.maximum(around / of, np.finfo(np.float32).tiny))
 
 
@@ -246,14 +247,16 @@ def _tops(
 def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats, noise: Floats) -> Bools:
     """Whether peaks (peak,) are more than what the lobes of the array bring of louder ones, in the grid and beyond."""
     least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
-    u, delay = profiles.direction[b], profiles.step * t.astype(float)
-    own = _over(window, profiles.width, u, delay, height, least)
-    beyond, late, power = louder_beyond(window, profiles, b[own], t[own], height[own], least[own] / LOBES)
-    if len(power):
-        u, delay = np.concatenate([u[own], beyond]), np.concatenate([delay[own], profiles.step * late])
-        unasked = np.full(len(power), np.inf)
-        height, least = np.concatenate([height[own], power]), np.concatenate([least[own], unasked])
-        own[own] = _over(window, profiles.width, u, delay, height, least)[: np.count_nonzero(own)]
+    loud = profiles.direction[b], profiles.step * t.astype(float), height
+    own, asked = _over(window, profiles.width, *loud, least), least
+    rest, line = suspects(window, profiles, b, t, least / LOBES)
+    while len(some := np.flatnonzero(own[rest])[:FOLLOWED]):
+        beyond = louder_beyond(window, profiles, b[rest[some]], t[rest[some]], height[rest[some]], line[some])
+        rest, line = rest[some[-1] + 1 :], line[some[-1] + 1 :]
+        if len(beyond[0]):
+            loud = tuple(np.concatenate(both) for both in zip(loud, beyond, strict=True))
+            asked = np.append(asked, np.full(len(beyond[0]), np.inf))
+            own &= _over(window, profiles.width, *loud, asked)[: len(own)]
     return own
 
 
