@@ -74,9 +74,7 @@ class EchoFilter:
         """Step (s) of delays."""
         return 0.5 / (self.length * self.received.beams.snapshots.spacing)
 
-    def profiles(
-        self, u: Floats
-    ) -> tuple[npt.NDArray[np.complex64], npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    def profiles(self, u: Floats) -> tuple[npt.NDArray[np.complex64], npt.NDArray[np.float32], npt.NDArray[np.float32]]:
         """Spectra (beam, bin) of the profiles of beams (beam, xyz), these, powers (beam, delay), and their sums."""
         window, sonar = self.received.beams.snapshots, self.received.sonar
         sine = u * (self.received.elements.face / sonar.assumed_sound_speed)

@@ -29,6 +29,7 @@ from sonarsynth.ranging.range_profiles import (
     residue,
 )
 from sonarsynth.ranging.received_window import ReceivedWindow
+from sonarsynth.receiver import Elements, Sonar
 
 BESIDE = 2
 """Cells beside the beams over threshold that are looked at too: a peak there has its neighbours."""
@@ -112,6 +113,7 @@ def _maxima(
     loudest = power.max(axis=0)
     floor = np.maximum(0.5 * least, loudest.max() * 10 ** (-dynamic_range / 10)).astype(np.float32)
     audible = maximum_filter1d(loudest, 2 * profiles.about + 1) * np.float32(10 ** (-side_lobes / 10))
+    audible[loudest <= floor.min()] = np.inf
     end = max(int(np.ceil(pulse_times.PULSE_HALF / profiles.step)), profiles.about) + 1
     b, t = local_maxima(power, index, *beams, floor, audible, axes.resolved, profiles.about, end)
     good = ~_cut(power, b, t, end)
@@ -266,30 +268,26 @@ def _over(
     """Whether `least` (peak,) is more than what lobes bring of louder peaks from directions (peak, xyz), at delays
     (peak,) in s, of heights (peak,)."""
     loud = np.argsort(-height, kind="stable")
-    band, live = window.sonar.band, np.flatnonzero(window.elements.gain)
-    taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
-    c = window.sonar.assumed_sound_speed
-    position, rate = window.elements.position[live], LOBE_STEPS * band.high
-    steps = int(np.ceil((4.0 * farthest(position) / c + 2.0 / (band.high - band.low)) * rate)) + 2
-    own = np.empty(len(height), bool)
-    own[loud] = over_lobes(
-        direction[loud] / c,
-        delay[loud],
-        height[loud],
-        position,
-        live_gain(window.elements.gain)[live],
-        np.linspace(band.low, band.high, LOBE_BINS),
-        taper,
-        2.0 * width / c,
-        least[loud] / LOBES,
-        _lobe_table(band.low, band.high, rate, steps),
-        rate,
-        LOBE_ERROR,
-    )
+    c, own = window.sonar.assumed_sound_speed, np.empty(len(height), bool)
+    *lobes, table = _lobes(window.elements, window.sonar)
+    near, rate = 2.0 * width / c, LOBE_STEPS * window.sonar.band.high
+    peaks, least = (direction[loud] / c, delay[loud], height[loud]), least[loud] / LOBES
+    own[loud] = over_lobes(*peaks, *lobes, near, least, table, rate, LOBE_ERROR)
     return own
 
 
 @lru_cache(maxsize=8)
+def _lobes(elements: Elements, sonar: Sonar) -> tuple[Floats, ...]:
+    """What `over_lobes` takes of an array: positions (sensor, xyz) and weights (sensor,) of live sensors; frequencies
+    (bin,), their taper, and the table of what they sum to."""
+    band, live, rate = sonar.band, np.flatnonzero(elements.gain), LOBE_STEPS * sonar.band.high
+    position, f = elements.position[live], np.linspace(band.low, band.high, LOBE_BINS)
+    longest = 4.0 * farthest(position) / sonar.assumed_sound_speed + 2.0 / (band.high - band.low)
+    taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
+    table = _lobe_table(band.low, band.high, rate, int(np.ceil(longest * rate)) + 2)
+    return position, live_gain(elements.gain)[live], f, taper, table
+
+
 def _lobe_table(low: float, high: float, rate: float, steps: int) -> Floats:
     """Sum (2, delay) over the band low to high (Hz), tapered, at delays in steps of 1/rate (Hz), `steps` either way."""
     delay = np.arange(-steps, steps + 1) / rate
