@@ -8,9 +8,6 @@ import numpy as np
 
 from sonarsynth.compiling import compiled
 
-GAP = 64
-"""Delays between others that are looked at with them: as fast as to begin anew."""
-
 
 @compiled
 def exceeded(power: Any, index: Any, i: int, j: int, t: int, about: int) -> Any:
@@ -32,35 +29,19 @@ def exceeded(power: Any, index: Any, i: int, j: int, t: int, about: int) -> Any:
 
 
 @compiled
-def _runs(least: Any, first: int, stop: int) -> Any:
-    """Bounds (run, 2) of the runs of least (delay,), from first to stop, that are finite, over gaps of up to `GAP`."""
-    bounds = [(0, 0) for _ in range(0)]
-    for t in range(first, stop):
-        if least[t] < np.inf:
-            near = len(bounds) > 0 and t - bounds[-1][1] < GAP
-            if near:
-                bounds[-1] = (bounds[-1][0], t + 1)
-            else:
-                bounds.append((t, t + 1))
-    return bounds
-
-
-@compiled
 def local_maxima(
-    power: Any, index: Any, row: Any, column: Any, floor: Any, least: Any, edge: Any, about: int, end: int
+    power: Any, index: Any, row: Any, column: Any, floor: Any, least: Any, edge: Any, about: int, runs: Any
 ) -> Any:
-    """Beams and delays (peak,) of values over `floor` (beam,), of `least` (delay,) at least, that no neighbour exceeds;
-    fast where `least` is infinite.
+    """Beams and delays (peak,) of values over `floor` (beam,), of `least` (delay,) at least, that no neighbour exceeds.
 
     power (beam, delay); index (elevation, azimuth) the beam there, -1 for none; row, column (beam,) of each beam. None
-    within `end` delays of an end, which is more than `about`, none in a beam that lacks a neighbour, where a slope
-    would pass for a peak, and none at the edge of an axis of which edge (2,) says that peaks are resolved: theirs may
-    be outside.
+    outside runs (run, 2) of delays, first and end, which are more than `about` from either end, none in a beam that
+    lacks a neighbour, where a slope would pass for a peak, and none at the edge of an axis of which edge (2,) says that
+    peaks are resolved: theirs may be outside.
     """
-    (rows, columns), stop = index.shape, power.shape[1] - end
-    runs, top = _runs(least, end, stop), np.zeros(power.shape[1] + 8 & -8, np.bool_)
-    eights, most = top.view(np.uint64), len(power) * (max(stop - end, 0) // (about + 1) + 1)  # more than `about` apart
-    peaks, count = np.empty((2, most), np.int32), 0
+    (rows, columns), top = index.shape, np.zeros(power.shape[1] + 8 & -8, np.bool_)
+    eights, most = top.view(np.uint64), power.shape[1] // (about + 1) + len(runs)  # more than `about` apart
+    peaks, count = np.empty((2, len(power) * most), np.int32), 0
     for b in range(len(power)):
         i, j = row[b], column[b]
         if (edge[0] and (i == 0 or i == rows - 1)) or (edge[1] and (j == 0 or j == columns - 1)):

@@ -35,19 +35,18 @@ BESIDE = 2
 """Cells beside the beams over threshold that are looked at too: a peak there has its neighbours."""
 LOBES = 8.0
 """Times what lobes bring of louder peaks that a peak must exceed: echoes are of more than their peaks."""
+GAP = 65
+"""Delays about loud ones that are looked for peaks with them."""
 NOISE_WIDTHS = 3.0
 """Beam widths on either side of a beam whose noise is taken for its own."""
 NOISE_ADDED = 2.0
 """Amplitude of noise, in units of its root mean square, that may be in a peak."""
-FOLLOWED = 12
-"""Peaks that are followed beyond the grid at once: what is found there of the likeliest explains most of the others."""
-LOBE_BINS = 48
-"""Frequencies that lobes are summed over."""
-LOBE_STEPS, LOBE_ERROR = 128, 4e-4
-"""Steps a period at the highest frequency that lobes are tabulated at; and what such a table errs by."""
+FEW, MANY = 12, 48
+"""Peaks that are followed beyond the grid first, and later: what the likeliest are lobes of explains most others."""
+LOBE_BINS, LOBE_STEPS, LOBE_ERROR = 48, 128, 4e-4
+"""Frequencies that lobes are summed over; steps a period at the highest that they are tabulated at; error of that."""
 RESOLVED = 1.0
 """An axis of the grid as long as this, in units of the roughness of noise along it, has peaks along it."""
-SIXTH = 1.0 / 6.0
 CENTRE_WINDOW = 1.4
 """Standard deviation, in widths of a peak, of the window about it in which the centre of power is looked for."""
 NOISE_CLEAR = 4.0
@@ -89,9 +88,8 @@ def peak_echoes(
     centre, late = np.empty((len(b), 3)), np.argsort(t, kind="stable")
     width, clear = axes.step * axes.sharpness, NOISE_CLEAR * noise
     centre[late] = power_centres(power, index, *beams, b[late], t[late], top_offset[late], width, CENTRE_WINDOW, clear)
-    snr = height / noise[b]
+    snr, offset = height / noise[b], top_offset * axes.step
     error = axes.errors(snr, centre)
-    offset = top_offset * axes.step
     return PickedEchoes(
         elevation=image.elevation[profiles.row[b]] + offset[:, 0],
         azimuth=image.azimuth[profiles.column[b]] + offset[:, 1],
@@ -113,11 +111,12 @@ def _maxima(
     loudest = power.max(axis=0)
     floor = np.maximum(0.5 * least, loudest.max() * 10 ** (-dynamic_range / 10)).astype(np.float32)
     audible = maximum_filter1d(loudest, 2 * profiles.about + 1) * np.float32(10 ** (-side_lobes / 10))
-    audible[loudest <= floor.min()] = np.inf
     end = max(int(np.ceil(pulse_times.PULSE_HALF / profiles.step)), profiles.about) + 1
-    b, t = local_maxima(power, index, *beams, floor, audible, axes.resolved, profiles.about, end)
-    good = ~_cut(power, b, t, end)
-    return b[good], t[good]
+    some = maximum_filter1d(loudest, GAP)[end : len(loudest) - end] > floor.min()
+    runs = end + np.flatnonzero(np.diff(some, prepend=False, append=False)).reshape(-1, 2)
+    b, t = local_maxima(power, index, *beams, floor, audible, axes.resolved, profiles.about, runs)
+    whole = ~_cut(power, b, t, end)
+    return b[whole], t[whole]
 
 
 def _once(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, t: Ints, height: Floats) -> Bools:
@@ -240,8 +239,8 @@ def _tops(
     Parabolas through peaks and their neighbours on each axis: through the cube roots of amplitudes, which the main lobe
     of a disc makes a parabola up to the fourth order (1 - y/2 + y^2/12 does).
     """
-    top = power[b, t].astype(float) ** SIXTH
-    sides = np.minimum(beside(power, index, *beams, b, t).astype(float) ** SIXTH, top)
+    top = power[b, t].astype(float) ** (1.0 / 6.0)
+    sides = np.minimum(beside(power, index, *beams, b, t).astype(float) ** (1.0 / 6.0), top)
     offset, height = parabola(sides[:, 0], top, sides[:, 1])
     return offset.T * resolved, np.prod((height[resolved] / top) ** 3, axis=0)
 
@@ -249,16 +248,18 @@ def _tops(
 def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats, noise: Floats) -> Bools:
     """Whether peaks (peak,) are more than what the lobes of the array bring of louder ones, in the grid and beyond."""
     least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
-    loud = profiles.direction[b], profiles.step * t.astype(float), height
-    own, asked = _over(window, profiles.width, *loud, least), least
-    rest, line = suspects(window, profiles, b, t, least / LOBES)
-    while len(some := np.flatnonzero(own[rest])[:FOLLOWED]):
-        beyond = louder_beyond(window, profiles, b[rest[some]], t[rest[some]], height[rest[some]], line[some])
+    u, delay = profiles.direction[b], profiles.step * t.astype(float)
+    own, asked, loud = _over(window, profiles.width, u, delay, height, least), least, height
+    (rest, line), many = suspects(window, profiles, b, t, least / LOBES), FEW
+    while len(some := np.flatnonzero(own[rest])):
+        some, many = some[: many if len(some) > 2 * many else None], min(2 * many, MANY)
+        p = rest[some]
+        beyond = louder_beyond(window, profiles, b[p], t[p], height[p], line[some])
         rest, line = rest[some[-1] + 1 :], line[some[-1] + 1 :]
         if len(beyond[0]):
-            loud = tuple(np.concatenate(both) for both in zip(loud, beyond, strict=True))
+            u, delay, loud = (np.concatenate(both) for both in zip((u, delay, loud), beyond, strict=True))
             asked = np.append(asked, np.full(len(beyond[0]), np.inf))
-            own &= _over(window, profiles.width, *loud, asked)[: len(own)]
+            own &= _over(window, profiles.width, u, delay, loud, asked)[: len(own)]
     return own
 
 
@@ -269,10 +270,10 @@ def _over(
     (peak,) in s, of heights (peak,)."""
     loud = np.argsort(-height, kind="stable")
     c, own = window.sonar.assumed_sound_speed, np.empty(len(height), bool)
-    *lobes, table = _lobes(window.elements, window.sonar)
+    position, weight, f, taper, table = _lobes(window.elements, window.sonar)
     near, rate = 2.0 * width / c, LOBE_STEPS * window.sonar.band.high
-    peaks, least = (direction[loud] / c, delay[loud], height[loud]), least[loud] / LOBES
-    own[loud] = over_lobes(*peaks, *lobes, near, least, table, rate, LOBE_ERROR)
+    peaks = direction[loud] / c, delay[loud], height[loud]
+    own[loud] = over_lobes(*peaks, position, weight, f, taper, near, least[loud] / LOBES, table, rate, LOBE_ERROR)
     return own
 
 
