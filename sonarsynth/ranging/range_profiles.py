@@ -26,9 +26,9 @@ from sonarsynth.receiver import Band, Elements, Sonar
 
 MAX_BEAMS = 16384
 """No more beams are ranged, the loudest of them: a bound on memory where a whole image is loud."""
-BEAMS_AT_ONCE, TRANSFORMED_AT_ONCE = 2048, 32
-"""Beams that share the sums over rows of a lattice; and those that are transformed together: more at once would need
-memory that is given back, and taken again, in every frame."""
+BEAMS_AT_ONCE, SAMPLES_AT_ONCE = 2048, 65536
+"""Beams that share the sums over rows of a lattice; and samples of beams that are transformed together, in the cache:
+more at once would need memory that is given back, and taken again, in every frame."""
 OVERSAMPLING = 4
 """Delays of a profile for each that its bandwidth needs: two of a transform, and one more after each."""
 HALFWAY = np.array([0.605571, -0.133738, 0.032692, -0.004536], np.float32)
@@ -81,13 +81,13 @@ class EchoFilter:
         blocks = [self.received.beams.spectra(u[low : low + BEAMS_AT_ONCE]) for low in range(0, len(u), BEAMS_AT_ONCE)]
         spectra = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
         power, total = np.empty((len(u), self.count), np.float32), np.empty(len(u), np.float32)
-        room = np.empty((TRANSFORMED_AT_ONCE, self.length), np.complex64)
-        for low in range(0, len(u), TRANSFORMED_AT_ONCE):
-            some = slice(low, low + TRANSFORMED_AT_ONCE)
+        room = np.empty((max(SAMPLES_AT_ONCE // self.length, 1), self.length), np.complex64)
+        for low in range(0, len(u), len(room)):
+            some = slice(low, low + len(room))
             steered, bins = spectra[some], (window.frequency[0], window.spacing)
             padded = room[: len(steered)]
             ranging_kernels.match(steered, sine[some, 1], sine[some, 2], *bins, self.share, self.matched, padded)
-            waves = ifft(padded, axis=1, overwrite_x=True)  # in the cache
+            waves = ifft(padded, axis=1, overwrite_x=True)
             ranging_kernels.powers(waves, HALFWAY, power[some], total[some])
         return spectra, power, total
 
