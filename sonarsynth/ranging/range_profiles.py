@@ -26,9 +26,9 @@ from sonarsynth.receiver import Band, Elements, Sonar
 
 MAX_BEAMS = 16384
 """No more beams are ranged, the loudest of them: a bound on memory where a whole image is loud."""
-BEAMS_AT_ONCE, TRANSFORMED_AT_ONCE = 512, 32
-"""Beams that share the sums over rows of a lattice; and those that are transformed together: more at once would need
-memory that is given back, and taken again, in every frame."""
+BEAMS_AT_ONCE, SAMPLES_AT_ONCE = 2048, 65536
+"""Beams that share the sums over rows of a lattice; and samples of beams that are transformed together, in the cache:
+more at once would need memory that is given back, and taken again, in every frame."""
 OVERSAMPLING = 4
 """Delays of a profile for each that its bandwidth needs: two of a transform, and one more after each."""
 HALFWAY = np.array([0.605571, -0.133738, 0.032692, -0.004536], np.float32)
@@ -74,25 +74,22 @@ class EchoFilter:
         """Step (s) of delays."""
         return 0.5 / (self.length * self.received.beams.snapshots.spacing)
 
-    def profiles(self, u: Floats) -> tuple[npt.NDArray[np.complex64], npt.NDArray[np.float32]]:
-        """Spectra (beam, bin) of the profiles of beams (beam, xyz), and these: powers (beam, delay)."""
+    def profiles(self, u: Floats) -> tuple[npt.NDArray[np.complex64], npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+        """Spectra (beam, bin) of the profiles of beams (beam, xyz), these, powers (beam, delay), and their sums."""
         window, sonar = self.received.beams.snapshots, self.received.sonar
         sine = u * (self.received.elements.face / sonar.assumed_sound_speed)
-        spectra = np.empty((len(u), len(self.matched)), np.complex64)
-        power = np.empty((len(u), self.count), np.float32)
-        room = np.empty((TRANSFORMED_AT_ONCE, self.length), np.complex64)
-        for first in range(0, len(u), BEAMS_AT_ONCE):
-            block = slice(first, first + BEAMS_AT_ONCE)
-            steered, bins = self.received.beams.spectra(u[block]), (window.frequency[0], window.spacing)
-            across, up = sine[block, 1], sine[block, 2]
-            ranging_kernels.match(steered, across, up, *bins, self.share, self.matched, spectra[block])
-            for few in range(first, min(first + BEAMS_AT_ONCE, len(u)), TRANSFORMED_AT_ONCE):
-                some = spectra[few : few + TRANSFORMED_AT_ONCE]
-                padded = room[: len(some)]
-                padded[:, : some.shape[1]], padded[:, some.shape[1] :] = some, 0.0
-                waves = ifft(padded, axis=1, overwrite_x=True)  # in the cache
-                ranging_kernels.powers(waves, HALFWAY, power[few : few + len(some)])
-        return spectra, power
+        blocks = [self.received.beams.spectra(u[low : low + BEAMS_AT_ONCE]) for low in range(0, len(u), BEAMS_AT_ONCE)]
+        spectra = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        power, total = np.empty((len(u), self.count), np.float32), np.empty(len(u), np.float32)
+        room = np.empty((max(SAMPLES_AT_ONCE // self.length, 1), self.length), np.complex64)
+        for low in range(0, len(u), len(room)):
+            some = slice(low, low + len(room))
+            steered, bins = spectra[some], (window.frequency[0], window.spacing)
+            padded = room[: len(steered)]
+            ranging_kernels.match(steered, sine[some, 1], sine[some, 2], *bins, self.share, self.matched, padded)
+            waves = ifft(padded, axis=1, overwrite_x=True)
+            ranging_kernels.powers(waves, HALFWAY, power[some], total[some])
+        return spectra, power, total
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +101,7 @@ class Profiles:
     direction: Floats  # (beam, xyz)
     spectra: npt.NDArray[np.complex64]  # (beam, bin) of which they are made
     power: npt.NDArray[np.float32]  # (beam, delay) relative
+    total: npt.NDArray[np.float32]  # (beam,) sum over delays
     first: float  # s after the direct arrival
     step: float  # s
     width: float  # rad: half of the half-power width of a beam
@@ -200,7 +198,7 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
     u = direction(received.image.azimuth[column], received.image.elevation[row])
     echoes = echo_filter(received)
     share, matched, taper = echoes.share, echoes.matched, echoes.taper
-    spectra, power = echoes.profiles(u)
+    spectra, power, total = echoes.profiles(u)
     spread = np.sum(taper**2)
     centre = float(f @ taper**2 / spread)
     beta = np.sqrt(max(float((f - centre) ** 2 @ taper**2 / spread), spacing**2))
@@ -210,6 +208,7 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
         direction=u,
         spectra=spectra,
         power=power,
+        total=total,
         first=window.start - float(received.estimates.time[0]),
         step=echoes.step,
         width=half_width(elements, centre / c),

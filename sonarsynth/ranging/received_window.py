@@ -18,7 +18,7 @@ class ReceivedWindow:
     sonar: Sonar
     image: EnergyImage
     beams: BeamSpectra
-    loudest: float  # Pa: largest pressure in the signals that the beams are made of
+    loudest: float  # Pa: about the largest pressure in the signals that the beams are made of
     direct: Signals  # with the direct pulse in them
     estimates: SourceEstimates
     focus: float | None = None  # m: of the beams; none: plane waves

@@ -181,7 +181,9 @@ def test_local_maxima_are_those_of_a_filter():
     index = np.arange(63).reshape(7, 9)
     edge, floor, least = np.array([True, True]), np.full(63, 0.5, np.float32), np.ones(60, np.float32)
     least[::2] = 0.0  # at every other delay nothing is loud enough
-    b, t = local_maxima(volume.reshape(63, 60), index, row, column, floor, least, edge, 3, 5)
+    b, t = local_maxima(
+        volume.reshape(63, 60), index, row, column, floor, least, edge, 3, np.array([[5, 30], [30, 55]])
+    )
     top = (volume == maximum_filter(volume, (3, 3, 7), mode="constant")) & (volume > 0.5) & (least == 0.0)
     top[[0, -1]] = top[:, [0, -1]] = False
     top[:, :, :5] = top[:, :, -5:] = False

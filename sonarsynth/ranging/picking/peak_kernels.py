@@ -30,33 +30,37 @@ def exceeded(power: Any, index: Any, i: int, j: int, t: int, about: int) -> Any:
 
 @compiled
 def local_maxima(
-    power: Any, index: Any, row: Any, column: Any, floor: Any, least: Any, edge: Any, about: int, end: int
+    power: Any, index: Any, row: Any, column: Any, floor: Any, least: Any, edge: Any, about: int, runs: Any
 ) -> Any:
     """Beams and delays (peak,) of values over `floor` (beam,), of `least` (delay,) at least, that no neighbour exceeds.
 
     power (beam, delay); index (elevation, azimuth) the beam there, -1 for none; row, column (beam,) of each beam. None
-    within `end` delays of an end, which is more than `about`, none in a beam that lacks a neighbour, where a slope
-    would pass for a peak, and none at the edge of an axis of which edge (2,) says that peaks are resolved: theirs may
-    be outside.
+    outside runs (run, 2) of delays, first and end, which are more than `about` from either end, none in a beam that
+    lacks a neighbour, where a slope would pass for a peak, and none at the edge of an axis of which edge (2,) says that
+    peaks are resolved: theirs may be outside.
     """
-    (rows, columns), stop = index.shape, power.shape[1] - end
-    least, top = least[end:stop], np.empty(max(stop - end, 0), np.bool_)
-    peaks, count = np.empty((2, len(power) * (len(top) // (about + 1) + 1)), np.int32), 0  # more than `about` apart
+    (rows, columns), top = index.shape, np.zeros(power.shape[1] + 8 & -8, np.bool_)
+    eights, most = top.view(np.uint64), power.shape[1] // (about + 1) + len(runs)  # more than `about` apart
+    peaks, count = np.empty((2, len(power) * most), np.int32), 0
     for b in range(len(power)):
         i, j = row[b], column[b]
         if (edge[0] and (i == 0 or i == rows - 1)) or (edge[1] and (j == 0 or j == columns - 1)):
             continue
         if index[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2].min() < 0:
             continue
-        before, own, after = power[b, end - 1 : stop - 1], power[b, end:stop], power[b, end + 1 : stop + 1]
-        left, right = power[index[i, max(j - 1, 0)], end:stop], power[index[i, min(j + 1, columns - 1)], end:stop]
-        for t in range(len(top)):  # many at once: slices, and no branch
-            loud = (own[t] > floor[b]) & (own[t] >= least[t])
-            top[t] = loud & (own[t] > before[t]) & (own[t] >= max(after[t], left[t], right[t]))
-        for t in range(len(top)):
-            if top[t] and not exceeded(power, index, i, j, end + t, about):
-                peaks[0, count], peaks[1, count] = b, end + t
-                count += 1
+        port, starboard = power[index[i, max(j - 1, 0)]], power[index[i, min(j + 1, columns - 1)]]
+        for first, last in runs:
+            before, own, after = power[b, first - 1 : last - 1], power[b, first:last], power[b, first + 1 : last + 1]
+            left, right, audible = port[first:last], starboard[first:last], least[first:last]
+            for t in range(last - first):  # many at once: slices, and no branch
+                loud = (own[t] > floor[b]) & (own[t] >= audible[t])
+                top[t] = loud & (own[t] > before[t]) & (own[t] >= max(after[t], left[t], right[t]))
+            top[last - first : last - first + 8] = False
+            for eight in np.flatnonzero(eights[: (last - first + 7) // 8]):
+                for t in range(first + 8 * eight, first + 8 * eight + 8):
+                    if top[t - first] and not exceeded(power, index, i, j, t, about):
+                        peaks[0, count], peaks[1, count] = b, t
+                        count += 1
     return peaks[0, :count].astype(np.int64), peaks[1, :count].astype(np.int64)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,7 +16,7 @@ from sonarsynth.equations.arrays.noise_peaks import peak_level
 from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond
+from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond, suspects
 from sonarsynth.ranging.picking.peak_kernels import beside, farthest, local_maxima, over_lobes, power_centres
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
 from sonarsynth.ranging.range_profiles import (
@@ -30,22 +29,24 @@ from sonarsynth.ranging.range_profiles import (
     residue,
 )
 from sonarsynth.ranging.received_window import ReceivedWindow
+from sonarsynth.receiver import Elements, Sonar
 
 BESIDE = 2
 """Cells beside the beams over threshold that are looked at too: a peak there has its neighbours."""
 LOBES = 8.0
 """Times what lobes bring of louder peaks that a peak must exceed: echoes are of more than their peaks."""
+GAP = 65
+"""Delays about loud ones that are looked for peaks with them."""
 NOISE_WIDTHS = 3.0
 """Beam widths on either side of a beam whose noise is taken for its own."""
 NOISE_ADDED = 2.0
 """Amplitude of noise, in units of its root mean square, that may be in a peak."""
-LOBE_BINS = 48
-"""Frequencies that lobes are summed over."""
-LOBE_STEPS, LOBE_ERROR = 128, 4e-4
-"""Steps a period at the highest frequency that lobes are tabulated at; and what such a table errs by."""
+FEW, MANY = 12, 48
+"""Peaks that are followed beyond the grid first, and later: what the likeliest are lobes of explains most others."""
+LOBE_BINS, LOBE_STEPS, LOBE_ERROR = 48, 128, 4e-4
+"""Frequencies that lobes are summed over; steps a period at the highest that they are tabulated at; error of that."""
 RESOLVED = 1.0
 """An axis of the grid as long as this, in units of the roughness of noise along it, has peaks along it."""
-SIXTH = 1.0 / 6.0
 CENTRE_WINDOW = 1.4
 """Standard deviation, in widths of a peak, of the window about it in which the centre of power is looked for."""
 NOISE_CLEAR = 4.0
@@ -87,9 +88,8 @@ def peak_echoes(
     centre, late = np.empty((len(b), 3)), np.argsort(t, kind="stable")
     width, clear = axes.step * axes.sharpness, NOISE_CLEAR * noise
     centre[late] = power_centres(power, index, *beams, b[late], t[late], top_offset[late], width, CENTRE_WINDOW, clear)
-    snr = height / noise[b]
+    snr, offset = height / noise[b], top_offset * axes.step
     error = axes.errors(snr, centre)
-    offset = top_offset * axes.step
     return PickedEchoes(
         elevation=image.elevation[profiles.row[b]] + offset[:, 0],
         azimuth=image.azimuth[profiles.column[b]] + offset[:, 1],
@@ -112,9 +112,11 @@ def _maxima(
     floor = np.maximum(0.5 * least, loudest.max() * 10 ** (-dynamic_range / 10)).astype(np.float32)
     audible = maximum_filter1d(loudest, 2 * profiles.about + 1) * np.float32(10 ** (-side_lobes / 10))
     end = max(int(np.ceil(pulse_times.PULSE_HALF / profiles.step)), profiles.about) + 1
-    b, t = local_maxima(power, index, *beams, floor, audible, axes.resolved, profiles.about, end)
-    good = ~_cut(power, b, t, end)
-    return b[good], t[good]
+    some = maximum_filter1d(loudest, GAP)[end : len(loudest) - end] > floor.min()
+    runs = end + np.flatnonzero(np.diff(some, prepend=False, append=False)).reshape(-1, 2)
+    b, t = local_maxima(power, index, *beams, floor, audible, axes.resolved, profiles.about, runs)
+    whole = ~_cut(power, b, t, end)
+    return b[whole], t[whole]
 
 
 def _once(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, t: Ints, height: Floats) -> Bools:
@@ -133,17 +135,15 @@ def _once(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, t: In
 
 def _energies(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, height: Floats) -> Floats:
     """Energies (peak,) in Pa2 s: of a peak h exp(-(sharpness t)^2), as a share of all that is in its beam."""
-    beams, beam = np.unique(b, return_inverse=True)
-    beam_energy = profiles.step * profiles.power[beams].sum(axis=1, dtype=float)
-    share = height * np.sqrt(np.pi) / axes.sharpness[2] / beam_energy[beam]
+    share = height * np.sqrt(np.pi) / axes.sharpness[2] / (profiles.step * profiles.total[b])
     return np.asarray(np.minimum(share, 1.0) * window.image.energy[profiles.row[b], profiles.column[b]])
 
 
 def _cut(power: npt.NDArray[np.float32], b: Ints, t: Ints, end: int) -> Bools:
     """Whether peaks (peak,) are what the window left of a louder echo, whose own peak is at its end or beyond."""
     own, last = power[b, t], power.shape[1] - 1
-    early = (t < 2 * end) & (power[:, :end].max(axis=1)[b] > own)
-    late = (last - t < 2 * end) & (power[:, -end:].max(axis=1)[b] > own)
+    early = (t < 2 * end) & (power[b, :end].max(axis=1) > own)
+    late = (last - t < 2 * end) & (power[b, -end:].max(axis=1) > own)
     return np.asarray(early | late)
 
 
@@ -213,13 +213,15 @@ def noise_power(profiles: Profiles, image: EnergyImage) -> Floats:
     """
     end = min(int(pulse_times.PULSE_HALF / profiles.step), profiles.power.shape[1] // 4)
     powers = profiles.power[:, end : profiles.power.shape[1] - end : OVERSAMPLING]
-    level, filled = np.zeros(image.energy.shape), np.zeros(image.energy.shape)
-    powers, half = np.sort(powers, axis=1), (powers.shape[1] - 1) / 2  # a fifth of the time of np.median
-    median = 0.5 * (powers[:, math.floor(half)] + powers[:, math.ceil(half)])
-    level[profiles.row, profiles.column] = median / np.log(2.0)
-    filled[profiles.row, profiles.column] = 1.0
+    half = powers.shape[1] // 2  # bits are in order as powers are, and twice as fast
+    parted = np.partition(powers.view(np.int32), half, axis=1).view(np.float32)
+    before = parted[:, :half].max(axis=1) if powers.shape[1] % 2 == 0 else parted[:, half]
+    median = 0.5 * (before + parted[:, half])
+    place = profiles.row - profiles.row.min(), profiles.column - profiles.column.min()
+    level, filled = np.zeros((2, place[0].max() + 1, place[1].max() + 1))
+    level[place], filled[place] = median / np.log(2.0), 1.0
     cells = [2 * int(NOISE_WIDTHS * 2 * profiles.width / step) + 1 if step else 1 for step in _steps(image)]
-    around, of = (uniform_filter(x, cells, mode="constant")[profiles.row, profiles.column] for x in (level, filled))
+    around, of = (uniform_filter(x, cells, mode="constant")[place] for x in (level, filled))
     return np.asarray(np.maximum(around / of, np.finfo(np.float32).tiny))
 
 
@@ -237,8 +239,8 @@ def _tops(
     Parabolas through peaks and their neighbours on each axis: through the cube roots of amplitudes, which the main lobe
     of a disc makes a parabola up to the fourth order (1 - y/2 + y^2/12 does).
     """
-    top = power[b, t].astype(float) ** SIXTH
-    sides = np.minimum(beside(power, index, *beams, b, t).astype(float) ** SIXTH, top)
+    top = power[b, t].astype(float) ** (1.0 / 6.0)
+    sides = np.minimum(beside(power, index, *beams, b, t).astype(float) ** (1.0 / 6.0), top)
     offset, height = parabola(sides[:, 0], top, sides[:, 1])
     return offset.T * resolved, np.prod((height[resolved] / top) ** 3, axis=0)
 
@@ -247,13 +249,17 @@ def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: F
     """Whether peaks (peak,) are more than what the lobes of the array bring of louder ones, in the grid and beyond."""
     least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
     u, delay = profiles.direction[b], profiles.step * t.astype(float)
-    own = _over(window, profiles.width, u, delay, height, least)
-    beyond, late, power = louder_beyond(window, profiles, b[own], t[own], height[own], least[own] / LOBES)
-    if len(power):
-        u, delay = np.concatenate([u[own], beyond]), np.concatenate([delay[own], profiles.step * late])
-        unasked = np.full(len(power), np.inf)
-        height, least = np.concatenate([height[own], power]), np.concatenate([least[own], unasked])
-        own[own] = _over(window, profiles.width, u, delay, height, least)[: np.count_nonzero(own)]
+    own, asked, loud = _over(window, profiles.width, u, delay, height, least), least, height
+    (rest, line), many = suspects(window, profiles, b, t, least / LOBES), FEW
+    while len(some := np.flatnonzero(own[rest])):
+        some, many = some[: many if len(some) > 2 * many else None], min(2 * many, MANY)
+        p = rest[some]
+        beyond = louder_beyond(window, profiles, b[p], t[p], height[p], line[some])
+        rest, line = rest[some[-1] + 1 :], line[some[-1] + 1 :]
+        if len(beyond[0]):
+            u, delay, loud = (np.concatenate(both) for both in zip((u, delay, loud), beyond, strict=True))
+            asked = np.append(asked, np.full(len(beyond[0]), np.inf))
+            own &= _over(window, profiles.width, u, delay, loud, asked)[: len(own)]
     return own
 
 
@@ -263,30 +269,26 @@ def _over(
     """Whether `least` (peak,) is more than what lobes bring of louder peaks from directions (peak, xyz), at delays
     (peak,) in s, of heights (peak,)."""
     loud = np.argsort(-height, kind="stable")
-    band, live = window.sonar.band, np.flatnonzero(window.elements.gain)
-    taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
-    c = window.sonar.assumed_sound_speed
-    position, rate = window.elements.position[live], LOBE_STEPS * band.high
-    steps = int(np.ceil((4.0 * farthest(position) / c + 2.0 / (band.high - band.low)) * rate)) + 2
-    own = np.empty(len(height), bool)
-    own[loud] = over_lobes(
-        direction[loud] / c,
-        delay[loud],
-        height[loud],
-        position,
-        live_gain(window.elements.gain)[live],
-        np.linspace(band.low, band.high, LOBE_BINS),
-        taper,
-        2.0 * width / c,
-        least[loud] / LOBES,
-        _lobe_table(band.low, band.high, rate, steps),
-        rate,
-        LOBE_ERROR,
-    )
+    c, own = window.sonar.assumed_sound_speed, np.empty(len(height), bool)
+    position, weight, f, taper, table = _lobes(window.elements, window.sonar)
+    near, rate = 2.0 * width / c, LOBE_STEPS * window.sonar.band.high
+    peaks = direction[loud] / c, delay[loud], height[loud]
+    own[loud] = over_lobes(*peaks, position, weight, f, taper, near, least[loud] / LOBES, table, rate, LOBE_ERROR)
     return own
 
 
 @lru_cache(maxsize=8)
+def _lobes(elements: Elements, sonar: Sonar) -> tuple[Floats, ...]:
+    """What `over_lobes` takes of an array: positions (sensor, xyz) and weights (sensor,) of live sensors; frequencies
+    (bin,), their taper, and the table of what they sum to."""
+    band, live, rate = sonar.band, np.flatnonzero(elements.gain), LOBE_STEPS * sonar.band.high
+    position, f = elements.position[live], np.linspace(band.low, band.high, LOBE_BINS)
+    longest = 4.0 * farthest(position) / sonar.assumed_sound_speed + 2.0 / (band.high - band.low)
+    taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
+    table = _lobe_table(band.low, band.high, rate, int(np.ceil(longest * rate)) + 2)
+    return position, live_gain(elements.gain)[live], f, taper, table
+
+
 def _lobe_table(low: float, high: float, rate: float, steps: int) -> Floats:
     """Sum (2, delay) over the band low to high (Hz), tapered, at delays in steps of 1/rate (Hz), `steps` either way."""
     delay = np.arange(-steps, steps + 1) / rate
