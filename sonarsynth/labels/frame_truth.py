@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from sonarsynth.columns import rows_of
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -95,8 +96,8 @@ def _boxes(
     """Columns of `Truth` of boxes in azimuth and elevation, of what is in view of bodies as they are seen."""
     views, straight, truncated, in_view = [], [], [], []
     for body, apparent in zip(bodies, appearances, strict=True):
-        faces = body.mesh.faces[apparent.visible]
-        box = box_in_view(apparent.corners, faces, beams, apparent.boxes[apparent.visible])
+        faces, boxes = (rows_of(column, apparent.visible) for column in (body.mesh.faces, apparent.boxes))
+        box = box_in_view(apparent.corners, faces, beams, boxes)
         views.append(box)
         truncated.append(truncation(apparent.corners, faces, box.view, beams))
         true = sonar_pose.to_body(body.pose.to_world(body.mesh.vertices)) if apparent.bent else apparent.corners

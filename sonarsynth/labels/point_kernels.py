@@ -250,12 +250,12 @@ def _shared(share: Floats, brought: Complexes, own: Bools, coherent: Bools) -> N
 
 
 @compiled
-def means(share: Floats, first: Ints, values: Floats) -> Floats:
-    """Means (point, column) of values (path, column) by the shares (point, path from `first` on) of points, none beyond
-    the values of the paths that bring `HEARD` of the loudest: where echoes cancel, their mean may be anywhere.
+def means(points: Ints, share: Floats, first: Ints, values: Floats) -> Floats:
+    """Means (row, column) of values (path, column) by the shares (point, path from `first` on) of some points (row,),
+    none beyond the values of the paths that bring `HEARD` of the loudest: where echoes cancel, it may be anywhere.
     """
-    out = np.zeros((len(share), values.shape[1]))
-    for p in range(len(share)):
+    out = np.zeros((len(points), values.shape[1]))
+    for row, p in enumerate(points):
         total, least = share[p].sum(), HEARD * share[p].max()
         for x in range(values.shape[1]):
             mean, low, high = 0.0, np.inf, -np.inf
@@ -265,7 +265,7 @@ def means(share: Floats, first: Ints, values: Floats) -> Floats:
                     mean += share[p, e] / total * value
                     if share[p, e] >= least:
                         low, high = min(low, value), max(high, value)
-            out[p, x] = min(max(mean, low), high)
+            out[row, x] = min(max(mean, low), high)
     return out
 
 

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonarsynth.casting.surface_distances import surface_distances
+from sonarsynth.columns import rows_of
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, direction
 from sonarsynth.geometry import turned
 from sonarsynth.labels import point_kernels as kernels
@@ -117,16 +118,15 @@ def _from_targets(
     """Range (point,) of where the echoes of points were made, and distance (point,) of the places (point, xyz) that the
     sonar gives them from the target, where sound met it and the array (m)."""
     arrivals, rows, owner = attributed.arrivals, attributed.rows, attributed.owner[points]
-    delay, made = arrivals.delay[rows], arrivals.point[rows]
-    shares = attributed.share[points], attributed.first[points]
+    delay, made, shares = arrivals.delay[rows], rows_of(arrivals.point, rows), (attributed.share, attributed.first)
     times = np.stack([delay, delay - arrivals.radius[rows] / arrivals.sound_speed], axis=1)
-    heard, met = kernels.means(*shares, times).T
+    heard, met = kernels.means(points, *shares, times).T
     ranges, distance = np.empty((2, len(points)))
     for group in np.unique(owner):
         at, middle, then = owner == group, float(heard[owner == group].mean()), float(met[owner == group].mean())
         sonar, placed = listening.track.later(middle), moment.bodies[attributed.target[group]].later(then)
         away = kernels.distances(made, sonar.pose.position, sonar.velocity, delay - middle)
-        ranges[at] = kernels.means(shares[0][at], shares[1][at], away)[:, 0]
+        ranges[at] = kernels.means(points[at], *shares, away)[:, 0]
         array = sonar.pose.position + np.outer(heard[at] - middle, sonar.velocity)
         place = array + turned(sonar.pose.turn_to_world(places[at]), sonar.spin, heard[at] - middle)
         distance[at] = surface_distances(placed, place - np.outer(met[at] - then, placed.velocity))
