@@ -233,7 +233,7 @@ class Track:
     def later(self, seconds: float) -> Track:
         """The same so many seconds (s) after, or before."""
         time = self.time + seconds
-        if self.straight:
+        if self.motion is None or self.straight:
             there = self.pose.position + self.velocity * seconds
             moved = self.pose if self.still else Pose(there, self.pose.orientation)
             return Track(moved, self.velocity, self.motion, time, self.offset)

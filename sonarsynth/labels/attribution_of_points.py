@@ -121,14 +121,9 @@ class Attribution:
 
 
 def attribution(
-    arrivals: Arrivals,
-    band: Band,
-    listening: SonarTiming,
-    beam: Floats,
-    late: Floats,
-    beam_energy: Floats,
+    arrivals: Arrivals, band: Band, listening: SonarTiming, beam: Floats, late: Floats, beam_energy: Floats,
     most_bins: int = MOST_BINS,
-) -> Attribution:
+) -> Attribution:  # fmt: skip
     """Whose energy beams (point, xyz) hold at delays (point,) s after the clock; beam_energy (point,): Pa2 s;
     most_bins: frequencies that paths are summed at, at most.
 
@@ -160,30 +155,12 @@ def attribution(
     fine = band.sliced(min(2.0 * width * across, most_bins))
     focus = 0.0 if listening.focus is None else 1.0 / listening.focus
     curvature, pulse = 1.0 / arrivals.radius[rows], fine.energy[groups[1]]
+    heard = _spectra(arrivals, rows, stretch, elements, fine), _matched(fine)[groups[1]], pulse, fine.frequency
     columns = kernels.attribute(
-        beam,
-        moment,
-        0.5 * beam_energy,  # at positive frequencies
-        first,
-        last,
-        direction,
-        slowness,
-        delay,
-        curvature,
-        longer[rows],
-        group,
-        arrivals.coherent[rows],
-        arrivals.kind[example] == Kind.DIRECT,
-        _spectra(arrivals, rows, stretch, elements, fine),
-        _matched(fine)[groups[1]],
-        pulse,
-        fine.frequency,
-        focus,
-        listening.sound_speed,
-        gate,
-        reach,
-        pattern_of(elements, listening.sound_speed, curvature, focus, band.high),
-    )
+        beam, moment, 0.5 * beam_energy, first, last, direction, slowness, delay, curvature, longer[rows], group,
+        arrivals.coherent[rows], arrivals.kind[example] == Kind.DIRECT, *heard, focus, listening.sound_speed, gate,
+        reach, pattern_of(elements, listening.sound_speed, curvature, focus, band.high),
+    )  # fmt: skip  # of the energy, the half at positive frequencies
     return Attribution(clock, arrivals, rows, first, *groups, columns[0], 2.0 * columns[1], *columns[2:])
 
 

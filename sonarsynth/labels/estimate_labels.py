@@ -37,8 +37,8 @@ def direct_paths(arrivals: Arrivals, envelope: Callable[[int, float, float], flo
     rows = np.flatnonzero(arrivals.direct & (arrivals.surface == 0) & (arrivals.bottom == 0))
     rows = rows[(arrivals.occluded[rows, :1] < 128).all(axis=1)]  # that reach the centre of the array
     rows = rows[np.lexsort((arrivals.delay[rows], arrivals.snap[rows]))]
-    snap, absorption, doppler = (column[rows] for column in (arrivals.snap, arrivals.absorption, arrivals.doppler))
-    heard = zip(snap.tolist(), absorption.tolist(), doppler.tolist(), strict=True)
+    snap = arrivals.snap[rows]
+    heard = zip(snap.tolist(), arrivals.absorption[rows].tolist(), arrivals.doppler[rows].tolist(), strict=True)
     late = [envelope(*path) for path in heard]
     return Direct(snap, arrivals.delay[rows] + np.array(late), arrivals.direction[rows])
 

@@ -63,7 +63,6 @@ def point_labels(
     arrivals: Arrivals,
     estimates: SourceEstimates,
     cloud: PointCloud,
-    band: Band,
     scattered: Arrivals | None = None,
 ) -> PointLabels:
     """Whose echo each point of a cloud is; scattered: paths of what scatters in surface, bottom and water."""
@@ -78,7 +77,7 @@ def point_labels(
         frame.sonar_track if moves else Track(frame.sonar_pose, np.zeros(3)),
         np.array([lateness(snap.waveform, sonar) for snap in frame.moment.snaps]),
     )
-    return label_points(cloud, arrivals, band, moment, listening, scattered)
+    return label_points(cloud, arrivals, band_of(plan, frame.moment.snaps), moment, listening, scattered)
 
 
 def frame_values(plan: Plan, frame: Frame) -> Values:

@@ -25,10 +25,6 @@ Connect = Callable[[Floats, Floats], Paths]
 """Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
 
 
-TINY, CLOSE = 1e-300, 1.0 + 1e-6
-"""Of the square of a length, where it is 0; of distances: more than rounding."""
-
-
 class Appearance(NamedTuple):
     """A body as the array sees it."""
 
@@ -95,12 +91,13 @@ def _leaving(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], rows: Ints, t
 
 
 def _between(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], to: Floats) -> tuple[PlacedTarget, ...]:
-    """Those of other bodies that may hide one from a place (xyz), world: by the spheres about their origins."""
+    """Those of other bodies that may hide one from a place (xyz), world: by spheres about their origins, with room
+    for where rays start."""
     line, near = to - body.pose.position, []
     for other in bodies:
         away = other.pose.position - body.pose.position
-        beside = away - min(max(float(away @ line) / max(float(line @ line), TINY), 0.0), 1.0) * line
-        if other is not body and math.sqrt(beside @ beside) <= CLOSE * (body.mesh.radius + other.mesh.radius):
+        beside = away - min(max(float(away @ line) / max(float(line @ line), 1e-300), 0.0), 1.0) * line
+        if other is not body and math.sqrt(beside @ beside) <= 1.001 * (body.mesh.radius + other.mesh.radius):
             near.append(other)
     return tuple(near)
 

@@ -41,10 +41,9 @@ def hearing(
     if track is None or not lights:
         return None
     loudest = max(lights, key=lambda n: float(snap_level[n]))
-    times, bodies = met[loudest], there[loudest]
-    if not np.isfinite(times).all():
-        times = np.where(np.isfinite(times), times, np.nanmean(times))
-        bodies = met_at(context.bodies, times)
+    known = np.isfinite(met[loudest])
+    times = np.where(known, met[loudest], np.nanmean(met[loudest]))
+    bodies = there[loudest] if known.all() else met_at(context.bodies, times)
     place, heard = np.array([body.pose.position for body in bodies]), times
     for _ in range(1 if track.still else ROUNDS):
         away = np.linalg.norm(place - track.positions(heard), axis=1)
