@@ -212,7 +212,8 @@ def met_again(mesh: Mesh, facet: Ints, offset: float, direction: Floats, distanc
     origin, heading, far, ray = np.empty_like(direction), direction.copy(), np.empty(len(facet)), np.empty_like(facet)
     of_facets = mesh.centroid, mesh.normal, ready.horizon, offset, ready.centre, ready.size
     count = intersections.off_facets(facet, heading, distance, *of_facets, origin, far, ray)
-    met[ray[:count]] = ready.within(origin[:count], heading[:count], far[:count], any_hit=True)[0] >= 0
+    if count:
+        met[ray[:count]] = ready.within(origin[:count], heading[:count], far[:count], any_hit=True)[0] >= 0
     return met
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from sonarsynth.frontiers.image_knobs import imaged
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.pipeline import BeamformedFrame, cloud_of
-from sonarsynth.pipeline.labelling import band_of, point_labels
+from sonarsynth.pipeline.labelling import point_labels
 from sonarsynth.planning import Plan
 from sonarsynth.products import Arrivals
 from sonarsynth.recipe.scene import Frame
@@ -44,8 +44,7 @@ def picking_point(
     estimates = beamformed.estimates
     distance = np.zeros(0)
     if len(cloud) and estimates is not None:
-        band = band_of(varied, frame.moment.snaps)
-        distance = point_labels(varied, frame, arrivals, estimates, cloud, band).distance.astype(float)
+        distance = point_labels(varied, frame, arrivals, estimates, cloud).distance.astype(float)
     off = int(np.isnan(distance).sum())
     distance = distance[np.isfinite(distance)]
     return Point(

@@ -233,13 +233,12 @@ class Track:
     def later(self, seconds: float) -> Track:
         """The same so many seconds (s) after, or before."""
         time = self.time + seconds
-        if self.still:
-            return Track(self.pose, self.velocity, self.motion, time, self.offset)
-        if self.motion is None:
-            moved = Pose(self.pose.position + self.velocity * seconds, self.pose.orientation)
-            return Track(moved, self.velocity, None, time, self.offset)
+        if self.motion is None or self.straight:
+            there = self.pose.position + self.velocity * seconds
+            moved = self.pose if self.still else Pose(there, self.pose.orientation)
+            return Track(moved, self.velocity, self.motion, time, self.offset)
         body = Track(pose(self.motion, time), velocity(self.motion, time), self.motion, time)
-        return body.part(np.array(self.offset))
+        return body.part(np.array(self.offset)) if any(self.offset) else body
 
     def positions(self, seconds: Floats) -> Floats:
         """Where it is (..., xyz) m, world, so many seconds (...) s after."""

@@ -16,7 +16,8 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import NO_TARGET, Bools, Complexes, Floats, Ints
+from sonarsynth.columns import rows_of
+from sonarsynth.conventions import NO_TARGET, Complexes, Floats, Ints
 from sonarsynth.equations.arrays.apertures import live_gain
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry.motion import Track
@@ -90,15 +91,15 @@ _tables = lru_cache(maxsize=2)(_PatternTables)
 def pattern_of(elements: Elements, speed: float, curvature: Floats, focus: float, top: float) -> kernels.Pattern:
     """Pattern of an array for waves of curvature (path,) 1/m where beams are focused at `focus` (1/m), up to `top`
     (Hz): tables for a lattice, its sensors elsewhere."""
-    live = np.flatnonzero(elements.gain)
-    sensors = elements.position[live] / speed, live_gain(elements.gain)[live]
     if not (elements.on_lattice and elements.aperture > 0.0):
+        live = np.flatnonzero(elements.gain)
+        sensors = elements.position[live] / speed, live_gain(elements.gain)[live]
         return kernels.Pattern(np.zeros((0, 0, 0), np.complex64), 0, 1.0, 0.0, *sensors)
     step = kernels.RIM_STEP * speed / (np.pi * elements.aperture**2)
     ends = np.clip(np.rint(top * (curvature - focus) / step), -WIDEST_DEFOCUS, WIDEST_DEFOCUS)
     low, high = int(min(ends.min(initial=0.0), 0.0)), int(max(ends.max(initial=0.0), 0.0))
     first, tables = _tables(elements).holding(low, high)
-    return kernels.Pattern(tables, first, step, elements.pitch / speed, *sensors)
+    return kernels.Pattern(tables, first, step, elements.pitch / speed, np.zeros((0, 3)), np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,14 +121,9 @@ class Attribution:
 
 
 def attribution(
-    arrivals: Arrivals,
-    band: Band,
-    listening: SonarTiming,
-    beam: Floats,
-    late: Floats,
-    beam_energy: Floats,
+    arrivals: Arrivals, band: Band, listening: SonarTiming, beam: Floats, late: Floats, beam_energy: Floats,
     most_bins: int = MOST_BINS,
-) -> Attribution:
+) -> Attribution:  # fmt: skip
     """Whose energy beams (point, xyz) hold at delays (point,) s after the clock; beam_energy (point,): Pa2 s;
     most_bins: frequencies that paths are summed at, at most.
 
@@ -138,16 +134,14 @@ def attribution(
     gate, reach = GATE / width, elements.aperture / listening.sound_speed
     clock, doppler = _clock(arrivals, listening, gate)
     stretch, shift = _stretches(arrivals, doppler, band)
-    moment, longer = clock + late, kernels.largest(arrivals.corner_delays) + shift
+    moment, longer = clock + late, kernels.largest(arrivals.corner_delays, shift)
     slowness = listening.sound_speed / arrivals.sound_speed
-    across = gate + reach * kernels.farthest(arrivals.direction, slowness, beam)
-    window = np.array([[-1.0], [1.0]]) * (across + longer.max(initial=0.0))
-    ends = np.searchsorted(np.sort(moment), arrivals.delay + window)
+    window = gate + reach * kernels.farthest(arrivals.direction, slowness, beam) + longer.max(initial=0.0)
     code = _code(arrivals, len(band.energy))
-    rows = np.flatnonzero(_loud(arrivals.amplitude**2, code) & (ends[1] > ends[0]))
+    rows = kernels.loud_at(np.sort(moment), window, arrivals.delay, arrivals.amplitude, code, FAINT)
     rows = rows[np.argsort(arrivals.delay[rows], kind="stable")]
-    delay, direction, code = arrivals.delay[rows], arrivals.direction[rows], code[rows]
-    first, last = np.searchsorted(delay, moment + window)
+    delay, direction, code = arrivals.delay[rows], rows_of(arrivals.direction, rows), code[rows]
+    first, last = np.searchsorted(delay, [moment - window, moment + window])
     known = np.flatnonzero(np.bincount(code))  # (group,) its code
     group = np.searchsorted(known, code)
     example = np.empty(len(known), np.int64)
@@ -161,30 +155,12 @@ def attribution(
     fine = band.sliced(min(2.0 * width * across, most_bins))
     focus = 0.0 if listening.focus is None else 1.0 / listening.focus
     curvature, pulse = 1.0 / arrivals.radius[rows], fine.energy[groups[1]]
+    heard = _spectra(arrivals, rows, stretch, elements, fine), _matched(fine)[groups[1]], pulse, fine.frequency
     columns = kernels.attribute(
-        beam,
-        moment,
-        0.5 * beam_energy,  # at positive frequencies
-        first,
-        last,
-        direction,
-        slowness,
-        delay,
-        curvature,
-        longer[rows],
-        group,
-        arrivals.coherent[rows],
-        arrivals.direct[example],
-        _spectra(arrivals, rows, stretch, elements, fine),
-        _matched(fine)[groups[1]],
-        pulse,
-        fine.frequency,
-        focus,
-        listening.sound_speed,
-        gate,
-        reach,
-        pattern_of(elements, listening.sound_speed, curvature, focus, band.high),
-    )
+        beam, moment, 0.5 * beam_energy, first, last, direction, slowness, delay, curvature, longer[rows], group,
+        arrivals.coherent[rows], arrivals.kind[example] == Kind.DIRECT, *heard, focus, listening.sound_speed, gate,
+        reach, pattern_of(elements, listening.sound_speed, curvature, focus, band.high),
+    )  # fmt: skip  # of the energy, the half at positive frequencies
     return Attribution(clock, arrivals, rows, first, *groups, columns[0], 2.0 * columns[1], *columns[2:])
 
 
@@ -194,15 +170,6 @@ def _code(paths: Arrivals, snaps: int) -> Ints:
     last = int(paths.target.max(initial=NO_TARGET)) + 1
     owner = np.where(paths.kind == Kind.REVERBERATION, last, paths.target)
     return np.asarray(((owner + 1) * snaps + paths.snap) * len(FAMILIES) ** 2 + ways)
-
-
-def _loud(power: Floats, code: Ints) -> Bools:
-    """(path,) without those that together bring `FAINT` of the power of their group, of one code, at most."""
-    faint = np.asarray(FAINT * np.bincount(code, power))
-    loud = np.asarray(power > faint[code])
-    others = np.flatnonzero(~loud)  # that may be left out
-    kernels.louder(power, code, others[np.argsort(power[others], kind="stable")], faint, loud)
-    return loud
 
 
 def _clock(arrivals: Arrivals, listening: SonarTiming, gate: float) -> tuple[float, float]:
@@ -220,13 +187,18 @@ def _clock(arrivals: Arrivals, listening: SonarTiming, gate: float) -> tuple[flo
 def _stretches(arrivals: Arrivals, doppler: float, band: Band) -> tuple[Floats, Floats]:
     """By what part (path,) pulses last longer than the direct one, of this Doppler; and by how much (path,) s they are
     ranged sooner or later for it, at the most: where that is nothing, 0."""
-    loud = band.weight > WHITENING * band.weight.max(axis=1, keepdims=True)
-    late = np.gradient(band.frequency * band.late, band.frequency, axis=1)
-    by_stretch = np.where(loud, np.abs(late), 0.0).max(axis=1)
     stretch = arrivals.doppler - doppler
-    shift = np.abs(stretch) * by_stretch[arrivals.snap]
+    shift = np.abs(stretch) * _by_stretch(band)[arrivals.snap]
     told = shift.max(initial=0.0) * (band.high - band.low) > SHIFTED
     return (stretch, shift) if told else (np.zeros(len(shift)), np.zeros(len(shift)))
+
+
+@lru_cache(maxsize=16)
+def _by_stretch(band: Band) -> Floats:
+    """By how much (snap,) s pulses are ranged sooner or later where they last twice as long, at the most."""
+    loud = band.weight > WHITENING * band.weight.max(axis=1, keepdims=True)
+    late = np.gradient(band.frequency * band.late, band.frequency, axis=1)
+    return np.asarray(np.where(loud, np.abs(late), 0.0).max(axis=1))
 
 
 def _spectra(arrivals: Arrivals, rows: Ints, stretch: Floats, elements: Elements, band: Band) -> Complexes:
@@ -239,31 +211,26 @@ def _spectra(arrivals: Arrivals, rows: Ints, stretch: Floats, elements: Elements
     """
     amplitude = arrivals.amplitude[rows]
     if arrivals.occluded.shape[1]:  # of the array, as much as sees it
-        occluded = arrivals.occluded[rows]
-        hidden = np.bitwise_count(occluded).sum(axis=1) - (occluded[:, 0] >= 128)
+        occluded = rows_of(arrivals.occluded, rows)
+        hidden = np.bitwise_count(occluded) @ np.ones(occluded.shape[1]) - (occluded[:, 0] >= 128)
         amplitude = amplitude * (1.0 - hidden / elements.count)
-    sine = arrivals.direction[rows, 1:] * (elements.face / arrivals.sound_speed)
-    frequency = band.frequency
-    delay_std, loss = arrivals.delay_std[rows], arrivals.absorption[rows]
-    decay = np.outer(np.log(10.0) / 20.0 * loss, -band.relative)
-    if delay_std.any():
-        decay -= np.outer(0.5 * (2.0 * np.pi * delay_std) ** 2, frequency**2)
+    sine = rows_of(arrivals.direction, rows)[:, 1:] * (elements.face / arrivals.sound_speed)
+    frequency, losses = band.frequency, (arrivals.absorption[rows], arrivals.delay_std[rows])
     spectra = kernels.path_spectra(
-        amplitude, arrivals.phase[rows], arrivals.delay[rows], np.exp(decay), sine, frequency
+        amplitude, arrivals.phase[rows], arrivals.delay[rows], *losses, sine, frequency, band.relative
     )
     if stretch.any():
         spectra *= np.exp(-2j * np.pi * stretch[rows, None] * (frequency * band.late)[arrivals.snap[rows]])
-    wide = arrivals.corner_delays.any(axis=1)
-    shaped = (arrivals.coherent | wide | (arrivals.coherent_fraction > 0.0))[rows]
-    if shaped.any():
-        echo = arrivals.select(rows[shaped])
-        shape = facet_response(
-            frequency, echo.coherent, echo.corner_delays, echo.coherent_fraction, echo.height_delay_std, echo.centre
-        )
-        spectra[shaped] *= shape
+    columns = arrivals.coherent, arrivals.corner_delays, arrivals.coherent_fraction, arrivals.height_delay_std
+    echo = [rows_of(column, rows) for column in columns]
+    shaped = np.flatnonzero(echo[0] | (echo[1].any() and echo[1].any(axis=1)) | (echo[2] > 0.0))
+    if len(shaped):
+        coherent, corners, fraction, height = (column[shaped] for column in echo)
+        spectra[shaped] *= facet_response(frequency, coherent, corners, fraction, height, arrivals.centre)
     return spectra
 
 
+@lru_cache(maxsize=16)
 def _matched(band: Band) -> Floats:
     """Amplitude (snap, bin) of pulses in what ranges them: flattened by the mean pulse, and a raised cosine."""
     mean = band.weight.mean(axis=0)

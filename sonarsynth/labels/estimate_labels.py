@@ -34,12 +34,13 @@ def direct_paths(arrivals: Arrivals, envelope: Callable[[int, float, float], flo
     envelope: of the index of a snap, the absorption on its way (dB at the centre of the band) and its Doppler: when the
     envelope of its pulse peaks in the band, s after its collapse.
     """
-    chosen = arrivals.select(arrivals.direct & (arrivals.surface == 0) & (arrivals.bottom == 0)).seen_from_centre
-    rows = np.lexsort((chosen.delay, chosen.snap))
-    snap = chosen.snap[rows]
-    heard = zip(snap.tolist(), chosen.absorption[rows].tolist(), chosen.doppler[rows].tolist(), strict=True)
+    rows = np.flatnonzero(arrivals.direct & (arrivals.surface == 0) & (arrivals.bottom == 0))
+    rows = rows[(arrivals.occluded[rows, :1] < 128).all(axis=1)]  # that reach the centre of the array
+    rows = rows[np.lexsort((arrivals.delay[rows], arrivals.snap[rows]))]
+    snap = arrivals.snap[rows]
+    heard = zip(snap.tolist(), arrivals.absorption[rows].tolist(), arrivals.doppler[rows].tolist(), strict=True)
     late = [envelope(*path) for path in heard]
-    return Direct(snap, chosen.delay[rows] + np.array(late), chosen.direction[rows])
+    return Direct(snap, arrivals.delay[rows] + np.array(late), arrivals.direction[rows])
 
 
 def heard_first(direct: Direct, snaps: int) -> tuple[Floats, Floats, Floats]:

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from sonarsynth.columns import rows_of
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose
-from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.oriented_box import oriented_box
 from sonarsynth.labels.views.appearance import Appearance, Connect, appearance, lit_fraction
@@ -19,7 +19,7 @@ from sonarsynth.labels.views.hearing import as_heard, hearing, mean_motion, met_
 from sonarsynth.products import Truth, View
 from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import BeamGrid
-from sonarsynth.state import FrameContext, meeting_times, positions
+from sonarsynth.state import FrameContext, meeting_times
 
 
 def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -> Truth:
@@ -36,24 +36,23 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     medium, sonar_track = context.medium, context.receiver.track
     connect = partial(propagation.direct.connect, medium.profile, medium.depth)
     bent = connect if propagation.bends else None
-    tracks = [body.track if sonar_track else body.frozen.track for body in bodies]
+    moving = bodies if sonar_track else tuple(body.frozen for body in bodies)
     straight_lines = medium.profile.uniform and propagation.straight(medium.profile)
     travel = (
         partial(_straight_times, 1.0 / medium.profile.speed[0]) if straight_lines else partial(_direct_times, connect)
     )
-    met = meeting_times(tracks, context.snaps, travel)
-    when = hearing(context, met, snap_level)
+    met = meeting_times([body.track for body in moving], context.snaps, travel)
+    there = [met_at(moving, times) for times in met]
+    when = hearing(context, met, there, snap_level)
     heard = as_heard(bodies, when)
     appearances = [appearance(body, heard, sonar_pose, bent) for body in heard]
     seen = [(a.corners, b.mesh.faces, a.boxes, a.full_box) for b, a in zip(heard, appearances, strict=True)]
     nearest = beam_views(seen, beams)
     way, turn = mean_motion(sonar_track, when)
-    lit = []
-    for snap, times in zip(context.snaps, met, strict=True):
-        there = met_at(bodies, times) if sonar_track else bodies
-        lit.append(
-            [lit_fraction(b, a.visible, there, snap, medium, bent) for b, a in zip(there, appearances, strict=True)]
-        )
+    lit = [
+        [lit_fraction(b, a.visible, placed, snap, medium, bent) for b, a in zip(placed, appearances, strict=True)]
+        for snap, placed in zip(context.snaps, there, strict=True)
+    ]
     return Truth(
         sonar_position=sonar_pose.position,
         sonar_orientation=sonar_pose.orientation,
@@ -63,8 +62,8 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
         target_orientation=_rows([b.pose.orientation for b in bodies], 4),
         target_velocity=_rows([b.velocity for b in bodies], 3),
         meeting_time=met,
-        position_at_echo=positions(tracks, met),
-        orientation_at_echo=_orientations(tracks, met),
+        position_at_echo=_where(met, [b.pose.position for placed in there for b in placed], 3),
+        orientation_at_echo=_where(met, [b.pose.orientation for placed in there for b in placed], 4),
         **_oriented(heard, sonar_pose),
         **_boxes(heard, appearances, sonar_pose, beams),
         visible_fraction=np.array([a.fraction for a in appearances]),
@@ -97,8 +96,8 @@ def _boxes(
     """Columns of `Truth` of boxes in azimuth and elevation, of what is in view of bodies as they are seen."""
     views, straight, truncated, in_view = [], [], [], []
     for body, apparent in zip(bodies, appearances, strict=True):
-        faces = body.mesh.faces[apparent.visible]
-        box = box_in_view(apparent.corners, faces, beams, apparent.boxes[apparent.visible])
+        faces, boxes = (rows_of(column, apparent.visible) for column in (body.mesh.faces, apparent.boxes))
+        box = box_in_view(apparent.corners, faces, beams, boxes)
         views.append(box)
         truncated.append(truncation(apparent.corners, faces, box.view, beams))
         true = sonar_pose.to_body(body.pose.to_world(body.mesh.vertices)) if apparent.bent else apparent.corners
@@ -132,12 +131,9 @@ def _straight_times(slowness: float, start: Floats, end: Floats) -> Floats:
     return np.asarray(np.linalg.norm(end - start, axis=1) * slowness)
 
 
-def _orientations(tracks: list[Track], times: Floats) -> Floats:
-    """How what is on each track lies (snap, track, wxyz) at times (snap, track) s of the frame; NaN where these are."""
-    orientations = np.full((*times.shape, 4), np.nan)
-    for snap, number in np.argwhere(np.isfinite(times)).tolist():
-        orientations[snap, number] = tracks[number].later(float(times[snap, number])).pose.orientation
-    return orientations
+def _where(met: Floats, values: list[Floats], width: int) -> Floats:
+    """Values of bodies as sound met them, as a table (snap, target, width); NaN where it did not: met is NaN."""
+    return np.where(np.isfinite(met)[..., None], np.reshape(values, (*met.shape, width)), np.nan)
 
 
 def _rows(rows: list[Floats], width: int) -> Floats:

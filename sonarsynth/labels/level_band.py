@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -27,13 +28,13 @@ class Band:
     relative: Floats  # (slice,) absorption in the middle of each over that at the centre of the band, less one
     late: Floats  # (snap, slice) s: group delay of the filtered snap, after the time that delays of paths count from
 
-    @property
+    @cached_property
     def frequency(self) -> Floats:
         """(slice,) Hz: the middle of each."""
         count = len(self.relative)
         return np.asarray(self.low + (np.arange(count) + 0.5) * ((self.high - self.low) / count))
 
-    @property
+    @cached_property
     def weight(self) -> Floats:
         """(snap, slice) share of the energy of each snap; all slices alike for one that sends nothing."""
         total = self.energy.sum(axis=1, keepdims=True)
@@ -42,14 +43,9 @@ class Band:
 
     def sliced(self, wanted: float) -> Band:
         """The same band in as many slices as are wanted, or somewhat more; no more than it has."""
-        count = next((n for n in DIVISORS if n >= wanted), SLICES)
-        slices = (len(self.energy), count, SLICES // count)
-        energy = self.energy.reshape(slices).sum(axis=2)
-        weight = self.weight.reshape(slices) + np.finfo(float).tiny
-        late = (weight * self.late.reshape(slices)).sum(axis=2) / weight.sum(axis=2)
-        return Band(self.low, self.high, energy, self.relative.reshape(slices[1:]).mean(axis=1), late)
+        return _sliced(self, next((n for n in DIVISORS if n >= wanted), SLICES))
 
-    @property
+    @cached_property
     def pulse(self) -> float:
         """How far apart (s) pulses of these spectra no longer interfere: their correlation stays below ALIKE."""
         if not len(self.energy):
@@ -58,3 +54,13 @@ class Band:
         half = correlation[: self.energy.shape[1]]
         last = int(np.flatnonzero(half > ALIKE * half[0])[-1])
         return (last + 1) * 0.5 / (self.high - self.low)
+
+
+@lru_cache(maxsize=64)
+def _sliced(band: Band, count: int) -> Band:
+    """A band in so many slices."""
+    slices = (len(band.energy), count, SLICES // count)
+    energy = band.energy.reshape(slices).sum(axis=2)
+    weight = band.weight.reshape(slices) + np.finfo(float).tiny
+    late = (weight * band.late.reshape(slices)).sum(axis=2) / weight.sum(axis=2)
+    return Band(band.low, band.high, energy, band.relative.reshape(slices[1:]).mean(axis=1), late)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from cmath import rect
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,10 @@ from sonarsynth.conventions import Bools, Complexes, Floats, Ints
 
 RIM_STEP = 0.35
 """rad at the rim of the aperture between two tables of the pattern: the nearest one errs by 0.1 rad rms at most."""
+SMALL = 0.1
+"""Np: decays as small as this go by the series of the exponential, good to 4e-6."""
+STEPS, TINY = 64, 1e-300
+"""Factors of two in power that paths are told apart by where they are faint; of the powers, where none is 0."""
 HEARD = 0.1
 """Of what the loudest path brings of a point: what brings less does not tell where it may be."""
 
@@ -40,29 +45,31 @@ def turn(angle: float, step: float, phasors: Complexes) -> None:
 
 @compiled
 def path_spectra(
-    amplitude: Floats, phase: Floats, delay: Floats, lost: Floats, sine: Floats, frequency: Floats
-) -> Complexes:
+    amplitude: Floats, phase: Floats, delay: Floats, loss: Floats, delay_std: Floats, sine: Floats, frequency: Floats,
+    relative: Floats,
+) -> Complexes:  # fmt: skip
     """Spectra (path, bin) of paths as an element of the array hears them, over that of the snap at 1 m.
 
-    phase rad; delay s; lost (path, bin): factor on the amplitude; sine (path, 2): those of the direction along y and z
-    times the side of the square face over the sound speed (s).
+    phase rad; delay s; loss dB where relative (bin,) is 1; delay_std s; sine (path, 2): those of the direction along y
+    and z times the side of the square face over the sound speed (s).
     """
     bins, spacing = len(frequency), frequency[1] - frequency[0] if len(frequency) > 1 else 0.0
-    spectrum, gain = np.empty((len(amplitude), bins), np.complex128), np.empty(bins)
+    spectrum, steepest = np.empty((len(amplitude), bins), np.complex128), np.abs(relative).max()
     for e in range(len(amplitude)):
+        decay, half = math.log(10.0) / 20.0 * loss[e], 0.5 * (2.0 * math.pi * delay_std[e]) ** 2
+        small = abs(decay) * steepest + half * frequency[-1] ** 2 < SMALL
+        y, z, late = math.pi * sine[e, 0], math.pi * sine[e, 1], -2.0 * math.pi * delay[e]
+        across, by_y = rect(1.0, frequency[0] * y), rect(1.0, spacing * y)
+        up, by_z = rect(1.0, frequency[0] * z), rect(1.0, spacing * z)
+        phasor, turned = rect(1.0, phase[e] + frequency[0] * late), rect(1.0, spacing * late)
         for k in range(bins):
-            gain[k] = amplitude[e] * lost[e, k]
-        for axis in range(2):
-            x, step = math.pi * frequency[0] * sine[e, axis], math.pi * spacing * sine[e, axis]
-            phasor, turned = complex(math.cos(x), math.sin(x)), complex(math.cos(step), math.sin(step))
-            for k in range(bins):
-                if abs(x) > 1e-6:
-                    gain[k] *= phasor.imag / x
-                x, phasor = x + step, phasor * turned
-        late = -2.0 * math.pi * delay[e]
-        turn(phase[e] + frequency[0] * late, spacing * late, spectrum[e])
-        for k in range(bins):
-            spectrum[e, k] *= gain[k]
+            f = frequency[k]
+            x = -decay * relative[k] - half * f * f
+            gain = 1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0)) if small else math.exp(x)
+            gain *= across.imag / (f * y) if abs(f * y) > 1e-6 else 1.0
+            gain *= up.imag / (f * z) if abs(f * z) > 1e-6 else 1.0
+            spectrum[e, k] = amplitude[e] * gain * phasor
+            across, up, phasor = across * by_y, up * by_z, phasor * turned
     return spectrum
 
 
@@ -81,23 +88,41 @@ def farthest(vectors: Floats, factor: float, others: Floats) -> float:
 
 
 @compiled
-def largest(values: Floats) -> Floats:
-    """Largest size (row,) of values (row, column)."""
-    out = np.zeros(len(values))
+def largest(values: Floats, more: Floats) -> Floats:
+    """Largest size (row,) of values (row, column), and more (row,)."""
+    out = more.copy()
     for n in range(len(values)):
+        size = 0.0
         for k in range(values.shape[1]):
-            out[n] = max(out[n], abs(values[n, k]))
+            size = max(size, abs(values[n, k]))
+        out[n] += size
     return out
 
 
 @compiled
-def louder(power: Floats, code: Ints, order: Ints, faint: Floats, loud: Bools) -> None:
-    """Write which of some paths are more than those that, from the faintest of their code on, bring `faint` (code,) at
-    most; order (row,): which paths, ascending in power."""
-    up_to = np.zeros(len(faint))
-    for e in order:
-        up_to[code[e]] += power[e]
-        loud[e] = up_to[code[e]] > faint[code[e]]
+def loud_at(moment: Floats, window: float, delay: Floats, amplitude: Floats, code: Ints, share: float) -> Ints:
+    """Which paths (path,) are within `window` (s) of any moment, in order, and not among those that from the faintest
+    of their code on bring this share of its power at most: by steps of a factor of two in power."""
+    total = np.zeros(code.max() + 1 if len(code) else 0)
+    for e in range(len(code)):
+        total[code[e]] += amplitude[e] ** 2
+    step, power = np.zeros(len(code), np.int64), np.zeros((len(total), STEPS))
+    for e in range(len(code)):
+        step[e] = min(max(math.frexp(share * total[code[e]] / max(amplitude[e] ** 2, TINY))[1], 0), STEPS - 1)
+        power[code[e], step[e]] += amplitude[e] ** 2
+    faintest = np.full(len(total), STEPS)  # of each code, the first step that is left out
+    for c in range(len(total)):
+        up_to = 0.0
+        while faintest[c] > 1 and up_to + power[c, faintest[c] - 1] <= share * total[c]:
+            faintest[c] -= 1
+            up_to += power[c, faintest[c]]
+    rows, count = np.empty(len(code), np.int64), 0
+    for e in range(len(code)):
+        if step[e] < faintest[code[e]]:
+            n = np.searchsorted(moment, delay[e] - window)
+            rows[count] = e
+            count += n < len(moment) and moment[n] < delay[e] + window
+    return rows[:count]
 
 
 @compiled(fastmath={"contract"}, forceinline=True)
@@ -129,16 +154,9 @@ def _delay(q: Floats, square: float, u: Floats, curvature: float) -> float:
 
 @compiled
 def _summed(
-    response: Complexes,
-    path: Floats,
-    curvature: float,
-    slowness: float,
-    beam: Floats,
-    focus: float,
-    speed: float,
-    frequency: Floats,
-    pattern: Pattern,
-) -> None:
+    response: Complexes, path: Floats, curvature: float, slowness: float, beam: Floats, focus: float, speed: float,
+    frequency: Floats, pattern: Pattern,
+) -> None:  # fmt: skip
     """Response (bin,) of sensors anywhere, one by one; curvatures in 1/m, positions over `speed` (m/s)."""
     response[:] = 0.0
     spacing = frequency[1] - frequency[0] if len(frequency) > 1 else 0.0
@@ -167,29 +185,11 @@ def _heard(spectrum: Complexes, response: Complexes, weight: Complexes, sums: Co
 
 @compiled
 def attribute(
-    beam: Floats,
-    moment: Floats,
-    beam_energy: Floats,
-    first: Ints,
-    last: Ints,
-    direction: Floats,
-    slowness: float,
-    delay: Floats,
-    curvature: Floats,
-    longer: Floats,
-    group: Ints,
-    coherent: Bools,
-    pulse: Bools,
-    spectrum: Complexes,
-    matched: Floats,
-    energy: Floats,
-    frequency: Floats,
-    focus: float,
-    speed: float,
-    gate: float,
-    reach: float,
+    beam: Floats, moment: Floats, beam_energy: Floats, first: Ints, last: Ints, direction: Floats, slowness: float,
+    delay: Floats, curvature: Floats, longer: Floats, group: Ints, coherent: Bools, pulse: Bools, spectrum: Complexes,
+    matched: Floats, energy: Floats, frequency: Floats, focus: float, speed: float, gate: float, reach: float,
     pattern: Pattern,
-) -> tuple[Floats, Floats, Ints, Floats]:
+) -> tuple[Floats, Floats, Ints, Floats]:  # fmt: skip
     """Power (point, group) at the delay of each point, energy (point, group) within the gate, the loudest group
     (point,), -1 without any, and what each path (point, path from `first` on) of it brings of that power: where its
     phase counts, what of its pressure is in phase with that of all such, and against it less than nothing. The mean
@@ -250,12 +250,12 @@ def _shared(share: Floats, brought: Complexes, own: Bools, coherent: Bools) -> N
 
 
 @compiled
-def means(share: Floats, first: Ints, values: Floats) -> Floats:
-    """Means (point, column) of values (path, column) by the shares (point, path from `first` on) of points, none beyond
-    the values of the paths that bring `HEARD` of the loudest: where echoes cancel, their mean may be anywhere.
+def means(points: Ints, share: Floats, first: Ints, values: Floats) -> Floats:
+    """Means (row, column) of values (path, column) by the shares (point, path from `first` on) of some points (row,),
+    none beyond the values of the paths that bring `HEARD` of the loudest: where echoes cancel, it may be anywhere.
     """
-    out = np.zeros((len(share), values.shape[1]))
-    for p in range(len(share)):
+    out = np.zeros((len(points), values.shape[1]))
+    for row, p in enumerate(points):
         total, least = share[p].sum(), HEARD * share[p].max()
         for x in range(values.shape[1]):
             mean, low, high = 0.0, np.inf, -np.inf
@@ -265,7 +265,19 @@ def means(share: Floats, first: Ints, values: Floats) -> Floats:
                     mean += share[p, e] / total * value
                     if share[p, e] >= least:
                         low, high = min(low, value), max(high, value)
-            out[p, x] = min(max(mean, low), high)
+            out[row, x] = min(max(mean, low), high)
+    return out
+
+
+@compiled
+def distances(places: Floats, start: Floats, velocity: Floats, times: Floats) -> Floats:
+    """Distances (row, 1) m of places (row, xyz) from what is at times (row,) s at start + velocity * time (xyz)."""
+    out = np.empty((len(places), 1))
+    for e in range(len(places)):
+        square = 0.0
+        for x in range(3):
+            square += (places[e, x] - start[x] - velocity[x] * times[e]) ** 2
+        out[e, 0] = math.sqrt(square)
     return out
 
 

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonarsynth.casting.surface_distances import surface_distances
+from sonarsynth.columns import rows_of
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, direction
 from sonarsynth.geometry import turned
 from sonarsynth.labels import point_kernels as kernels
@@ -116,22 +117,17 @@ def _from_targets(
 ) -> tuple[Floats, Floats]:
     """Range (point,) of where the echoes of points were made, and distance (point,) of the places (point, xyz) that the
     sonar gives them from the target, where sound met it and the array (m)."""
-    arrivals, owner, rows = attributed.arrivals, attributed.owner[points], attributed.rows
-    delay, target, facet = arrivals.delay[rows], arrivals.target[rows], arrivals.facet[rows]
+    arrivals, rows, owner = attributed.arrivals, attributed.rows, attributed.owner[points]
+    delay, made, shares = arrivals.delay[rows], rows_of(arrivals.point, rows), (attributed.share, attributed.first)
     times = np.stack([delay, delay - arrivals.radius[rows] / arrivals.sound_speed], axis=1)
+    heard, met = kernels.means(points, *shares, times).T
     ranges, distance = np.empty((2, len(points)))
     for group in np.unique(owner):
-        at, number = owner == group, attributed.target[group]
-        shares = attributed.share[points[at]], attributed.first[points[at]]
-        heard, met = kernels.means(*shares, times).T
-        placed = moment.bodies[number].later(float(met.mean()))
-        spots = placed.pose.to_world(placed.mesh.centroid[np.where(target == number, facet, 0)])
-        middle = float(heard.mean())
-        sonar = listening.track.later(middle)
-        spots += np.outer(times[:, 1] - met.mean(), placed.velocity) - np.outer(delay - middle, sonar.velocity)
-        away = np.linalg.norm(spots - sonar.pose.position, axis=1)
-        ranges[at] = kernels.means(*shares, away[:, None])[:, 0]
-        array = sonar.pose.position + np.outer(heard - middle, sonar.velocity)
-        place = array + turned(sonar.pose.turn_to_world(places[at]), sonar.spin, heard - middle)
-        distance[at] = surface_distances(placed, place - np.outer(met - met.mean(), placed.velocity))
+        at, middle, then = owner == group, float(heard[owner == group].mean()), float(met[owner == group].mean())
+        sonar, placed = listening.track.later(middle), moment.bodies[attributed.target[group]].later(then)
+        away = kernels.distances(made, sonar.pose.position, sonar.velocity, delay - middle)
+        ranges[at] = kernels.means(points[at], *shares, away)[:, 0]
+        array = sonar.pose.position + np.outer(heard[at] - middle, sonar.velocity)
+        place = array + turned(sonar.pose.turn_to_world(places[at]), sonar.spin, heard[at] - middle)
+        distance[at] = surface_distances(placed, place - np.outer(met[at] - then, placed.velocity))
     return ranges, distance

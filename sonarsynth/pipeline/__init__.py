@@ -136,7 +136,7 @@ def trace_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> Trac
     mark_stage("label")
     others = frame_chorus(plan, frame), frame_reverberation(plan, frame)
     mark_stage("trace")
-    return TracedFrame(frame, arrivals, truth, budget, levels_of_echoes, band, *others)
+    return TracedFrame(frame, arrivals, truth, budget, levels_of_echoes, *others)
 
 
 def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
@@ -238,7 +238,7 @@ def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFr
         cloud = cloud_of(plan, frame, beamformed).loudest(plan.sizes["point"])
         mark_stage("range")
         scattered = scattered_paths(plan, traced.arrivals, traced.reverberation)
-        labels = point_labels(plan, frame, traced.arrivals, beamformed.estimates, cloud, traced.band, scattered)
+        labels = point_labels(plan, frame, traced.arrivals, beamformed.estimates, cloud, scattered)
         values |= cloud_values(cloud, labels, plan.sizes["point"], len(frame.moment.bodies))
     return values
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from sonarsynth.conventions import Floats
-from sonarsynth.labels import Band
 from sonarsynth.pipeline.stored_values import Values
 from sonarsynth.products import Arrivals, BeamSpectra, Echoes, EnergyImage, LinkBudget, Signals, SourceEstimates, Truth
 from sonarsynth.products.pulse_arrivals import ReverberationArrivals
@@ -22,7 +21,6 @@ class TracedFrame:
     truth: Truth
     budget: LinkBudget
     echoes: Echoes
-    band: Band
     chorus: ChorusArrivals | None = None  # None: the scene has none
     reverberation: ReverberationArrivals | None = None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import snap_gains
 from sonarsynth.signals.isolated_paths import energy_in_slices, lateness_in_slices, measured_levels
+from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
 
 
@@ -33,11 +35,17 @@ def expansion_error(plan: Plan, arrivals: Arrivals) -> float:
 
 
 def band_of(plan: Plan, snaps: tuple[Emission, ...]) -> Band:
-    """The band that levels are taken in."""
+    """The band that levels are taken in: one, and what is known of it, for all frames whose snaps are alike."""
+    return _band(plan, tuple(snap.waveform for snap in snaps), tuple(snap_gains(snaps).tolist()))
+
+
+@lru_cache(maxsize=2)
+def _band(plan: Plan, waveforms: tuple[Waveform, ...], gains: tuple[float, ...]) -> Band:
+    """The same of pulses and factors on them, one a snap."""
     sonar = plan.scene.sonar
-    alike = np.array([energy_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)
-    energy = alike * snap_gains(snaps)[:, None] ** 2
-    late = np.array([lateness_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)
+    alike = np.array([energy_in_slices(waveform, sonar, SLICES) for waveform in waveforms]).reshape(-1, SLICES)
+    energy = alike * np.array(gains)[:, None] ** 2
+    late = np.array([lateness_in_slices(waveform, sonar, SLICES) for waveform in waveforms]).reshape(-1, SLICES)
     band = Band(sonar.band.low, sonar.band.high, energy, np.zeros(SLICES), late)
     return replace(band, relative=relative_absorption(plan.absorption, band.frequency, sonar.band.centre))
 
@@ -55,7 +63,6 @@ def point_labels(
     arrivals: Arrivals,
     estimates: SourceEstimates,
     cloud: PointCloud,
-    band: Band,
     scattered: Arrivals | None = None,
 ) -> PointLabels:
     """Whose echo each point of a cloud is; scattered: paths of what scatters in surface, bottom and water."""
@@ -70,7 +77,7 @@ def point_labels(
         frame.sonar_track if moves else Track(frame.sonar_pose, np.zeros(3)),
         np.array([lateness(snap.waveform, sonar) for snap in frame.moment.snaps]),
     )
-    return label_points(cloud, arrivals, band, moment, listening, scattered)
+    return label_points(cloud, arrivals, band_of(plan, frame.moment.snaps), moment, listening, scattered)
 
 
 def frame_values(plan: Plan, frame: Frame) -> Values:

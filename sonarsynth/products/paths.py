@@ -160,8 +160,7 @@ class Arrivals(Columns):
         """The paths that reach the centre of the array, as if all hydrophones saw what it sees."""
         if not self.occluded.shape[1]:
             return self
-        unoccluded = self.select(self.occluded[:, 0] < 128)
-        return replace(unoccluded, occluded=unoccluded.occluded[:, :0])
+        return self.but(occluded=self.occluded[:, :0]).select(self.occluded[:, 0] < 128)
 
     @property
     def without_reverberation(self) -> Arrivals:

@@ -17,6 +17,7 @@ from sonarsynth.geometry.motion import ConstantVelocity, Still
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import Band, SonarTiming, label_points
 from sonarsynth.labels.attribution_of_points import attribution
+from sonarsynth.labels.point_kernels import loud_at
 from sonarsynth.pipeline import trace_frame
 from sonarsynth.pipeline.labelling import band_of
 from sonarsynth.planning import plan
@@ -372,3 +373,19 @@ def test_a_point_is_labelled_by_its_own_direction_and_not_by_that_of_others() ->
     for i in range(2):
         alone = label_points(cloud.select(np.array([i])), case.arrivals, case.band, case.frame.moment, case.listening)
         assert all(np.array_equal(vars(found)[n][i], v[0], equal_nan=True) for n, v in vars(alone).items())
+
+
+def test_paths_left_out_as_faint_bring_their_group_no_more_than_their_share() -> None:
+    """The fainter ones of each group, and those no point is about; one step of two more would bring too much."""
+    random, share = np.random.default_rng(4), 1e-3
+    code, amplitude, delay = random.integers(0, 4, 800), 10.0 ** random.uniform(-4.0, 0.0, 800), np.zeros(800)
+    delay[::50], power = 1.0, amplitude**2
+    kept = loud_at(np.zeros(1), 0.5, delay, amplitude, code, share)
+    near = loud_at(np.zeros(1), 2.0, delay, amplitude, code, share)
+    assert np.array_equal(kept, near[delay[near] == 0.0])
+    for group in range(4):
+        own = np.flatnonzero(code == group)
+        faint, loud = np.setdiff1d(own, near), np.intersect1d(own, near)
+        assert 0.0 < power[faint].sum() <= share * power[own].sum()
+        assert power[faint].max() <= power[loud].min()
+        assert power[own[power[own] <= 2.0 * power[loud].min()]].sum() > share * power[own].sum()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -77,7 +78,7 @@ def _visible(
 
 def _leaving(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], rows: Ints, to: Floats) -> tuple[Ints, Bools]:
     """Those of facets (row,) on whose outer side a place (xyz), world, is, and which of them no body hides from it."""
-    mesh, pose, offset, others = body.mesh, body.pose, _offset(body), tuple(b for b in bodies if b is not body)
+    mesh, pose, offset, others = body.mesh, body.pose, _offset(body), _between(body, bodies, to)
     facet, towards, distance = np.empty(len(rows), np.int64), np.empty((len(rows), 3)), np.empty(len(rows))
     own = mesh.centroid, mesh.normal, offset, pose.to_body(to)
     count = view_kernels.leaving(rows, *own, facet, towards, distance)
@@ -87,6 +88,18 @@ def _leaving(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], rows: Ints, t
         start = pose.to_world(mesh.centroid[facet] + offset * mesh.normal[facet])
         hidden |= occluded(others, start, alike(to, count))
     return facet, ~hidden
+
+
+def _between(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], to: Floats) -> tuple[PlacedTarget, ...]:
+    """Those of other bodies that may hide one from a place (xyz), world: by spheres about their origins, with room
+    for where rays start."""
+    line, near = to - body.pose.position, []
+    for other in bodies:
+        away = other.pose.position - body.pose.position
+        beside = away - min(max(float(away @ line) / max(float(line @ line), 1e-300), 0.0), 1.0) * line
+        if other is not body and math.sqrt(beside @ beside) <= 1.001 * (body.mesh.radius + other.mesh.radius):
+            near.append(other)
+    return tuple(near)
 
 
 def _offset(body: PlacedTarget) -> float:

@@ -107,13 +107,13 @@ def _mark(
     for strip in range(max(int((west - left) * strips), 0), min(int((east - left) * strips), STRIPS - 1) + 1):
         for n in range(cells.part[strip * PARTS + lowest], cells.part[strip * PARTS + highest + 1]):
             bit = np.uint64(1) << np.uint64(n & 63)
-            if not west <= cells.azimuth[column, n] <= east or covered[place, n >> 6] & bit:
+            if covered[place, n >> 6] & bit:
                 continue
             x, y = cells.cosine[row, n] * cells.across[column, n, 0], cells.cosine[row, n] * cells.across[column, n, 1]
-            within = True
-            for i in range(3):
-                within &= x * planes[i, 0] + y * planes[i, 1] + cells.sine[row, n] * planes[i, 2] >= 0.0
-            if within:
+            z, within = cells.sine[row, n], (west <= cells.azimuth[column, n]) & (cells.azimuth[column, n] <= east)
+            a = x * planes[0, 0] + y * planes[0, 1] + z * planes[0, 2]
+            b = x * planes[1, 0] + y * planes[1, 1] + z * planes[1, 2]
+            if within & (min(a, b, x * planes[2, 0] + y * planes[2, 1] + z * planes[2, 2]) >= 0.0):
                 covered[place, n >> 6] |= bit
                 added += 1
     return added

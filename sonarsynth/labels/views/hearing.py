@@ -11,7 +11,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion_product
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.state import FrameContext, positions
+from sonarsynth.state import FrameContext
 
 BRIEF = 1e-6
 """s: from the instant of a frame, in which nothing moves or turns."""
@@ -23,27 +23,32 @@ TINY = 1e-300
 class Hearing(NamedTuple):
     """Of the loudest snap that lights targets, by direct paths; in the mean of the others where one has none."""
 
-    met: Floats  # (target,) s on the clock of the frame: when its sound meets each target
+    bodies: tuple[PlacedTarget, ...]  # where its sound meets them
     heard: Floats  # (target,) s: when the middle of the array hears that
     sonar: Track
 
 
-def hearing(context: FrameContext, met: Floats, snap_level: Floats) -> Hearing | None:
+def hearing(
+    context: FrameContext, met: Floats, there: list[tuple[PlacedTarget, ...]], snap_level: Floats
+) -> Hearing | None:
     """Of a frame; None where nothing moves while sound is under way, or no snap lights a target.
 
-    met: (snap, target) s when the sound of each snap meets each target; snap_level: (snap,) dB.
+    met: (snap, target) s when the sound of each snap meets each target; there: of each snap, `met_at` that; snap_level:
+    (snap,) dB.
     """
     track, lights = context.receiver.track, [n for n, snap in enumerate(context.snaps) if snap.illuminates]
     lights = [n for n in lights if np.isfinite(met[n]).any()]
     if track is None or not lights:
         return None
-    times = met[max(lights, key=lambda n: float(snap_level[n]))]
-    times = np.where(np.isfinite(times), times, np.nanmean(times))
-    place, heard = positions([body.track for body in context.bodies], times), times
-    for _ in range(ROUNDS):
+    loudest = max(lights, key=lambda n: float(snap_level[n]))
+    known = np.isfinite(met[loudest])
+    times = np.where(known, met[loudest], np.nanmean(met[loudest]))
+    bodies = there[loudest] if known.all() else met_at(context.bodies, times)
+    place, heard = np.array([body.pose.position for body in bodies]), times
+    for _ in range(1 if track.still else ROUNDS):
         away = np.linalg.norm(place - track.positions(heard), axis=1)
         heard = times + away / context.receiver.speed(context.medium)
-    return Hearing(times, heard, track)
+    return Hearing(bodies, heard, track)
 
 
 def met_at(bodies: tuple[PlacedTarget, ...], times: Floats) -> tuple[PlacedTarget, ...]:
@@ -58,7 +63,7 @@ def as_heard(bodies: tuple[PlacedTarget, ...], when: Hearing | None) -> tuple[Pl
     instant of the frame."""
     if when is None:
         return bodies
-    there, now = met_at(bodies, when.met), when.sonar.pose
+    there, now = when.bodies, when.sonar.pose
     if when.sonar.still:
         return there
     heard = []
