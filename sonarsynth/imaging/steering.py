@@ -38,9 +38,17 @@ class Steering(Method):
 
     def beams(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> BeamSpectra:
         """Beams of a window of the signals, computed when their energies or spectra are asked for."""
-        return BeamSpectra(
-            snapshots, partial(self._image, snapshots, elements, sonar), self.steered(snapshots, elements, sonar)
-        )
+        steered = self.steered(snapshots, elements, sonar)
+        if type(self).steered is not Steering.steered:
+            steered = partial(self._checked_spectra, steered, len(snapshots.frequency))
+        return BeamSpectra(snapshots, partial(self._image, snapshots, elements, sonar), steered)
+
+    def _checked_spectra(
+        self, steered: Callable[[Floats], npt.NDArray[np.complex64]], bins: int, direction: Floats
+    ) -> npt.NDArray[np.complex64]:
+        """What the function that `steered` returns makes of directions (beam, xyz), once it has the shape of beams."""
+        beams: npt.NDArray[np.complex64] = returned(self, "steered", steered(direction), (len(direction), bins))
+        return beams
 
     def _image(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
         """The energies, once they have the shape of an image."""

@@ -104,7 +104,7 @@ def signal_values(signals: Signals, counts: bool) -> Values:
 
 def source_estimate_values(estimates: SourceEstimates) -> Values:
     """Source estimates, in degrees."""
-    columns = dict(vars(estimates))
+    columns = {name: values for name, values in vars(estimates).items() if name != "position_by_speed"}
     for name in ("azimuth", "azimuth_error", "elevation", "elevation_error"):
         columns[name] = np.rad2deg(columns[name])
     return table("/source_estimates", **columns)

@@ -71,10 +71,12 @@ def supports_of(looks: Sequence[SampledScene]) -> PulseDurations:
 
 
 def _late(looks: Sequence[SampledScene]) -> float:
-    """`PulseDurations.late`, of the pulse that motion makes longest or shortest."""
-    worst = [max(stretches(look), key=lambda row: abs(row.longer), default=Stretch()) for look in looks]
-    look, row = max(zip(looks, worst, strict=True), key=lambda pair: abs(pair[1].longer))
-    return ranged_echo(row.part, row.waveform, look.scene.sonar).spread
+    """`PulseDurations.late`, of the pulse that motion makes longest or shortest: in proportion to that."""
+    rows = [(row, look.scene.sonar) for look in looks for row in stretches(look)]
+    worst, sonar = max(rows, key=lambda pair: abs(pair[0].longer), default=(Stretch(), looks[0].scene.sonar))
+    part = np.array([row.part for row, _ in rows if row.waveform == worst.waveform])
+    late = abs(ranged_echo(worst.part, worst.waveform, sonar).late)
+    return late * float(np.sqrt(np.mean(part**2))) / abs(worst.part) if late else 0.0
 
 
 def stretches(look: SampledScene) -> list[Stretch]:
@@ -109,11 +111,11 @@ def _stretch(frame: Frame, body: PlacedTarget, snap: Emission, sonar: Sonar) -> 
 def ranged_echo(stretch: float, shape: Waveform | None, sonar: Sonar) -> StretchedEcho:
     """What ranging makes of an echo whose pulse lasts 1 + stretch times as long."""
     if shape is None or stretch == 0.0:
-        return StretchedEcho(0.0, 1.0, 0.0)
+        return StretchedEcho(0.0, 1.0)
     (f, wave), (_, longer) = (whole_spectrum(shape, sonar, doppler) for doppler in (0.0, stretch))
     band = slice(*np.searchsorted(f, [sonar.band.low, sonar.band.high]))
     if len(f[band]) < 2:  # too narrow for anything to be located, or ranged
-        return StretchedEcho(0.0, 1.0, 0.0)
+        return StretchedEcho(0.0, 1.0)
     return stretched_echo(f[band], wave[band], longer[band], sonar.band)
 
 

@@ -62,6 +62,7 @@ class SourceEstimates:
     range_from_curvature_error: Floats  # (estimate,) m
     position: Floats  # (estimate, xyz) m, sonar frame: of the wavefront, and of the bottom's depth where it was used
     position_covariance: Floats  # (estimate, xyz, xyz) m2
+    position_by_speed: Floats  # (estimate, xyz) s: dS/dc, c the assumed sound speed, whose error the covariance holds
     residual: Floats  # (estimate,) s: root mean square residual of the sensor delays
     bottom_used: (
         Ints  # (estimate,) 1 where the depth of the bottom entered the position, 0 where it did not, -1 without one

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
+import numpy as np
+
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.description.method import FrameSize, Method, returned_rows
+from sonarsynth.description.method import FrameSize, Method, returned, returned_rows
 from sonarsynth.environment.sea import Profile
 from sonarsynth.products import Paths
 
@@ -66,6 +68,21 @@ class PathModel(Method):
         """Rays beside known ones, to points (end, xyz) in the world: a faster way than `connect`; none: there is no
         such way, and `connect` is asked."""
         return None
+
+    def checked_rays_beside(
+        self, profile: Profile, environment_depth: float, rays: KnownRays, end: Floats
+    ) -> RaysBeside | None:
+        """What `beside` returns, once it has the shape of that, and is known wherever a travel time is."""
+        found = self.beside(profile, environment_depth, rays, end)
+        if found is not None:
+            shape = len(rays.start), len(end)
+            returned(self, "beside", found, shape, "travel_time", unknown=True)
+            there = np.isfinite(found.travel_time)
+            for name, wide in (("spreading", ()), ("departure", (3,))):
+                returned(self, "beside", found, (*shape, *wide), name, unknown=True)
+                known = getattr(found, name)[there]
+                returned(self, "beside", known, known.shape)
+        return found
 
     @property
     def direct(self) -> Self:

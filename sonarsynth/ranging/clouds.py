@@ -118,15 +118,18 @@ def range_error(solution: Solution, echoes: PickedEchoes, estimates: SourceEstim
     """Predicted standard error (echo,) in m of the range of where an echo was made: direction, clock, snap position,
     sound speed, and what placing itself leaves out.
 
-    The same delay means another range in another direction (dr/dpsi, psi the angle between beam and source).
+    The same delay means another range in another direction (dr/dpsi, psi the angle between beam and source). Another
+    sound speed moves the snap as well, which makes up for some of what it does to the range.
     """
     c = sonar.assumed_sound_speed
     beside = solution.by_angle * _angle_error(echoes, estimates.position[0])
     clock = solution.by_path * c * echoes.delay_error
     g = solution.by_source
     snap = np.einsum("bi,ij,bj->b", g, estimates.position_covariance[0], g)
+    moved = g @ estimates.position_by_speed[0] * sonar.sound_speed_error  # which `snap` holds
     speed = solution.by_speed * sonar.sound_speed_error
-    return np.asarray(np.sqrt(beside**2 + clock**2 + np.maximum(snap, 0.0) + speed**2 + solution.model_error**2))
+    both = np.maximum(snap + speed * (speed + 2.0 * moved), 0.0)
+    return np.asarray(np.sqrt(beside**2 + clock**2 + both + solution.model_error**2))
 
 
 def _angle_error(echoes: PickedEchoes, source: Floats) -> Floats:
@@ -136,6 +139,9 @@ def _angle_error(echoes: PickedEchoes, source: Floats) -> Floats:
     to_port = np.column_stack([-sine, cosine, np.zeros(len(beam))])
     away = source - (beam @ source)[:, None] * beam
     length = np.linalg.norm(away, axis=1, keepdims=True)
-    share = np.sum(to_port * unit(np.where(length > 0.0, away, to_port)), axis=1) ** 2
-    sideways = echoes.azimuth_error * np.cos(echoes.elevation)
-    return np.asarray(np.sqrt(share * sideways**2 + (1.0 - share) * echoes.elevation_error**2))
+    toward = unit(np.where(length > 0.0, away, to_port))
+    level = np.cos(echoes.elevation)
+    port = np.sum(to_port * toward, axis=1)
+    up = np.copysign(np.sqrt(np.maximum(1.0 - port**2, 0.0)), toward[:, 2])
+    variance = (port * level * echoes.azimuth_error) ** 2 + (up * echoes.elevation_error) ** 2
+    return np.asarray(np.sqrt(np.maximum(variance + 2.0 * port * level * up * echoes.error_product, 0.0)))

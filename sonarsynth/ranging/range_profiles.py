@@ -233,7 +233,6 @@ class StretchedEcho:
 
     late: float  # s: where its profile is largest
     power: float  # there, over that of one like the direct pulse
-    spread: float  # s: root mean square delay of its power, beside that of one like the direct pulse
 
 
 def stretched_echo(f: Floats, wave: Complexes, stretched: Complexes, band: Band) -> StretchedEcho:
@@ -243,13 +242,8 @@ def stretched_echo(f: Floats, wave: Complexes, stretched: Complexes, band: Band)
     plain, profile = (np.abs(ifft(of * matched, count)) for of in (wave, stretched))
     top = int(profile.argmax())
     offset, height = parabola(*profile[[top - 1, top, (top + 1) % count]])
-    delay = (np.arange(count) - count * (np.arange(count) > count / 2)) / (count * (f[1] - f[0]))
-    own, square = (float(delay**2 @ of**2 / np.sum(of**2)) for of in (plain, profile))
-    return StretchedEcho(
-        float(delay[top] + offset * delay[1]),
-        float((height / plain[0]) ** 2),
-        np.sqrt(max(square - own, 0.0)),
-    )
+    late = (top - count * (top > count / 2) + float(offset)) / (count * (f[1] - f[0]))
+    return StretchedEcho(float(late), float((height / plain[0]) ** 2))
 
 
 def _own_band(f: Floats, density: Floats, spacing: float, band: Band) -> tuple[float, float]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.fft import irfft
 
 from sonarsynth.conventions import Floats
+from sonarsynth.description.method import returned
 from sonarsynth.environment.noise import NoiseField
 from sonarsynth.equations.noise.ambient_noise import power_density
 from sonarsynth.equations.noise.filters import duration
@@ -37,7 +38,7 @@ def _noise_size(
     that is of noise of 1 Pa2/Hz."""
     f = _frequencies(1, length // 2, sampling_frequency, length)
     passed = filter_response(antialias, sampling_frequency, length)[1 : length // 2] ** 2
-    power = noise.density(f) * passed
+    power = returned(noise, "density", noise.density(f), f.shape) * passed
     bins = np.flatnonzero(power > QUIETEST * power.max())
     # half of the power of a bin in each part; irfft divides by the length
     size, gain = (np.sqrt(x * sampling_frequency * length) / 2.0 for x in (power, passed))

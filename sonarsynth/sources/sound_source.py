@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
@@ -117,7 +118,12 @@ class SoundSource(Method):
     def emission(self, bottom: float, start: float, time: float, gain: float = 1.0, width: float = 1.0) -> Emission:
         """What it emits `time` (s) after the instant of a frame, gain times as loud and width times as long."""
         now, model = start + time, self.model(bottom)
-        motion = self.velocity(now), self.directivity(now)
+        velocity, pattern = np.asarray(returned(self, "velocity", self.velocity(now), (3,))), self.directivity(now)
+        motion = velocity, None if pattern is None else partial(self._checked_factor, pattern)
         return Emission(
             self.checked_position(bottom, now), time, model, self.level, gain, width, *motion, self.illuminates
         )
+
+    def _checked_factor(self, pattern: Directivity, direction: Floats) -> Floats:
+        """What the pattern that `directivity` returns says of directions (..., xyz), once each has a number."""
+        return np.asarray(returned(self, "directivity", pattern(direction), direction.shape[:-1]))

@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.columns import Columns, picked, rows_of
 from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.description.method import returned
 from sonarsynth.scattering import Component, Scatterers
 from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse
 from sonarsynth.tracing.doppler import MotionTerms
@@ -100,6 +101,7 @@ def echo_batches(
         for component in (part.past_limb() if looked_for else part for part in of_law):
             patch = surface.geometry(component.needs_corners).select(facet)
             amplitude = component.amplitude(incident, scattered, patch, wavenumber)
+            returned(component, "amplitude", amplitude, row.shape)
             sign = surface.polarity(component)[facet]
             batch = EchoBatch(surface, component, row, patch, incident, scattered, wavenumber, amplitude, sign)
             strength = np.abs(amplitude) * factor[row]

@@ -124,6 +124,10 @@ def test_a_sweep_ranges_what_moves_as_far_off_as_the_plan_says(speed: float, tmp
     assert both.windows.supports.late == made.windows.supports.late > 0.0
     assert f"ranges are {said} m off" in "\n".join(both.warnings)
 
+    rests = replace(world.targets[0], name="rests", motion=still.scene.world.targets[0].motion)
+    half = plan(replace(still, scene=replace(still.scene, world=replace(world, targets=(*world.targets, rests)))))
+    assert half.windows.supports.late == pytest.approx(np.sqrt(0.5) * made.windows.supports.late)  # one standard error
+
 
 @pytest.mark.parametrize("width", [1e3, 3e3, 10e3, "a long tone"])
 def test_an_echo_window_holds_noise_to_tell_echoes_by(width: float | str) -> None:

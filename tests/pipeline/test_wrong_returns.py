@@ -16,17 +16,31 @@ from sonarsynth.detection import ImagePeaks, Region, SonarView, detections_of
 from sonarsynth.environment.noise import FlatNoise
 from sonarsynth.environment.noise.noise_field import NoiseField
 from sonarsynth.environment.scatterers.stones import Stones
+from sonarsynth.imaging import Capon
 from sonarsynth.planning import Plan
 from sonarsynth.planning.notes.source_notes import locator
+from sonarsynth.propagation import Refracted
 from sonarsynth.ranging.cancelling.reflection_cancelling import WavefrontCancelling
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes
 from sonarsynth.scattering.boundaries.lambert_boundary import Lambert
+from sonarsynth.scattering.components import CoherentKirchhoff
 from sonarsynth.sources.shrimp import SnappingShrimp
 
 Spoiled = Callable[[Any], Any]
 
 BOTTOM = "scene.world.reverberation={bottom: {kind: lambert}}"
 STONES = "scene.world.scatterers=[{kind: stones, positions: [[10, 0], [11, 0]]}]"
+NOISE = "scene.world.environment.noise={kind: flat, level: 41 dB}"
+HUM = (
+    "scene.world.noise_sources=[{name: hum, motion: {kind: still, position: [5, 5, -3]}, "
+    "sound: {kind: flat, level: 120 dB}}]"
+)
+KIRCHHOFF = "scene.physics.scattering={kind: kirchhoff}"
+CAPON = "scene.processing.beamforming={kind: capon}"
+BENT = [
+    "scene.physics.tracing={kind: refracted}",
+    "scene.world.environment.sound_speed={kind: linear, surface_speed: 1500 m/s, gradient: 1}",
+]
 CANCEL = "scene.processing.cancelling={kind: wavefront}"
 
 
@@ -45,6 +59,11 @@ def longer(array: Any) -> Any:
 
 def unknown(array: Any) -> Any:
     return np.full_like(array, np.nan)
+
+
+def unknown_between(density: Any) -> Any:
+    """Where a few frequencies over the band would not show it."""
+    return np.where(np.arange(len(density)) == len(density) // 2 + 1, np.nan, density) if len(density) > 17 else density
 
 
 def nothing(_: Any) -> None:
@@ -75,6 +94,15 @@ CASES: list[tuple[str, Callable[[Plan], Any], str, list[str], Spoiled, str]] = [
     ),
     ("density", lambda _: FlatNoise(level=40.0), "density", [], lambda d: d[0], r"shape \(\), not .* \(17,\)"),
     ("density", lambda _: FlatNoise(level=40.0), "density", [], unknown, "NaN"),
+    ("density", lambda _: FlatNoise(level=40.0), "density", [NOISE], unknown_between, "NaN"),
+    ("density", lambda _: FlatNoise(level=40.0), "density", [HUM], unknown_between, "NaN"),
+    ("velocity", lambda _: SnappingShrimp, "velocity", [], short, r"\(2,\), not .* \(3,\)"),
+    ("directivity", lambda _: SnappingShrimp, "directivity", [], lambda _: lambda u: u[..., 0] * np.nan, "NaN"),
+    ("directivity", lambda _: SnappingShrimp, "directivity", [], lambda _: np.abs, r"shape \(.*3\), not an array"),
+    ("part", lambda _: CoherentKirchhoff, "amplitude", [KIRCHHOFF], lambda a: a[..., None], "shape"),
+    ("beside", lambda _: Refracted, "beside", BENT, lambda r: r._replace(spreading=unknown(r.spreading)), "NaN"),
+    ("beside", lambda _: Refracted, "beside", BENT, lambda r: r._replace(departure=r.spreading), "as departure"),
+    ("steered", lambda _: Capon, "steered", [CAPON], lambda f: lambda u: f(u)[:, :-1], "shape"),
     ("position", lambda _: SnappingShrimp(position=(1.0, 1.0)), "position_at", [], short, r"\(2,\), not .* \(3,\)"),
     ("strength", lambda _: Lambert(), "strength", [BOTTOM], short, "shape"),
     ("scatterers", lambda _: Stones, "scatterers", [STONES], column(sign=unknown), "NaN as sign"),

@@ -8,7 +8,7 @@ import numpy as np
 
 from sonarsynth.compiling import compiled
 
-SETTLED = 1e-8
+SETTLED = 1e-6
 """A step (rad) after which Gauss-Newton stops: what is left is its square."""
 
 

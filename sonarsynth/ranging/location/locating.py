@@ -39,7 +39,7 @@ Cut aside of its pulse, a tail shifts it by 1 % of that: 16 ns, or 1.5 degrees, 
 ROBUST_ROUNDS = 3
 """Reweightings that turn outliers out of the first fit, at most."""
 FIRST_STEPS = 3
-"""Steps from the plane wave to the first sphere; a step each after that."""
+"""Steps from the plane wave to the first sphere."""
 SHARED = 0.05
 """Share of a pulse's power at the sensors that its wavefront may leave unexplained, unless it is the noise's own:"""
 AUDIBLE = 4.0
@@ -201,7 +201,7 @@ def fit_pulse(
             if whole is None:
                 return BAND
             aligned, pulse, longer = whole
-        better = fit_wave(expected + pulse.lag, q, c, pulse.weight, wave, 1)
+        better = fit_wave(expected + pulse.lag, q, c, pulse.weight, wave)
         if better is None:
             return UNFIT
         wave, last = better, wave
@@ -257,17 +257,12 @@ def _whole(
     return None
 
 
-def fit_wave(
-    delay: Floats, position: Floats, sound_speed: float, weight: Floats, start: Wavefront, steps: int = 20
-) -> Wavefront | None:
-    """Sphere through delays; a plane where there are too few sensors for a sphere.
-
-    One step (of Gauss and Newton) suffices where `start` is near and the fit is made again on better delays.
-    """
+def fit_wave(delay: Floats, position: Floats, sound_speed: float, weight: Floats, start: Wavefront) -> Wavefront | None:
+    """Sphere through delays; a plane where there are too few sensors for a sphere."""
     u, k = start.direction, start.curvature
-    wave = spherical_wave(delay, position, sound_speed, weight, u, k, iterations=steps)
+    wave = spherical_wave(delay, position, sound_speed, weight, u, k)
     if wave is None:
-        wave = spherical_wave(delay, position, sound_speed, weight, u, curved=False, iterations=steps)
+        wave = spherical_wave(delay, position, sound_speed, weight, u, curved=False)
     return wave
 
 

@@ -20,7 +20,7 @@ class LocatingMethod(Method):
     def checked_estimates(self, signals: Signals, receiver: Receiver, survey: Survey, snaps: int) -> SourceEstimates:
         """What `locate` returns, once it has the shape of that."""
         found = self.locate(signals, receiver, survey, snaps)
-        wide = {"position": (3,), "position_covariance": (3, 3)}
+        wide = {"position": (3,), "position_covariance": (3, 3), "position_by_speed": (3,)}
         estimates: SourceEstimates = returned_rows(self, "locate", found, SourceEstimates, "time", (), wide, snaps)
         return estimates
 

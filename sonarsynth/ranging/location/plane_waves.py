@@ -110,7 +110,7 @@ def refine(signals: Signals, elements: Elements, sonar: Sonar, near: PlaneWaveFi
     for _ in range(ROUNDS):
         pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
         delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c) + pulse.lag
-        better = fit_wave(delay, q, c, pulse.weight, wave, 1)
+        better = fit_wave(delay, q, c, pulse.weight, wave)
         if better is None:
             return None
         wave = better

@@ -56,6 +56,7 @@ class SourceFix:
     range_from_curvature: tuple[float, float]
     position: Floats
     covariance: Floats
+    by_speed: Floats  # (xyz) s: dS/dc, c the assumed sound speed
     residual: float
     bottom_used: int
     reason: int
@@ -88,6 +89,7 @@ class Fix:
     direction: Floats  # (xyz)
     curvature: float
     covariance: Floats  # (3, 3) of (along tangents, curvature)
+    by_speed: Floats  # (3,) change of these per m/s of the assumed sound speed
     used: bool  # whether the bottom was
 
 
@@ -122,12 +124,10 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
         from_curvature = 1 / wave.curvature if wave.curvature > 0 else np.nan
         curvature_error = np.sqrt(full[2, 2]) * from_curvature**2
     reason = RANGE if not np.sqrt(fix.covariance[2, 2]) <= FARTHEST * fix.curvature else ACCEPTED
-    if not _in_water(wave, full, slope, by_angle, fall, knowledge):
-        reason = OUTSIDE
+    reason = reason if _in_water(wave, full, slope, by_angle, fall, knowledge) else OUTSIDE
     time, time_error = _arrival(pulse, float(full[3, 3]), sonar, knowledge.rounding)
     reason = reason if np.isfinite(time) else BAND
-    position, covariance = _position(wave, fix)
-    known_place = reason == ACCEPTED
+    position, covariance, by_speed = _position(wave, fix, reason == ACCEPTED)
     return SourceFix(
         time=time,
         time_error=time_error,
@@ -135,10 +135,11 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
         angle_error=np.sqrt([around, spread[1, 1]]),
         range_from_depth=(from_depth, float(depth_error) / abs(slope) if np.isfinite(from_depth) else np.nan),
         range_from_curvature=(from_curvature, curvature_error),
-        position=position if known_place else np.full(3, np.nan),
-        covariance=covariance if known_place else np.full((3, 3), np.nan),
+        position=position,
+        covariance=covariance,
+        by_speed=by_speed,
         residual=float(np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum())),
-        bottom_used=int(fix.used) if known_place else -1,
+        bottom_used=int(fix.used) if reason == ACCEPTED else -1,
         reason=reason,
         curvature=(wave.curvature, float(np.sqrt(full[2, 2]))),
         chord=wave.direction,
@@ -182,7 +183,7 @@ def _fuse(wave: Wavefront, covariance: Floats, fall: float, knowledge: SonarKnow
     where each step has led (Gauss and Newton), and not used where that does not settle.
     """
     u, k, p, up = wave.direction, wave.curvature, covariance[:3, :3], knowledge.pose.rotation[2]
-    alone = Fix(u, k, p, False)
+    alone = Fix(u, k, p, wave.by_sound_speed[:3], False)
     slope, by_angle = float(up @ u), wave.tangents @ up
     if not (knowledge.on_bottom and slope * fall > 0):
         return alone
@@ -204,7 +205,8 @@ def _fuse(wave: Wavefront, covariance: Floats, fall: float, knowledge: SonarKnow
     else:
         return alone
     keep = np.eye(3) - np.outer(gain, row)  # Joseph's form: no variance can come out negative
-    return Fix(_turned(wave, step), k + float(step[2]), keep @ p @ keep.T + np.outer(gain, gain) * noise, True)
+    fused = keep @ p @ keep.T + np.outer(gain, gain) * noise
+    return Fix(_turned(wave, step), k + float(step[2]), fused, keep @ alone.by_speed, True)
 
 
 def _turned(wave: Wavefront, step: Floats) -> Floats:
@@ -212,13 +214,13 @@ def _turned(wave: Wavefront, step: Floats) -> Floats:
     return np.asarray(u / np.linalg.norm(u))
 
 
-def _position(wave: Wavefront, fix: Fix) -> tuple[Floats, Floats]:
-    """Position (xyz) and covariance of a fix."""
+def _position(wave: Wavefront, fix: Fix, known: bool) -> tuple[Floats, Floats, Floats]:
+    """Position (xyz) of a fix that is known, its covariance, its change (xyz) per m/s of the assumed sound speed."""
     u, k = fix.direction, fix.curvature
-    if not k > 0:
-        return np.full(3, np.nan), np.full((3, 3), np.nan)
+    if not (known and k > 0):
+        return np.full(3, np.nan), np.full((3, 3), np.nan), np.full(3, np.nan)
     jacobian = np.stack([wave.tangents[0] / k, wave.tangents[1] / k, -u / k**2], axis=1)
-    return u / k, jacobian @ fix.covariance @ jacobian.T
+    return u / k, jacobian @ fix.covariance @ jacobian.T, jacobian @ fix.by_speed
 
 
 def _in_water(
@@ -266,7 +268,7 @@ def refused(reason: int) -> SourceFix:
     """A row of which nothing is known but why."""
     none, pair = np.full(3, np.nan), (np.nan, np.nan)
     return SourceFix(
-        np.nan, np.nan, none, none[:2], pair, pair, none, np.full((3, 3), np.nan),
+        np.nan, np.nan, none, none[:2], pair, pair, none, np.full((3, 3), np.nan), none,
         np.nan, -1, reason, pair, none, np.nan,
     )  # fmt: skip
 
@@ -277,9 +279,6 @@ def as_estimates(rows: list[SourceFix], snaps: int, reason: int = SILENT) -> Sou
 
     def column(get: Callable[[SourceFix], object], *shape: int) -> Floats:
         return np.array([get(row) for row in rows], float).reshape(snaps, *shape)
-
-    def ints(get: Callable[[SourceFix], int]) -> np.ndarray:
-        return np.array([get(row) for row in rows], np.int64)
 
     return SourceEstimates(
         time=column(lambda r: r.time),
@@ -295,6 +294,7 @@ def as_estimates(rows: list[SourceFix], snaps: int, reason: int = SILENT) -> Sou
         position=column(lambda r: r.position, 3),
         position_covariance=column(lambda r: r.covariance, 3, 3),
         residual=column(lambda r: r.residual),
-        bottom_used=ints(lambda r: r.bottom_used),
-        reason=ints(lambda r: r.reason),
+        position_by_speed=column(lambda r: r.by_speed, 3),
+        bottom_used=column(lambda r: r.bottom_used).astype(np.int64),
+        reason=column(lambda r: r.reason).astype(np.int64),
     )

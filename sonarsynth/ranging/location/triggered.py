@@ -67,6 +67,7 @@ class Triggered(LocatingMethod):
                 angle_error=np.array([min(turned / max(np.hypot(own[0], own[1]) / r, 1e-9), np.pi), turned]),
                 position=own,
                 covariance=error**2 * np.eye(3),
+                by_speed=np.zeros(3),
                 bottom_used=0,
             )
             rows.append(fix)

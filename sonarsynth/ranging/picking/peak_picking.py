@@ -89,7 +89,7 @@ def peak_echoes(
     width, clear = axes.step * axes.sharpness, NOISE_CLEAR * noise
     centre[late] = power_centres(power, index, *beams, b[late], t[late], top_offset[late], width, CENTRE_WINDOW, clear)
     snr, offset = height / noise[b], top_offset * axes.step
-    error = axes.errors(snr, centre)
+    error, error_product = axes.errors(snr, centre)
     return PickedEchoes(
         elevation=image.elevation[profiles.row[b]] + offset[:, 0],
         azimuth=image.azimuth[profiles.column[b]] + offset[:, 1],
@@ -100,6 +100,7 @@ def peak_echoes(
         energy=energy.astype(np.float32),
         snr=10 * np.log10(snr),
         overflow=left_out,
+        error_product=error_product,
     )
 
 
@@ -184,18 +185,19 @@ class Axes:
         lasting = max(profiles.power.shape[1] * profiles.step - 2 * pulse_times.PULSE_HALF, profiles.step)  # s
         return np.append(angle, lasting * 2 * np.pi * profiles.moments.noise_own_band)
 
-    def errors(self, snr: Floats, centre: Floats) -> Floats:
-        """Predicted standard errors (peak, 3) in rad, rad, s; snr (peak,): signal-to-noise ratio of powers.
+    def errors(self, snr: Floats, centre: Floats) -> tuple[Floats, Floats]:
+        """Predicted standard errors (peak, 3) in rad, rad, s, and covariance (peak,) of angles; snr (peak,): of powers.
 
         Noise moves the top of an amplitude that falls as 1 - (sharp x)^2/2 by its derivative over the bend, of standard
         deviation rough/(sharp^2 (2 snr)^1/2). Where echoes overlap the `centre` of their power (peak, 3), in widths
-        from the peak, is beside it: the peak is taken to err by about as much (`CENTRE_ERROR`).
+        from the peak, is beside it: the peak is taken to err by about as much (`CENTRE_ERROR`), and that way.
         """
         sharp = np.maximum(self.sharpness, [1e-3, 1e-3, 0.0])
         noise = self.roughness / (sharp**2 * np.sqrt(2.0 * snr[:, None]))
         resolved_error = np.sqrt(noise**2 + (SURFACE_ERROR**2 + (CENTRE_ERROR * centre) ** 2) / sharp**2)
         unresolved_error = UNKNOWN * np.maximum(1.0 / sharp, 0.5 * self.step)
-        return np.asarray(np.minimum(np.where(self.resolved, resolved_error, unresolved_error), [np.pi, np.pi, np.inf]))
+        error = np.minimum(np.where(self.resolved, resolved_error, unresolved_error), [np.pi, np.pi, np.inf])
+        return error, self.resolved[:2].all() * np.prod((CENTRE_ERROR * centre / sharp)[:, :2], axis=1)
 
 
 def _tangents(elevation: float, azimuth: float) -> Floats:

@@ -25,6 +25,7 @@ class PickedEchoes(Columns):
     energy: npt.NDArray[np.float32]  # (echo,) Pa2 s: of the echo, or of its beam
     snr: Floats  # (echo,) dB: power of the peak over the mean power of noise in its beam
     overflow: int = 0  # beams that were not looked at, the faintest
+    error_product: Floats | float = 0.0  # (echo,) rad2: covariance of the errors of azimuth and elevation
 
 
 def no_echoes(image: EnergyImage, overflow: int) -> PickedEchoes:

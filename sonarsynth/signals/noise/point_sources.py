@@ -9,6 +9,7 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from sonarsynth.conventions import Floats
+from sonarsynth.description.method import returned
 from sonarsynth.equations.noise.filters import duration, response
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import Elements, Sonar
@@ -65,7 +66,8 @@ def add_noise_source(
         sent[drawn] = rfft(played)[drawn] * through[drawn]
     else:
         normal = random.standard_normal((2, drawn.size))
-        sent[drawn] = (normal[0] + 1j * normal[1]) * through[drawn] * np.sqrt(source.sound.density(f) * fs * length) / 2
+        density = returned(source.sound, "density", source.sound.density(f), f.shape)
+        sent[drawn] = (normal[0] + 1j * normal[1]) * through[drawn] * np.sqrt(density * fs * length) / 2
     relative = relative_absorption(absorption, frequency[heard], sonar.band.centre)
     spectrum = np.zeros((elements.count, frequency.size), np.complex64)  # as exact as pressure is
     spectrum[:, heard] = exact_spectra(front, elements, frequency[heard], relative, early) * sent[heard]

@@ -115,7 +115,7 @@ def rays_to_probes(legs: ReceivePaths, geometry: ReceiverGeometry) -> tuple[Floa
     position = geometry.receiver.pose.to_world(probe.position)
     centre_rays = KnownRays(legs.point, legs.departure, legs.bounces + legs.turning)
     nothing = np.full((len(legs.row), len(position)), np.nan)
-    beside = geometry.propagation.beside(medium.profile, medium.depth, centre_rays, position)
+    beside = geometry.propagation.checked_rays_beside(medium.profile, medium.depth, centre_rays, position)
     time, spreading, departure = beside or (nothing, nothing.copy(), np.zeros((*nothing.shape, 3)))
     c = geometry.receiver.speed(medium)
     farther = sphere(legs.direction, legs.radius, probe.position)
