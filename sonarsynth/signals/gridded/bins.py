@@ -56,16 +56,12 @@ class Bins(NamedTuple):
         """Those of a segment of so many samples, not `period`; a share `early` of these are before a pulse arrives."""
         both, before = np.zeros((1 + len(self.modes), period // 2 + 1), complex), round(early * samples)
         both[:, self.first : self.first + self.frequency.size] = np.concatenate([self.spectrum[None], self.modes])
-        wave = irfft(both, period, axis=1)
-        wave = np.concatenate([wave[:, : samples - before], wave[:, period - before :]], axis=1)
+        wave = np.delete(irfft(both, period, axis=1), slice(samples - before, period - before), axis=1)
         step = self.step * period / samples
         first, last = int(self.frequency[0] / step), min(int(np.ceil(self.frequency[-1] / step)), samples // 2)
         frequency = np.asarray(step * np.arange(first, last + 1), float)
-        spectrum, *modes = rfft(wave, axis=1)[:, first : last + 1]
-        relative = np.interp(frequency, self.frequency, self.relative)
-        return Bins(
-            first, frequency, spectrum, relative, step, np.array(modes).reshape(-1, frequency.size), self.changes
-        )
+        spectra, relative = rfft(wave, axis=1)[:, first : last + 1], np.interp(frequency, self.frequency, self.relative)
+        return Bins(first, frequency, spectra[0], relative, step, spectra[1:], self.changes)
 
 
 def audible(spectrum: Complexes, tolerance: float) -> slice:

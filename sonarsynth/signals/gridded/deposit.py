@@ -73,7 +73,8 @@ def add_segment(
     stage = Stage(aim, bins, origin, segment, grid, oversampling, wave, dtype, tails)
     front = _in_parts(front.without_faint_shadows(0.1 * tolerance, elements), elements.count)
     for tile in tiles(front, aim) if front.count else ():
-        paths, most = front.select(tile.paths), max(1, LARGEST // (len(tile.nodes(elements)) * samples))
+        paths = tile.reference if tile.alone else front.select(tile.paths)
+        most = max(1, LARGEST // (len(tile.nodes(elements)) * samples))
         if not tile.alone or paths.count <= most:
             _add_tile(out, tile, paths, stage)
             continue
@@ -85,8 +86,9 @@ def add_segment(
 def _in_parts(front: Wavefronts, sensors: int) -> Wavefronts:
     """Paths of which none misses less than half of the hydrophones: those that do reach all, and after all paths there
     is one for each that takes away what the few hear of it."""
-    missed = np.bitwise_count(front.occluded).sum(axis=1)
-    if not (most := np.flatnonzero((missed > 0) & (2 * missed < sensors))).size:
+    some = np.flatnonzero(front.occluded.any(axis=1))
+    most = some[2 * np.bitwise_count(front.occluded[some]).sum(axis=1) < sensors]
+    if not most.size:
         return front
     occluded = front.occluded.copy()
     occluded[most] = 0
@@ -144,11 +146,11 @@ def _hear(
         if paths.occluded.any():
             gain *= ~paths.hidden(elements.count)
     onto, column, weight = to_sensors(elements, tile.axes, stage.dtype)
-    wave = np.stack([wave[:, :, ::2], wave[:, :, 1::2]], axis=2).reshape(len(wave), -1, weight.shape[1] * 2 * length)
-    wave = (wave if onto is None else onto @ wave).reshape(len(wave), -1, weight.shape[1], 2, length)
     late, first = 2.0 * stage.segment.samples * stage.bins.step * delay, stage.segment.first + begin
-    for n in range(len(wave)):
-        hear(wave[n], column, weight, late[n], gain[n], stage.wave.taps, stage.wave.lanes, int(first[n]), out)
+    for n, whole in enumerate(wave):
+        halves = whole.reshape(-1, length, 2).swapaxes(1, 2).reshape(-1, weight.shape[1] * 2 * length)
+        field = (halves if onto is None else onto @ halves).reshape(-1, weight.shape[1], 2, length)
+        hear(field, column, weight, late[n], gain[n], stage.wave.taps, stage.wave.lanes, int(first[n]), out)
 
 
 def _shorter(stage: Stage, length: int) -> Stage:
