@@ -71,6 +71,7 @@ def add_segment(
     wave = kernel(-8 * (-width // 8), samples * bins.step / highest, 2 * samples, dtype)  # as wide as its lanes
     tails = highest > stop or tolerance <= 10.0 * filters.SUPPORT_TOLERANCE
     stage = Stage(aim, bins, origin, segment, grid, oversampling, wave, dtype, tails)
+    front = Wavefronts(**{name: getattr(front, name) for name in Wavefronts.__dataclass_fields__})  # no more is needed
     front = _in_parts(front.without_faint_shadows(0.1 * tolerance, elements), elements.count)
     for tile in tiles(front, aim) if front.count else ():
         paths = tile.reference if tile.alone else front.select(tile.paths)
