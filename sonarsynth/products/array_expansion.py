@@ -52,6 +52,16 @@ def _kept_terms(position: bytes, aperture: float, monomials: tuple[int, ...]) ->
     return polynomials
 
 
+@lru_cache(maxsize=256)
+def _kept_gradient(position: bytes, aperture: float, monomials: tuple[int, ...]) -> Floats:
+    places, step = np.frombuffer(position).reshape(-1, 3), 1e-4 * aperture
+    sides = places + step * np.array([1.0, -1.0])[:, None, None, None] * np.eye(3)[:, None]  # (side, axis, point, xyz)
+    ahead, behind = aperture_terms(sides, aperture, max(monomials, default=0) + 1)[..., list(monomials)]
+    gradient = np.asarray((ahead - behind) / (2.0 * step))
+    gradient.setflags(write=False)
+    return gradient
+
+
 @dataclass(frozen=True, eq=False)
 class ArrayExpansion(Columns):
     """Paths over an aperture: polynomials through values at probe sensors, and one matrix from there to all sensors.
@@ -114,8 +124,8 @@ class ArrayExpansion(Columns):
         """How much of each degree (path, degree) there is in 1 + amplitude b(q): the moduli of its terms, summed."""
         terms = self.amplitude.shape[1]
         gain = np.abs(self.amplitude + np.eye(1, terms)) if terms else np.ones((len(self.amplitude), 1))
-        starts = [self.first(n) for n in range(len(FIRST_OF_DEGREE))]
-        return np.asarray(np.add.reduceat(gain, [n for n in starts if n < gain.shape[1]], axis=1))
+        degree = np.searchsorted(FIRST_OF_DEGREE, self.monomials[: gain.shape[1]], side="right") - 1
+        return gain @ np.eye(1 + degree[-1])[degree]
 
     def first(self, degree: int) -> int:
         """The first term of a degree."""
@@ -123,11 +133,8 @@ class ArrayExpansion(Columns):
 
     def gradient(self, points: Floats, *names: str) -> Floats:
         """Gradient (xyz, point, term) in 1/m of as many polynomials as some quantities have, at places (point, xyz)."""
-        terms, step = max(getattr(self, name).shape[1] for name in names), 1e-4 * self.aperture
-        if not terms:
-            return np.zeros((3, 0, 0))
-        sides = [[self._terms_at(points + sign * axis, terms) for sign in (1, -1)] for axis in step * np.eye(3)]
-        return np.array([(ahead - behind) / (2.0 * step) for ahead, behind in sides])
+        terms = max(getattr(self, name).shape[1] for name in names)
+        return _kept_gradient(points.tobytes(), self.aperture, self.monomials[:terms])
 
     def _terms_at(self, points: Floats, terms: int) -> Floats:
         """The first polynomials at places (point, xyz): (point, term)."""

@@ -260,8 +260,8 @@ def reach(front: Wavefronts) -> Floats:
 def face_reach(front: Wavefronts, elements: Elements) -> Floats:
     """Bound (path,) on how long (s) before or after the middle of a hydrophone's face a wave meets its edges."""
     turned = front.aperture * front.curvature  # from the array centre to its rim, rad
-    along = np.minimum(np.abs(front.direction[:, 1:]) + turned[:, None], 1.0)
-    return np.asarray(0.5 * elements.face / front.sound_speed * along.sum(axis=1))
+    y, z = (np.minimum(np.abs(along) + turned, 1.0) for along in front.direction.T[1:])
+    return np.asarray(0.5 * elements.face / front.sound_speed * (y + z))
 
 
 def steered_spread(front: Wavefronts, rows: Ints | slice) -> float:

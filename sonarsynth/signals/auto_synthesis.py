@@ -17,6 +17,8 @@ from sonarsynth.state import Emission
 DEFAULT_ERROR = 3e-4
 """Error of the synthesis where no plan says what is allowed."""
 PRECISIONS: Final[tuple[Literal["float32", "float64"], ...]] = ("float32", "float64")
+KERNELS: Final = ((8, 1.25), (8, 1.5), (8, 2.0), (16, 1.25), (16, 1.5))
+"""Widths, which cost as much as the next multiple of eight, and oversamplings of the deposit, from the cheapest on."""
 LEFT = 0.3
 """Share of the error allowed that kernel and precision must leave to the other approximations."""
 LEAST_TOLERANCE, MOST_TOLERANCE = 1e-10, 1e-2
@@ -24,15 +26,15 @@ LEAST_TOLERANCE, MOST_TOLERANCE = 1e-10, 1e-2
 
 def deposit_for(error: float, bandwidth: float = np.inf) -> GriddedSynthesis:
     """The cheapest `GriddedSynthesis` whose error in a band (Hz) is no more, or the most exact one."""
-    for width in range(6, 17, 2):
-        kernel = kernel_error(width, GriddedSynthesis().oversampling, bandwidth)
+    for width, oversampling in KERNELS:
+        kernel = kernel_error(width, oversampling, bandwidth)
         for precision in PRECISIONS:
             allowed = (error - kernel - ROUNDING[precision]) / error_over_tolerance(bandwidth)
             if allowed >= LEFT * error / error_over_tolerance(bandwidth):
                 tolerance = min(allowed, MOST_TOLERANCE)
                 digit = 10.0 ** np.floor(np.log10(tolerance))
                 down = float(f"{np.floor(tolerance / digit) * digit:.1g}")
-                return GriddedSynthesis(width=width, precision=precision, tolerance=down)
+                return GriddedSynthesis(width=width, oversampling=oversampling, precision=precision, tolerance=down)
     return GriddedSynthesis(width=16, precision="float64", tolerance=LEAST_TOLERANCE)
 
 

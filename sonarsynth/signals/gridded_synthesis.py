@@ -135,7 +135,9 @@ class GriddedSynthesis(UnroundedSynthesis):
 
     def row(self) -> str:
         """Its kind and what it is set to."""
-        return f"{self.kind}, width {self.width}, tolerance {self.tolerance:.1g}, {self.precision}"
+        return (
+            f"{self.kind}, width {self.width} x {self.oversampling:g}, tolerance {self.tolerance:.1g}, {self.precision}"
+        )
 
     def pressure(
         self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception

@@ -115,7 +115,7 @@ def from_the_sharpest(front: ArrayPaths, highest: float) -> ArrayPaths:
 
 def _loudest(loud: Floats) -> Ints:
     """The loudest (path,), not those that are silent."""
-    order = np.argsort(-loud, kind="stable")[:LOUDEST]
+    order = np.argsort(-loud)[:LOUDEST]
     return np.asarray(order[loud[order] > 0.0])
 
 

@@ -166,7 +166,7 @@ def _runs(rows: Ints, early: Floats, late: Floats) -> Iterator[Ints]:
     if early[rows].max() <= late[rows].min():  # all of them at one time
         yield rows
         return
-    order = rows[np.argsort(early[rows], kind="stable")]
+    order = rows[np.argsort(early[rows])]
     silent = early[order[1:]] > np.maximum.accumulate(late[order])[:-1]
     for run in np.split(order, np.flatnonzero(silent) + 1):
         yield np.sort(run)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy.fft import irfft, rfft
 
 from sonarsynth.conventions import Complexes, Floats
 from sonarsynth.description import FieldError
@@ -51,12 +52,16 @@ class Bins(NamedTuple):
         frequency, spectrum, relative = self.frequency[first], self.spectrum[first], self.relative[first]
         return self._replace(frequency=frequency, spectrum=spectrum, relative=relative, modes=self.modes[:, first])
 
-    def every(self, share: int) -> Bins:
-        """One bin in `share`: those of a segment that is shorter by this factor."""
-        some = slice(-self.first % share, None, share)
-        frequency, spectrum, relative = self.frequency[some], self.spectrum[some], self.relative[some]
-        first, modes = -(-self.first // share), self.modes[:, some]
-        return Bins(first, frequency, spectrum, relative, share * self.step, modes, self.changes)
+    def shorter(self, period: int, samples: int, early: float) -> Bins:
+        """Those of a segment of so many samples, not `period`; a share `early` of these are before a pulse arrives."""
+        both, before = np.zeros((1 + len(self.modes), period // 2 + 1), complex), round(early * samples)
+        both[:, self.first : self.first + self.frequency.size] = np.concatenate([self.spectrum[None], self.modes])
+        wave = np.delete(irfft(both, period, axis=1), slice(samples - before, period - before), axis=1)
+        step = self.step * period / samples
+        first, last = int(self.frequency[0] / step), min(int(np.ceil(self.frequency[-1] / step)), samples // 2)
+        frequency = np.asarray(step * np.arange(first, last + 1), float)
+        spectra, relative = rfft(wave, axis=1)[:, first : last + 1], np.interp(frequency, self.frequency, self.relative)
+        return Bins(first, frequency, spectra[0], relative, step, spectra[1:], self.changes)
 
 
 def audible(spectrum: Complexes, tolerance: float) -> slice:

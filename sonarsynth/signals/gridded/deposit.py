@@ -71,15 +71,32 @@ def add_segment(
     wave = kernel(-8 * (-width // 8), samples * bins.step / highest, 2 * samples, dtype)  # as wide as its lanes
     tails = highest > stop or tolerance <= 10.0 * filters.SUPPORT_TOLERANCE
     stage = Stage(aim, bins, origin, segment, grid, oversampling, wave, dtype, tails)
-    front = front.without_faint_shadows(0.1 * tolerance, elements)
+    front = Wavefronts(**{name: getattr(front, name) for name in Wavefronts.__dataclass_fields__})  # no more is needed
+    front = _in_parts(front.without_faint_shadows(0.1 * tolerance, elements), elements.count)
     for tile in tiles(front, aim) if front.count else ():
-        paths, most = front.select(tile.paths), max(1, LARGEST // (len(tile.nodes(elements)) * samples))
+        paths = tile.reference if tile.alone else front.select(tile.paths)
+        most = max(1, LARGEST // (len(tile.nodes(elements)) * samples))
         if not tile.alone or paths.count <= most:
             _add_tile(out, tile, paths, stage)
             continue
         for first in range(0, paths.count, most):
             some = paths.select(np.arange(first, min(first + most, paths.count)))
             _add_tile(out, replace(tile, paths=tile.paths[first : first + most], reference=some), some, stage)
+
+
+def _in_parts(front: Wavefronts, sensors: int) -> Wavefronts:
+    """Paths of which none misses less than half of the hydrophones: those that do reach all, and after all paths there
+    is one for each that takes away what the few hear of it."""
+    some = np.flatnonzero(front.occluded.any(axis=1))
+    most = some[2 * np.bitwise_count(front.occluded[some]).sum(axis=1) < sensors]
+    if not most.size:
+        return front
+    occluded = front.occluded.copy()
+    occluded[most] = 0
+    parts = front.but(occluded=occluded).select(np.append(np.arange(front.count), most))
+    parts.occluded[front.count :] = ~front.occluded[most] & np.packbits(np.arange(1 + sensors) > 0)
+    parts.amplitude[front.count :] *= -1.0
+    return parts
 
 
 def _on_grid(bins: Bins, highest: float, width: int, oversampling: float, dtype: str) -> tuple[Bins, Kernel]:
@@ -130,24 +147,23 @@ def _hear(
         if paths.occluded.any():
             gain *= ~paths.hidden(elements.count)
     onto, column, weight = to_sensors(elements, tile.axes, stage.dtype)
-    wave = np.stack([wave[:, :, ::2], wave[:, :, 1::2]], axis=2).reshape(len(wave), -1, weight.shape[1] * 2 * length)
-    wave = (wave if onto is None else onto @ wave).reshape(len(wave), -1, weight.shape[1], 2, length)
     late, first = 2.0 * stage.segment.samples * stage.bins.step * delay, stage.segment.first + begin
-    for n in range(len(wave)):
-        hear(wave[n], column, weight, late[n], gain[n], stage.wave.taps, stage.wave.lanes, int(first[n]), out)
+    for n, whole in enumerate(wave):
+        halves = whole.reshape(-1, length, 2).swapaxes(1, 2).reshape(-1, weight.shape[1] * 2 * length)
+        field = (halves if onto is None else onto @ halves).reshape(-1, weight.shape[1], 2, length)
+        hear(field, column, weight, late[n], gain[n], stage.wave.taps, stage.wave.lanes, int(first[n]), out)
 
 
 def _shorter(stage: Stage, length: int) -> Stage:
     """A stage of a stretch that holds no more than `length` samples, where that is a part of it: of fewer bins."""
-    bins, samples = stage.bins, stage.segment.samples
-    most = max(min(samples // length, bins.frequency.size // 8), 1)
-    share = max(n for n in range(1, most + 1) if n == 1 or samples % (2 * n) == 0)
-    if share == 1:
+    bins, segment, length = stage.bins, stage.segment, 2 * int(next_fast_len(-(-length // 2), real=True))
+    if 8 * length > 7 * segment.samples:
         return stage
-    wave = kernel(stage.wave.width, samples * bins.step / stage.aim.highest, 2 * samples // share, stage.dtype)
-    segment, of_grid = replace(stage.segment, samples=samples // share), (stage.grid.width, stage.oversampling)
-    bins, grid = _on_grid(bins.every(share), stage.aim.highest, *of_grid, stage.dtype)
-    return stage._replace(bins=bins, segment=segment, grid=grid, wave=wave)
+    rate, early = segment.samples * bins.step, segment.before / (segment.before + segment.after)
+    wave = kernel(stage.wave.width, rate / stage.aim.highest, 2 * length, stage.dtype)
+    bins = bins.shorter(segment.samples, length, early)
+    bins, grid = _on_grid(bins, stage.aim.highest, stage.grid.width, stage.oversampling, stage.dtype)
+    return stage._replace(bins=bins, segment=replace(segment, samples=length), grid=grid, wave=wave)
 
 
 def _alone(tile: Tile, paths: Wavefronts, points: Floats, begin: Floats, stage: Stage) -> npt.NDArray[Any]:

@@ -98,14 +98,14 @@ class _Views:
     own: bool  # no nodes can stand for the hydrophones: a source is within or about that box, or paths miss some
 
 
-def _views(front: Wavefronts, aim: TileSettings, missed: bool) -> _Views:
+def _views(front: Wavefronts, aim: TileSettings) -> _Views:
     elements = aim.elements
     near = bool(front.curvature.max() * np.linalg.norm(np.abs(elements.position).max(axis=0)) > 0.8)
     probes = _probes(elements, near)
     gradient = aperture_gradient(front, probes.points)
     bend = slopes(front, gradient, aim.weights[0] * aim.highest, aim.highest)
     amplitude = np.multiply(np.abs(front.amplitude), front.expansion.amplitude_degrees.T, order="C")
-    return _Views(front, _columns(front, probes.points, gradient), amplitude, probes, gradient, bend, near or missed)
+    return _Views(front, _columns(front, probes.points, gradient), amplitude, probes, gradient, bend, near)
 
 
 def _columns(front: Wavefronts, probes: Floats, gradient: Floats) -> Floats:
@@ -133,7 +133,7 @@ class _Extent(NamedTuple):
     modes: tuple[float, ...]  # sizes of the modes of the pulses' shapes
 
     def half(self) -> _Extent:
-        """The best that halving can give."""
+        """The best that halving can give; in one direction it seldom gives as much."""
         y, z = self.turn
         phase, modes = tuple(0.5 * p for p in self.phase), (1.0, *(0.5 * m for m in self.modes[1:]))
         return _Extent(0.5 * self.paths, phase, self.drift, self.degrees, (0.5 * y, 0.5 * z), 0.5 * self.decay, modes)
@@ -238,24 +238,20 @@ def _halves(trial: _Trial, views: _Views, aim: TileSettings) -> tuple[Ints, Ints
 def tiles(front: Wavefronts, aim: TileSettings) -> list[Tile]:
     """The tiles of predicted least cost: each is halved while that pays; the first halving may pay only with the
     second. Paths that miss some hydrophones are apart: each of these is a node of their tiles."""
-    if (apart := steep(front, aim.highest)).any():
-        left = np.flatnonzero(~apart)
-        others = [replace(t, paths=left[t.paths]) for t in tiles(front.select(left), aim)] if left.size else []
-        return [_alone(np.flatnonzero(apart), front, aim), *others]
-    missed = front.occluded.any(axis=1)
-    if not missed.any() or missed.all():
-        return _tiles(front, aim, bool(missed.any()))
-    rows = [np.flatnonzero(~missed), np.flatnonzero(missed)]
-    groups = [(group, _tiles(front.select(group), aim, n == 1)) for n, group in enumerate(rows)]
-    return [replace(tile, paths=group[tile.paths]) for group, of_group in groups for tile in of_group]
+    apart, missed = steep(front, aim.highest), front.occluded.any(axis=1)
+    chosen = [_alone(np.flatnonzero(apart), front, aim)] if apart.any() else []
+    groups = [(np.flatnonzero(~apart & (missed == misses)), misses) for misses in (False, True)]
+    chosen += [_alone(paths, front, aim) for paths, _ in groups if 0 < paths.size <= FEW]
+    if many := [group for group in groups if group[0].size > FEW]:
+        views = _views(front, aim)
+        chosen += [tile for paths, misses in many for tile in _tiles(paths, views, aim, misses)]
+    return chosen
 
 
-def _tiles(front: Wavefronts, aim: TileSettings, missed: bool) -> list[Tile]:
+def _tiles(paths: Ints, views: _Views, aim: TileSettings, missed: bool) -> list[Tile]:
     """The tiles of paths of one kind."""
-    if front.count <= FEW:
-        return [_alone(np.arange(front.count), front, aim)]
-    views = _views(front, aim, missed)
-    trial = _try(np.arange(front.count), views, aim)
+    front, views = views.front, replace(views, own=views.own or missed)
+    trial = _try(paths, views, aim)
     if not missed:
         return _best(trial, views, aim, patient=True)
     best = [trial.tile] if _alone_pays(trial.tile, front, aim) else _best(trial, views, aim, patient=True)
@@ -289,7 +285,7 @@ def _best(trial: _Trial, views: _Views, aim: TileSettings, patient: bool) -> lis
     tile = trial.tile
     if trial.extent is None:
         return [tile]
-    possible = tile.cost == np.inf or 2.0 * _cheapest(trial.extent.half(), aim)[2] < tile.cost
+    possible = tile.cost == np.inf or 2.0 * _cheapest(trial.extent.half(), aim)[2] < 0.9 * tile.cost
     halves = _halves(trial, views, aim) if possible else None
     if halves is None:
         return [tile]
