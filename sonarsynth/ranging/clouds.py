@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, azimuth_elevation, direction
+from sonarsynth.conventions import Floats, azimuth_elevation, depth, direction
 from sonarsynth.description.method import returned_rows
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.arrays.apertures import defocus_spread
@@ -24,6 +24,9 @@ from sonarsynth.receiver.mirror_images import plane_normal
 if TYPE_CHECKING:
     from sonarsynth.ranging.picking import PickingMethod
     from sonarsynth.ranging.placing import PlacingMethod
+
+LEAST_HEIGHT = 0.5
+"""m: above and below the middle of the way of an echo, over which gradients are taken at least."""
 
 
 def point_cloud(
@@ -50,6 +53,7 @@ def point_cloud(
     echoes = replace(echoes, delay_error=np.hypot(echoes.delay_error, window.late))
     echoes = _with_defocus(echoes, solution.range, window)
     error = range_error(solution, echoes, window.estimates, window.sonar)
+    echoes = echoes if profile.uniform else _with_bending(echoes, beam, solution.range, sonar_pose, profile)
     cloud = PointCloud(
         position=solution.position.astype(np.float32),
         range=solution.range.astype(np.float32),
@@ -84,6 +88,28 @@ def _with_defocus(echoes: PickedEchoes, distance: Floats, window: ReceivedWindow
         echoes,
         azimuth_error=np.minimum(np.hypot(echoes.azimuth_error, across / np.maximum(level, 0.1)), np.pi),
         elevation_error=np.minimum(np.hypot(echoes.elevation_error, along), np.pi),
+    )
+
+
+def _with_bending(
+    echoes: PickedEchoes, beam: Floats, distance: Floats, sonar_pose: Pose, profile: Profile
+) -> PickedEchoes:
+    """Echoes with what bent rays add to the errors of directions, which are those of rays as they arrive: an arc is
+    r g cos a/(2c) beside its chord in the vertical plane, r the distance (echo,) m, g the mean gradient of the sound
+    speed on the way."""
+    up, own = sonar_pose.rotation[2], float(depth(sonar_pose.position))
+    other = np.maximum(own - distance * (beam @ up), 0.0)
+    middle, half = 0.5 * (own + other), np.maximum(0.5 * np.abs(other - own), LEAST_HEIGHT)
+    gradient = (profile.at(middle + half) - profile.at(middle - half)) / (2.0 * half)
+    arc = 0.5 * distance * np.abs(gradient) / float(profile.at(own))
+    port = arc * (direction(echoes.azimuth + 0.5 * np.pi, np.zeros(len(beam))) @ up)
+    upward = arc * (direction(echoes.azimuth, echoes.elevation + 0.5 * np.pi) @ up)
+    return replace(
+        echoes,
+        azimuth_error=np.minimum(
+            np.hypot(echoes.azimuth_error, port / np.maximum(np.cos(echoes.elevation), 0.1)), np.pi
+        ),
+        elevation_error=np.minimum(np.hypot(echoes.elevation_error, upward), np.pi),
     )
 
 

@@ -61,6 +61,9 @@ FAMILIES = {
     "straight placing in water that bends rays": Family(
         PING, gradient=-0.5, processing=TOLD | {"placing": ss.AutoPlacing()}
     ),
+    "straight placing in water that bends rays more": Family(
+        PING, gradient=1.0, processing=TOLD | {"placing": ss.AutoPlacing()}
+    ),
     "one echo a beam": Family(PING, processing=TOLD | {"picking": ss.BeamAxis()}),
     "the first echo": Family(PING, processing=TOLD | {"picking": ss.FirstEcho()}),
 }
@@ -141,7 +144,8 @@ NAMES = (
 @pytest.mark.parametrize("name", FAMILIES)
 def test_points_err_by_what_is_predicted(name: str) -> None:
     """Of 32 scenes. Ranges were predicted to err by 3 times too much, by 50 where a beam of a ping has one echo, by
-    half too much where the speed that is off moves the located snap as well."""
+    half too much where the speed that is off moves the located snap as well. Elevations were 1.9 predicted
+    errors off in a gradient of 1 1/s."""
     rows = np.concatenate([pulls(FAMILIES[name], seed) for seed in range(32)])
     ranges, angles = np.sqrt(np.mean(rows[:, 0] ** 2)), np.sqrt(np.mean(rows[:, 1:] ** 2))
     assert len(rows) > 40
