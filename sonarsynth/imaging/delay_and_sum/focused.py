@@ -60,8 +60,8 @@ class FocusedDelayAndSum(Steering):
     whose measured error is allowed; elsewhere, the fewest whose `focus_error` is under 0.1 dB, or 16 each way. Those
     that sound is traced to are `physics.subarrays`."""
     bins: Literal["few", "all", "auto"] = "auto"
-    """Frequencies of the window that energies are summed over: as few as its sound needs, which is shorter (0.01 dB),
-    or all. Auto: few in a plan, by the error that it measures; else all."""
+    """Frequencies of the window that energies are summed over: as few as sound with silence in it needs (0.02 dB), or
+    all. Auto: few in a plan, by the error that it measures; else all."""
 
     def resolve(self, demand: Demand) -> tuple[FocusedDelayAndSum | DenseDelayAndSum, float]:
         """With the recipe's subarrays; left to the plan, the fewest that err by no more than is allowed (dB)."""
