@@ -75,25 +75,30 @@ def _put_powers(energy: Any, mirror: int, other: int, row: int, column: int, pow
 @compiled(forceinline=True)
 def _add_powers(
     lines: Any, start: int, columns: int, odd: bool, across: Any, turns: Any, at: int, frequency: float, spacing: float,
-    groups: int, energy: Any, mirror: int, row: int,
+    groups: int, energy: Any, row: int,
 ) -> None:  # fmt: skip
-    """Add |B|^2 of the beams of one elevation, and of their mirror images along y, of an array that is its only
-    subarray: half steps from `at` on."""
-    azimuths = energy.shape[2]
+    """Add |B|^2 of the beams of one elevation and of their mirror images, of an array that is its only subarray: half
+    steps from `at` on."""
+    azimuths, size, none = energy.shape[2], columns * TERM, (splat(ZERO), splat(ZERO))
     for i in range(0, azimuths, 2):
         j = min(i + 1, azimuths - 1)
         c, s = phasors(across[at + i], frequency, spacing)
         d, t = phasors(across[at + j], frequency, spacing)
-        near, far = (splat(ZERO), splat(ZERO)), (splat(ZERO), splat(ZERO))
+        near, far, near_down, far_down = none, none, none, none
         for group in range(groups):
-            first = start + group * columns * TERM
-            inner, outer = term_sums(lines, first, first + columns * TERM, odd, c, s, d, t)
+            first = start + group * size
+            inner, outer = term_sums(lines, first, first + size, odd, c, s, d, t)
             near, far = _with_powers(near, *upper(inner)), _with_powers(far, *upper(outer))
+            first += GROUPS * size
+            inner, outer = term_sums(lines, first, first + size, odd, c, s, d, t)
+            near_down, far_down = _with_powers(near_down, *upper(inner)), _with_powers(far_down, *upper(outer))
             c, s = groups_on(c, s, turns, at + i)
             d, t = groups_on(d, t, turns, at + j)
-        _put_powers(energy, mirror, mirror + 1, row, i, near)
+        _put_powers(energy, 0, 1, row, i, near)
+        _put_powers(energy, 2, 3, row, i, near_down)
         if j > i:
-            _put_powers(energy, mirror, mirror + 1, row, j, far)
+            _put_powers(energy, 0, 1, row, j, far)
+            _put_powers(energy, 2, 3, row, j, far_down)
 
 
 @compiled(forceinline=True)
@@ -160,11 +165,10 @@ def lattice_energies(
                                 np.float32(1.0), first, spacing, groups, beams, (row + which) * azimuths,
                             )  # fmt: skip
                         else:
-                            for down in range(2):
-                                _add_powers(
-                                    lines, start + down * GROUPS * columns * TERM, columns, odd_columns, across, port,
-                                    at, first, spacing, groups, energy, 2 * down, row + which,
-                                )  # fmt: skip
+                            _add_powers(
+                                lines, start, columns, odd_columns, across, port, at, first, spacing, groups, energy,
+                                row + which,
+                            )  # fmt: skip
             if count > 1:
                 _add_powers_of_beams(beams, groups, energy, mirror)
     return energy
