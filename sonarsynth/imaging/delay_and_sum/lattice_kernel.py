@@ -126,9 +126,9 @@ def lattice_energies(
     pairs, bins a multiple of LANES, the last sensor silent; places (mirror, subarray, column, row, 4), from the middle
     of a subarray outwards: sensors at (+z, +y), (+z, -y), (-z, +y), (-z, -y), the silent one for none;
     weight (sensor + 1,) float32; delay (subarray, column, row, side of y) s, of focusing; heights (subarray, column)
-    rows in use; rise (elevation, subarray, side of y, column) and across (subarray, elevation, azimuth): half of what a wave is
-    sooner (s) at the next row up and at the next column to port; middle (subarray, elevation, azimuth): what it is
-    later (s) in the middle of the subarray; frequency, spacing: of bin 0 and between bins (Hz).
+    rows in use; rise (elevation, subarray, side of y, column) and across (subarray, elevation, azimuth): half of what a
+    wave is sooner (s) at the next row up and at the next column to port; middle (subarray, elevation, azimuth): what it
+    is later (s) in the middle of the subarray; frequency, spacing: of bin 0 and between bins (Hz).
     """
     _, count, columns, rows, _ = places.shape
     _, elevations, azimuths = across.shape
