@@ -131,6 +131,12 @@ def _fold(terms: Any, at: int, plus: Any, minus: Any) -> None:
 
 
 @compiled(forceinline=True)
+def _turned(pairs: Any, at: int, weight: float, c: Any, s: Any) -> Any:
+    x, y = weighted(pairs, 2 * at, weight)
+    return turned(x, y, c, s)
+
+
+@compiled(forceinline=True)
 def focus(
     pairs: Any, bins: int, low: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float, folded: Any
 ) -> None:  # fmt: skip
@@ -145,12 +151,12 @@ def focus(
                 e, u = phasors(delay[0, n, m, side], frequency, spacing)
                 f, v = phasors(delay[1, n, m, side], frequency, spacing)
                 above = (
-                    *turned(*weighted(pairs, 2 * (a * bins + low), weight[a]), e, u),
-                    *turned(*weighted(pairs, 2 * (b * bins + low), weight[b]), f, v),
+                    *_turned(pairs, a * bins + low, weight[a], e, u),
+                    *_turned(pairs, b * bins + low, weight[b], f, v),
                 )
                 below = (
-                    *turned(*weighted(pairs, 2 * (c * bins + low), weight[c]), e, u),
-                    *turned(*weighted(pairs, 2 * (d * bins + low), weight[d]), f, v),
+                    *_turned(pairs, c * bins + low, weight[c], e, u),
+                    *_turned(pairs, d * bins + low, weight[d], f, v),
                 )
                 _fold(folded, ((side * columns + n) * rows + m) * TERM, above, below)
 

@@ -36,6 +36,9 @@ ASIDE = 1e-3
 """Of half a window that is cut out about a pulse: where one is farther aside of its pulse than that, all are cut anew.
 Cut aside of its pulse, a tail shifts it by 1 % of that: 16 ns, or 1.5 degrees, of a pulse of 3 kHz along the array.
 """
+FEW = 64
+"""Sensors, about, that the first fit is made of where it errs by under `SURE` periods of the band centre; else all."""
+SURE = 0.01
 ROBUST_ROUNDS = 3
 """Reweightings that turn outliers out of the first fit, at most."""
 FIRST_STEPS = 3
@@ -140,9 +143,8 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
     if pulse.share > SHARED and pulse.noise > AUDIBLE * knowledge.quiet:
         return refused(UNRESOLVED)
     row = _placed(wave, pulse, elements, knowledge, bend)
-    return replace(
-        row, time_error=float(np.hypot(row.time_error, _clipping_error(signals, elements, sonar, centre, half)))
-    )
+    clipping = _clipping_error(signals, elements, sonar, centre, half)
+    return replace(row, time_error=float(np.hypot(row.time_error, clipping)))
 
 
 def _placed(
@@ -224,18 +226,21 @@ def _first_wave(
 ) -> tuple[Wavefront, float] | None:
     """Wavefront through the envelope peaks of the sensors, as of `fit_pulse`, and the standard error (s) of its times,
     root mean square over the sensors; None where none fits."""
-    c, q, live = sonar.assumed_sound_speed, elements.position, elements.gain != 0
-    cut, start = pulse_times.excerpt(signals, centre, half)
-    delay, height = pulse_times.envelope_peaks(cut, signals.sampling_frequency, sonar.band)
-    loud = height**2 * live  # who hears more counts more
-    times, settled = start + delay, pulse_times.FLOOR
-    wave = robust_wave(times, q, c, loud, steps=FIRST_STEPS, rounds=ROBUST_ROUNDS, settled=settled)
-    if wave is None:
+    c, (cut, start), settled = sonar.assumed_sound_speed, pulse_times.excerpt(signals, centre, half), pulse_times.FLOOR
+    for every in (max(elements.count // FEW, 1), 1):
+        q, live = elements.position[::every], elements.gain[::every] != 0
+        delay, height = pulse_times.envelope_peaks(cut[::every], signals.sampling_frequency, sonar.band)
+        loud = height**2 * live  # who hears more counts more
+        wave = robust_wave(start + delay, q, c, loud, steps=FIRST_STEPS, rounds=ROBUST_ROUNDS, settled=settled)
+        if wave is not None:
+            off = 1.4826 * float(np.median(np.abs(wave.residual[live]))) * float(np.sqrt(4.0 / np.count_nonzero(live)))
+            if every == 1 or off < SURE / sonar.band.centre:
+                break
+    else:
         return None
-    off = 1.4826 * float(np.median(np.abs(wave.residual[live]))) * float(np.sqrt(4.0 / np.count_nonzero(live)))
     if velocity.any():
         passing = _times(wave, q, c)
-        wave = fit_wave(passing, q + (passing - wave.time)[:, None] * velocity, c, loud, wave)
+        wave = fit_wave(passing, q + (passing - wave.time)[:, None] * velocity[::every], c, loud, wave)
     return None if wave is None else (wave, off)
 
 
@@ -283,12 +288,7 @@ def _settled(wave: Wavefront, last: Wavefront, position: Floats, sound_speed: fl
 
 
 def _refit(
-    pulse: Pulse,
-    wave: Wavefront,
-    elements: Elements,
-    speed: float,
-    extra: Floats | float,
-    measured: float | None = None,
+    pulse: Pulse, wave: Wavefront, elements: Elements, speed: float, extra: Floats | float, measured: float = 0.0
 ) -> Wavefront:
     """The straight wave at `speed` (m/s) that is left when delays `extra` (sensor,) in s are taken away.
 
