@@ -248,8 +248,8 @@ def _received(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> Received
     image, signals, estimates, beams = beamformed.image, beamformed.imaged, beamformed.estimates, beamformed.beams
     if image is None or signals is None or estimates is None or beams is None:
         return None
-    loudest, supports = ranging_kernels.peak(signals.pressure), plan.windows.supports
-    elements, sonar = known_elements(plan, frame), plan.scene.sonar
+    elements, sonar, supports = known_elements(plan, frame), plan.scene.sonar, plan.windows.supports
+    loudest = ranging_kernels.power_and_peak(signals.pressure, elements.gain != 0)[1]
     focus, direct = plan.choices.beamforming.focus, beamformed.signals
     return ReceivedWindow(
         elements, sonar, image, beams, loudest, direct, estimates, focus, supports.late, supports.direct

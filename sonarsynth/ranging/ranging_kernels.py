@@ -42,16 +42,6 @@ def power_and_peak(pressure: Any, live: Any) -> Any:
 
 
 @compiled
-def peak(pressure: Any) -> float:
-    """The largest |pressure| (sensor, sample)."""
-    high = np.zeros(pressure.shape[1], pressure.dtype)
-    for q in range(pressure.shape[0]):
-        for n in range(pressure.shape[1]):
-            high[n] = max(high[n], abs(pressure[q, n]))
-    return float(high.max()) if len(high) > 0 else 0.0
-
-
-@compiled
 def powers(waves: Any, taps: Any, power: Any) -> None:
     """Write |.|^2 of complex waves (beam, sample), and of what they are halfway between samples, into power (beam, two
     for a sample), as many as it has.

@@ -24,8 +24,6 @@ LONGEST = 0.8
 """Longest sound that the ends of the band are weighted for, over the inverse of the bins' distance."""
 FEWEST = 84
 """Bins that are left, at least: of 64 the ends of the band err by 0.01 to 0.03 dB, of 84 by 0.004 to 0.01."""
-BLOCKS = 256
-"""Blocks that power is summed in, at most: of the longest travel time otherwise."""
 WEIGHTED = 200
 """Most bins whose weights are solved for: of more, those in the middle weigh one. Over 600 to 1000 bins that changes
 weights by 1e-4, and the sum by 1e-5 of what the weights leave wrong."""
@@ -51,7 +49,7 @@ def fewer_bins(snapshots: Snapshots, travel_time: float) -> Snapshots:
 def _longest_step(snapshots: Snapshots, travel_time: float, most: int) -> int:
     """From bin to bin, `most` at most, with which `OVERLAP` is kept: of all sensors together, give or take a block."""
     rate, power = snapshots.sampling_frequency, snapshots.sample_power
-    block = max(round(travel_time * rate), -(-len(power) // BLOCKS))
+    block = max(round(travel_time * rate), -(-len(power) // 256))
     amplitude = np.sqrt(np.add.reduceat(power, np.arange(0, len(power), block), dtype=float))
     shared = np.zeros(2 * len(amplitude) + 1)  # by blocks later
     shared[: len(amplitude)] = np.correlate(amplitude, amplitude, "full")[len(amplitude) - 1 :]

@@ -93,5 +93,5 @@ def _halves(elements: Elements, focus: float | None, sound_speed: float) -> tupl
     )  # fmt: skip
     used = rows_in_use(np.min(places, axis=(0, 3)) < nobody)
     later = np.append(focus_delay(elements.position, AHEAD, focus, sound_speed), 0.0)[places]
-    later = np.where(places[..., :2] < nobody, later[..., :2], later[..., 2:])
-    return places, used, columns, 0.5 * elements.pitch * (elements.columns - columns), later
+    middle = 0.5 * elements.pitch * (elements.columns - columns)
+    return places, used, columns, middle, np.maximum(later[..., :2], later[..., 2:])  # the silent one has no delay

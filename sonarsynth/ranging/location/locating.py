@@ -37,8 +37,7 @@ ASIDE = 1e-3
 Cut aside of its pulse, a tail shifts it by 1 % of that: 16 ns, or 1.5 degrees, of a pulse of 3 kHz along the array.
 """
 FEW = 64
-"""Sensors, about, that the first fit is made of where it errs by under `SURE` periods of the band centre; else all."""
-SURE = 0.01
+"""Sensors, about, that the first fit is made of where it errs by under 0.01 periods of the band centre; else all."""
 ROBUST_ROUNDS = 3
 """Reweightings that turn outliers out of the first fit, at most."""
 FIRST_STEPS = 3
@@ -203,7 +202,7 @@ def fit_pulse(
             if whole is None:
                 return BAND
             aligned, pulse, longer = whole
-        better = fit_wave(expected + pulse.lag, q, c, pulse.weight, wave, 1)
+        better = spherical_wave(expected + pulse.lag, q, c, pulse.weight, wave.direction, wave.curvature, 1)
         if better is None:
             return UNFIT
         wave, last = better, wave
@@ -234,13 +233,14 @@ def _first_wave(
         wave = robust_wave(start + delay, q, c, loud, steps=FIRST_STEPS, rounds=ROBUST_ROUNDS, settled=settled)
         if wave is not None:
             off = 1.4826 * float(np.median(np.abs(wave.residual[live]))) * float(np.sqrt(4.0 / np.count_nonzero(live)))
-            if every == 1 or off < SURE / sonar.band.centre:
+            if every == 1 or off < 0.01 / sonar.band.centre:
                 break
     else:
         return None
     if velocity.any():
         passing = _times(wave, q, c)
-        wave = fit_wave(passing, q + (passing - wave.time)[:, None] * velocity[::every], c, loud, wave)
+        q = q + (passing - wave.time)[:, None] * velocity[::every]
+        wave = spherical_wave(passing, q, c, loud, wave.direction, wave.curvature)
     return None if wave is None else (wave, off)
 
 
@@ -260,20 +260,6 @@ def _whole(
             return aligned, pulse, longer
         longer *= pulse_times.LONGER
     return None
-
-
-def fit_wave(
-    delay: Floats, position: Floats, sound_speed: float, weight: Floats, start: Wavefront, steps: int = 20
-) -> Wavefront | None:
-    """Sphere through delays; a plane where there are too few sensors for a sphere.
-
-    One step (of Gauss and Newton) suffices where `start` is near and the fit is made again on better delays.
-    """
-    u, k = start.direction, start.curvature
-    wave = spherical_wave(delay, position, sound_speed, weight, u, k, iterations=steps)
-    if wave is None:
-        wave = spherical_wave(delay, position, sound_speed, weight, u, curved=False, iterations=steps)
-    return wave
 
 
 def _times(wave: Wavefront, position: Floats, sound_speed: float) -> Floats:
@@ -296,4 +282,5 @@ def _refit(
     """
     q = elements.position
     own = wavefront_delays(q, wave.direction, wave.curvature, measured or speed)
-    return fit_wave(wave.time + own + wave.residual - extra, q, speed, pulse.weight, wave) or wave
+    delay = wave.time + own + wave.residual - extra
+    return spherical_wave(delay, q, speed, pulse.weight, wave.direction, wave.curvature) or wave
