@@ -38,6 +38,8 @@ Cut aside of its pulse, a tail shifts it by 1 % of that: 16 ns, or 1.5 degrees, 
 """
 FEW = 64
 """Sensors, about, that the first fit is made of where it errs by under 0.01 periods of the band centre; else all."""
+CLEAR = 3e4
+"""Energy of a pulse at a sensor over that of the noise in a bin, above which so few sensors are tried."""
 ROBUST_ROUNDS = 3
 """Reweightings that turn outliers out of the first fit, at most."""
 FIRST_STEPS = 3
@@ -184,7 +186,7 @@ def fit_pulse(
     Envelope peaks of the sensors give eq. 6 in closed form, then the sphere, robustly; then the sensors are aligned
     and their lags measured coherently, until these settle.
     """
-    first = _first_wave(signals, elements, sonar, centre, half, velocity)
+    first = _first_wave(signals, elements, sonar, centre, half, velocity, quiet)
     if first is None:
         return UNFIT
     c, q, rest, aligned, longer, (wave, off) = sonar.assumed_sound_speed, elements.position, elements, None, 1.0, first
@@ -221,12 +223,15 @@ def fit_pulse(
 
 
 def _first_wave(
-    signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats
+    signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats, quiet: float
 ) -> tuple[Wavefront, float] | None:
     """Wavefront through the envelope peaks of the sensors, as of `fit_pulse`, and the standard error (s) of its times,
     root mean square over the sensors; None where none fits."""
     c, (cut, start), settled = sonar.assumed_sound_speed, pulse_times.excerpt(signals, centre, half), pulse_times.FLOOR
-    for every in (max(elements.count // FEW, 1), 1):
+    some = cut[:: max(elements.count // FEW, 1)]
+    energy = float(np.einsum("ij,ij->", some, some)) / (len(some) * signals.sampling_frequency)
+    clear = energy * 2.0 * pulse_times.half_length(sonar.band) > CLEAR * quiet
+    for every in (max(elements.count // FEW, 1), 1) if clear else (1,):
         q, live = elements.position[::every], elements.gain[::every] != 0
         delay, height = pulse_times.envelope_peaks(cut[::every], signals.sampling_frequency, sonar.band)
         loud = height**2 * live  # who hears more counts more
