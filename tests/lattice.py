@@ -49,6 +49,6 @@ def _stated(glass, centre, y, z, u):
     """What a zone adds (sensor,) to the delays of a plane wave at y, z (sensor,) m, for a beam of its quadrant."""
     middle_y, middle_z = glass.middle(y, z)
     middle = glass.bulge(middle_y, middle_z, u) - glass.bulge(middle_y, middle_z, centre)
-    rise = (z - middle_z) * glass.slope_along_z(y, middle_z, np.array([centre[0], u[1]]), centre)
+    rise = (z - middle_z) * glass.slope_along_z(y, middle_z, np.array([centre[0], u[1]]))
     across = (y - middle_y) * glass.slope_along_y(middle_y, middle_z, u, centre)
-    return glass.bulge(y, z, centre) + middle + rise + across
+    return glass.even_bulge(y, middle_z, z - middle_z, centre) + middle + rise + across

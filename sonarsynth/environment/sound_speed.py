@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -281,6 +281,7 @@ class Profile:
         return speed if self.uniform else np.asarray(np.interp(depth, self.depth, self.speed))
 
 
+@lru_cache(maxsize=64)  # the same in all frames of a sonar that stands still
 def mean_gradient(profile: Profile, depth: float, other_depth: float, least: float) -> float:
     """Mean of |dc/dz| (1/s) between two depths (m), over no less than `least` (m) about them; jumps count."""
     middle, half = 0.5 * (depth + other_depth), 0.5 * max(abs(depth - other_depth), least)
@@ -289,6 +290,7 @@ def mean_gradient(profile: Profile, depth: float, other_depth: float, least: flo
     return float(np.sum(np.abs(np.diff(speed)))) / (2 * half)
 
 
+@lru_cache(maxsize=64)
 def kink(profile: Profile, depth: float, reach: float) -> float:
     """Change (1/s) of the gradient of the sound speed within `reach` (m) of a depth (m): 0 of one slope."""
     inside = profile.depth[np.abs(profile.depth - depth) < reach]

@@ -19,22 +19,16 @@ Shading = Literal["uniform", "hann"]
 """Weights over the aperture: equal, or lower towards the rim (lower side lobes, a wider beam)."""
 
 
-def snapshots_of(
-    signals: Signals, sonar: Sonar, start: float, stop: float, *, lasting: float | None = None
-) -> Snapshots:
-    """Spectra of the window from start to stop (s, clock of the signals) in the sonar's band; lasting (s): how long the
-    sound in it lasts, measured in the signals where it is left out.
+def snapshots_of(signals: Signals, sonar: Sonar, start: float, stop: float) -> Snapshots:
+    """Spectra of the window from start to stop (s, clock of the signals) in the sonar's band.
 
     Raises ValueError when the window reaches outside the signals, or is too short to resolve the band.
     """
     rate = signals.sampling_frequency
     first, count = gate_samples(start, stop, signals.start, rate, signals.pressure.shape[1])
     frequency, spectra, power = gated_spectra(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
-    if lasting is None:
-        begins, ends = sounding(power.astype(float))
-        lasting = (ends - begins) / rate
     spacing, begin = frequency_spacing(count, rate), signals.start + first / rate
-    return Snapshots(frequency, spacing, spectra, begin, count, rate, lasting)
+    return Snapshots(frequency, spacing, spectra, begin, count, rate, power)
 
 
 def sounding(power: Floats) -> tuple[int, int]:

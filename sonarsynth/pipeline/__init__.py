@@ -13,6 +13,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sonarsynth.conventions import Floats
 from sonarsynth.description.method import returned
 from sonarsynth.labels import echo_levels, label, link_budget, path_powers
@@ -57,7 +59,6 @@ from sonarsynth.threads import in_one_thread
 from sonarsynth.tracing.arrivals import trace
 
 if TYPE_CHECKING:
-    import numpy as np
     import numpy.typing as npt
     import xarray as xr
 
@@ -248,8 +249,9 @@ def _received(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> Received
     image, signals, estimates, beams = beamformed.image, beamformed.imaged, beamformed.estimates, beamformed.beams
     if image is None or signals is None or estimates is None or beams is None:
         return None
-    loudest, supports = ranging_kernels.peak(signals.pressure), plan.windows.supports
-    elements, sonar = known_elements(plan, frame), plan.scene.sonar
+    elements, sonar, supports = known_elements(plan, frame), plan.scene.sonar, plan.windows.supports
+    some = np.arange(elements.count) % max(elements.count // 64, 1) == 0
+    loudest = ranging_kernels.power_and_peak(signals.pressure, some & (elements.gain != 0))[1]
     focus, direct = plan.choices.beamforming.focus, beamformed.signals
     return ReceivedWindow(
         elements, sonar, image, beams, loudest, direct, estimates, focus, supports.late, supports.direct

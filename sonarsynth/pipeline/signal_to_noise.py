@@ -151,7 +151,7 @@ class _BeamEnergies:
             return np.zeros(len(beams))
         start, stop = self._gate(inside, late)
         heard = part if inside.shape[1] == self.count else self._amid_silence(part, inside, late, start, stop)
-        snapshots = snapshots_of(heard, self.sonar, start, stop, lasting=stop - start)
+        snapshots = snapshots_of(heard, self.sonar, start, stop)
         return self.method.energies_in(snapshots, self.elements, self.sonar, self.grid[beams])
 
     def _amid_silence(self, part: Signals, inside: Pressure, late: int, start: float, stop: float) -> Signals:

@@ -21,7 +21,7 @@ class Snapshots:
     start: float  # s: the sample that phases refer to
     samples: int  # of the window
     sampling_frequency: float  # Hz
-    lasting: float  # s: of the part of the window that all of its energy is in, but for 1e-7 before and after
+    sample_power: npt.NDArray[np.floating]  # (sample,) Pa2 of all sensors together
 
     @property
     def duration(self) -> float:
@@ -39,7 +39,8 @@ class Snapshots:
 
     def select(self, bins: npt.NDArray[np.integer]) -> Snapshots:
         """Some bins, next to each other: of part of a band, sound may last as long as the window."""
-        return replace(self, frequency=self.frequency[bins], spectra=self.spectra[:, bins], lasting=self.duration)
+        unknown = np.ones_like(self.sample_power)
+        return replace(self, frequency=self.frequency[bins], spectra=self.spectra[:, bins], sample_power=unknown)
 
 
 @dataclass(frozen=True, eq=False)

@@ -149,8 +149,8 @@ def direct_spectrum(
     At the frequencies of an FFT of `length` samples. pulse (s): how long it is heard before and after that time.
     """
     c, front = sonar.assumed_sound_speed, PlaneWaveFit.of(estimates)
-    expected, longer = front.delays(elements, c), max(pulse / (FLAT * pulse_times.PULSE_HALF), 1.0)
-    aligned = pulse_times.align(signals, elements, sonar.band, expected, whole=True, longer=longer)
+    half = max(pulse / FLAT, pulse_times.PULSE_HALF)
+    aligned = pulse_times.cut(signals, elements.gain, front.delays(elements, c), half, None)
     wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
     return template_spectrum(wave.template, length)
 

@@ -41,16 +41,6 @@ def power_and_peak(pressure: Any, live: Any) -> Any:
     return power, float(high.max()) if samples > 0 else 0.0
 
 
-@compiled
-def peak(pressure: Any) -> float:
-    """The largest |pressure| (sensor, sample) of 64 sensors or more, which is about that of all."""
-    high = np.zeros(pressure.shape[1], pressure.dtype)
-    for q in range(0, len(pressure), max(len(pressure) // 64, 1)):
-        for n in range(pressure.shape[1]):
-            high[n] = max(high[n], abs(pressure[q, n]))
-    return float(high.max()) if len(high) > 0 else 0.0
-
-
 @compiled(fastmath=True, forceinline=True)
 def _sum(values: Any) -> Any:
     total = np.float32(0.0)

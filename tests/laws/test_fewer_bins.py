@@ -20,16 +20,21 @@ WINDOW = (0.5e-3, 6.0e-3)
 FEW, ALL = (FocusedDelayAndSum(focus=None, bins=bins) for bins in ("few", "all"))
 
 
-def echoes(seed, noise=0.0):
-    """Plane waves of snaps, with flanks at both ends of the band, within 0.6 ms; and white noise all the time."""
+def echoes(seed, noise=0.0, again=0.0):
+    """Plane waves of snaps, with flanks at both ends of the band, within 0.6 ms; and white noise all the time. again
+    (s): so much later they come once more, of half the amplitude, from the other side."""
     rng = np.random.default_rng(seed)
-    f = np.fft.rfftfreq(1400, 1 / RATE)
+    samples = 1400 if not again else 2400
+    f = np.fft.rfftfreq(samples, 1 / RATE)
     spectra = np.zeros((ARRAY.count, len(f)), complex)
     for time, level in zip(rng.uniform(2.5e-3, 3.1e-3, 12), rng.uniform(0.1, 1.0, 12), strict=True):
         u = direction(*rng.uniform(-0.4, 0.4, 2))
         late = time - ARRAY.position @ u / SONAR.assumed_sound_speed
         spectra += level * pulse_spectrum(f) * np.exp(-2j * np.pi * f * late[:, None])
-    pressure = np.fft.irfft(spectra, 1400, axis=1) * RATE
+        if again:
+            late = time + again + ARRAY.position @ (u * [-1, 1, 1]) / SONAR.assumed_sound_speed
+            spectra += 0.5 * level * pulse_spectrum(f) * np.exp(-2j * np.pi * f * late[:, None])
+    pressure = np.fft.irfft(spectra, samples, axis=1) * RATE
     pressure += noise * np.abs(pressure).max() * rng.standard_normal(pressure.shape)
     return Signals(pressure.astype(np.float32), 0.0, RATE, 0.0, 0, 0)
 
@@ -44,6 +49,29 @@ def test_short_echoes_have_the_energy_of_all_bins(seed):
     few, every = (method.image(signals, ARRAY, SONAR, *WINDOW).energy for method in (FEW, ALL))
     bright = every >= 1e-2 * every.max()
     assert np.sqrt(np.mean((10 * np.log10(few[bright] / every[bright])) ** 2)) < 0.003
+
+
+LONG = 0.5e-3, 12.0e-3
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_silence_between_echoes_needs_no_bins(seed):
+    """Echoes that come twice, 7.5 ms apart, of every second bin, which takes what is 5.8 ms apart for one."""
+    signals = echoes(seed, again=7.5e-3)
+    window = snapshots_of(signals, SONAR, *LONG)
+    assert len(fewer_bins(window, 2e-4).frequency) < 0.51 * len(window.frequency)
+    few, every = (method.image(signals, ARRAY, SONAR, *LONG).energy for method in (FEW, ALL))
+    bright = every >= 1e-2 * every.max()
+    assert np.sqrt(np.mean((10 * np.log10(few[bright] / every[bright])) ** 2)) < 0.01
+
+
+@pytest.mark.parametrize("part", [2, 3, 4])
+def test_echoes_that_fewer_bins_would_take_for_one_keep_more(part):
+    """Of echoes 1/(k df) apart, every k-th bin tells no difference, whatever else is silent."""
+    apart = 1.0 / (part * snapshots_of(echoes(0, again=4e-3), SONAR, *LONG).spacing)
+    window = snapshots_of(echoes(0, again=apart), SONAR, *LONG)
+    used = len(fewer_bins(window, 2e-4).frequency)
+    assert abs(used * part / len(window.frequency) - 1) > 0.1
 
 
 def test_noise_that_lasts_as_long_as_the_window_keeps_every_bin():

@@ -58,6 +58,15 @@ def test_four_quadrants(azimuth, elevation):
         assert found.time[0] == pytest.approx(12.0 / C + envelope_late(), abs=3 * found.time_error[0])
 
 
+def test_an_array_of_which_every_second_sensor_stands_in_one_line():
+    """The first fit is made of some sensors where these do: here they tell no direction, and all are taken."""
+    array, source = elements(PlanarLattice(columns=2, rows=64, pitch=0.05)), 12.0 * direction(0.3, -0.2)
+    found = locate(hear_direct(array, source), array, source)
+    assert found.reason[0] == ACCEPTED
+    assert found.azimuth[0] == pytest.approx(0.3, abs=1e-3)
+    assert found.elevation[0] == pytest.approx(-0.2, abs=1e-4)
+
+
 def test_a_planar_array_hears_what_is_behind_it_in_front():
     behind, mirrored = np.array([-9.0, 4.0, -3.0]), np.array([9.0, 4.0, -3.0])
     found = locate(hear_direct(ROMANIS, behind), ROMANIS, mirrored)

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.environment.sea import Profile
-from sonarsynth.equations.arrays.spherical_wave import Wavefront, wavefront_delays
+from sonarsynth.equations.arrays.spherical_wave import Wavefront, spherical_wave, wavefront_delays
 from sonarsynth.evaluation import snap_located
 from sonarsynth.evaluation.source_estimates import as_predicted
 from sonarsynth.geometry import Pose, quaternion
@@ -21,7 +21,6 @@ from sonarsynth.planning.notes.source_notes import locator, off_the_bottom, stan
 from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.ranging import SensorDelays
-from sonarsynth.ranging.location.locating import fit_wave
 from sonarsynth.ranging.location.pulse_times import Pulse, lag_variance
 from sonarsynth.receiver import Band, PlanarLattice, PositionTable, Sonar, elements
 from sonarsynth.state import Receiver, Survey
@@ -270,7 +269,7 @@ def test_the_more_alike_neighbours_err_the_larger_errors_are_predicted(alike: fl
     random = np.random.default_rng(12)
     for _ in range(300):
         error = 1e-8 * (root @ random.standard_normal((12, 12)) @ root.T).ravel()
-        wave = fit_wave(delay + error, q, C, pulse.weight, true)
+        wave = spherical_wave(delay + error, q, C, pulse.weight, true.direction, true.curvature)
         assert wave is not None
         fits.append([*wave.direction, wave.curvature])
         variance = lag_variance(wave, pulse, elements(WIDE), 0.0)

@@ -37,7 +37,7 @@ def test_a_step_from_a_wave_along_the_plane_of_an_array_stays_at_its_delays(asid
     random, u = np.random.default_rng(seed), unit(np.array([10.0**aside, np.cos(el), np.sin(el)]))
     q = random.uniform(-0.5, 0.5, (40, 3)) * [0.0, 1.0, 1.0]
     delay = wavefront_delays(q, u, curvature, 1500.0)
-    wave = spherical_wave(delay + 1e-9 * random.normal(size=40), q, 1500.0, np.ones(40), u, curvature, True, steps)
+    wave = spherical_wave(delay + 1e-9 * random.normal(size=40), q, 1500.0, np.ones(40), u, curvature, steps)
     assert wave is not None
     off = wave.time + wavefront_delays(q, wave.direction, wave.curvature, 1500.0) - delay
     assert np.abs(off).max() < 1e-8

@@ -95,13 +95,12 @@ def spherical_wave(
     weight: npt.ArrayLike,
     start: npt.ArrayLike,
     curvature: float = 0.0,
-    curved: bool = True,
     iterations: int = 20,
 ) -> Wavefront | None:
     """The spherical wave that fits delays (sensor,) best, by Gauss-Newton from direction `start`; None where none does.
 
-    weight (sensor,) >= 0: inverse variances, up to a common factor. Not `curved`: the curvature is held at its start
-    (three sensors cannot tell it), with infinite variance. Derivatives, with rho = |u - k q|:
+    weight (sensor,) >= 0: inverse variances, up to a common factor. Where there are too few sensors for a sphere (three
+    cannot tell it), a plane, the variance of its curvature infinite. Derivatives, with rho = |u - k q|:
         d/du along a tangent e: -(q.e)/(c rho);  d/dk: (|q|^2 - (u.q)^2)/(c rho (rho + 1 - k u.q)).
     Fisher matrix and bound follow: `covariance` times the variance of a delay of weight one is the Cramer-Rao bound
     (physics: independent Gaussian errors; Van Trees 2002, section 8.4).
@@ -110,9 +109,9 @@ def spherical_wave(
     size = _size(q)
     if not (np.all(np.isfinite(u)) and size > 0):
         return None
-    from sonarsynth.equations.arrays.spherical_wave_kernel import gauss_newton
+    from sonarsynth.equations.arrays.spherical_wave_kernel import curved_or_plane
 
-    wave = gauss_newton(q, t, w, (u, float(curvature)), float(sound_speed), size, curved, iterations)
+    curved, wave = curved_or_plane(q, t, w, (u, float(curvature)), float(sound_speed), size, iterations)
     return _wavefront(wave, curved)
 
 

@@ -123,7 +123,9 @@ def gauss_newton(
 def curved_or_plane(position: Any, delay: Any, weight: Any, start: Any, speed: float, size: float, steps: int) -> Any:
     """`gauss_newton`, without the curvature where there is no fit with it; and whether there is."""
     wave = gauss_newton(position, delay, weight, start, speed, size, True, steps)
-    return (True, wave) if wave[0] else (False, gauss_newton(position, delay, weight, start, speed, size, False, steps))
+    if wave[0]:
+        return True, wave
+    return False, gauss_newton(position, delay, weight, (start[0], 0.0), speed, size, False, steps)
 
 
 @compiled

@@ -35,15 +35,15 @@ class FocusedDelayAndSum(Steering):
     Each quadrant of the picture is two zones, beside the axis and beyond. A zone has the delays of a sphere in its
     middle, and from there to each beam what of them is separable (`zones`). Cut into subarrays, each with delays of its
     own, the array errs by less and takes longer. 1.3 m array of 508 elements, 25 to 85 kHz, 50 by 50 degrees, 101 by
-    101 beams, 241 bins: time (10 ms for [1, 1]), and the largest error (dB) within 20 dB of the peak of a source at the
+    101 beams, 241 bins: time (3 ms for [1, 1]), and the largest error (dB) within 20 dB of the peak of a source at the
     focus (`focus_error`),
 
         subarrays    time     50 m     20 m     10 m      5 m      2 m
-           [1, 1]     1.0     0.04     0.25     0.86     3.03     8.09
-           [2, 2]     2.6     0.01     0.08     0.29     0.74     3.59
-           [3, 3]     3.2     0.01     0.02     0.06     0.21     1.09
-           [4, 4]     5.8     0.01     0.03     0.05     0.16     0.75
-           [6, 6]      10     0.00     0.01     0.02     0.08     0.43
+           [1, 1]     1.0     0.05     0.28     0.95     3.83     9.15
+           [2, 2]     3.3     0.01     0.08     0.29     0.74     3.54
+           [3, 3]     4.9     0.01     0.02     0.06     0.21     1.09
+           [4, 4]     7.7     0.01     0.03     0.05     0.16     0.75
+           [6, 6]      14     0.00     0.01     0.02     0.08     0.43
 
     Rounding: 2e-7 of the brightest beam (241 bins; 1e-6 for 20 bins, 6e-6 for 300 elements in a row). What is left out
     falls as the square of a subarray: 64 by 64 hydrophones 5 cm apart err by 0.5 dB at 20 m in [4, 4].
@@ -60,8 +60,8 @@ class FocusedDelayAndSum(Steering):
     whose measured error is allowed; elsewhere, the fewest whose `focus_error` is under 0.1 dB, or 16 each way. Those
     that sound is traced to are `physics.subarrays`."""
     bins: Literal["few", "all", "auto"] = "auto"
-    """Frequencies of the window that energies are summed over: as few as its sound needs, which is shorter (0.01 dB),
-    or all. Auto: few in a plan, by the error that it measures; else all."""
+    """Frequencies of the window that energies are summed over: as few as sound with silence in it needs (0.02 dB), or
+    all. Auto: few in a plan, by the error that it measures; else all."""
 
     def resolve(self, demand: Demand) -> tuple[FocusedDelayAndSum | DenseDelayAndSum, float]:
         """With the recipe's subarrays; left to the plan, the fewest that err by no more than is allowed (dB)."""

@@ -82,8 +82,8 @@ class LatticeBeams:
 @lru_cache(maxsize=16)
 def _halves(elements: Elements, focus: float | None, sound_speed: float) -> tuple[Ints, Ints, int, float, Floats]:
     """Sensors (half, half column, half row, 4) of the halves of a lattice to port and to starboard, rows in use (half
-    column,), columns of a half, how far (m) its middle is from that of the array, and delays (s) of focusing of the
-    sensors."""
+    column,), columns of a half, how far (m) its middle is from that of the array, and delays (half, half column, half
+    row, side) in s of focusing: the same above and below."""
     columns, nobody = -(-elements.columns // 2), elements.count
     port, live = elements.column < columns, elements.gain > 0
     column = np.where(port, elements.column, elements.column - (elements.columns - columns))
@@ -93,4 +93,5 @@ def _halves(elements: Elements, focus: float | None, sound_speed: float) -> tupl
     )  # fmt: skip
     used = rows_in_use(np.min(places, axis=(0, 3)) < nobody)
     later = np.append(focus_delay(elements.position, AHEAD, focus, sound_speed), 0.0)[places]
-    return places, used, columns, 0.5 * elements.pitch * (elements.columns - columns), later
+    middle = 0.5 * elements.pitch * (elements.columns - columns)
+    return places, used, columns, middle, np.maximum(later[..., :2], later[..., 2:])  # the silent one has no delay

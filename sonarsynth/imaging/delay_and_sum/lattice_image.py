@@ -31,7 +31,7 @@ class SteeredZone:
     odd: tuple[bool, bool]  # whether a subarray has an odd number of rows, and of columns
     places: Ints  # (mirror, subarray, half column, half row, 4) sensors
     heights: Ints  # (subarray, half column) rows in use
-    delay: Floats  # (subarray, half column, half row, 4) s
+    delay: Floats  # (subarray, half column, half row, side of y) s
     rise: Floats  # (row, subarray, side of y, half column) s
     across: Floats  # (subarray, row, column) s
     middle: Floats  # (subarray, row, column) s
@@ -46,13 +46,10 @@ def steered(zone: Zone, elements: Elements, beams: BeamGrid, glass: Lens) -> Ste
     odd = glass.subarray_rows % 2 == 1, glass.subarray_columns % 2 == 1
     places, heights = _fold(elements, glass)
     middle_z, middle_y = (m.ravel()[:, None, None] for m in np.meshgrid(*_middles(glass), indexing="ij"))
-    delay = np.stack(
-        [glass.bulge(middle_y + b * y[:, None], middle_z + a * z, zone.centre) for a in (1, -1) for b in (1, -1)], -1
-    )
+    delay = np.stack([glass.even_bulge(middle_y + b * y[:, None], middle_z, z, zone.centre) for b in (1, -1)], -1)
     u = quadrant(beams)[:, zone.columns]
     level = np.stack(np.broadcast_arrays(zone.centre[0], u[:, 0, 1]), axis=-1)[:, None, None, None, :]
-    rise = glass.slope_along_z(middle_y + np.stack([y, -y]), middle_z, level, zone.centre)
-    rise = level[..., 1] / glass.sound_speed - rise
+    rise = level[..., 1] / glass.sound_speed - glass.slope_along_z(middle_y + np.stack([y, -y]), middle_z, level)
     across = u[..., 0] / glass.sound_speed - glass.slope_along_y(middle_y, middle_z, u, zone.centre)
     middle = glass.bulge(middle_y, middle_z, u) - glass.bulge(middle_y, middle_z, zone.centre)
     middle -= (u[..., 0] * middle_y + u[..., 1] * middle_z) / glass.sound_speed

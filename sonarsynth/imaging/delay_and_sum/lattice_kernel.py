@@ -67,37 +67,43 @@ def _with_powers(powers: Any, x: Any, y: Any, p: Any, q: Any) -> Any:
 
 
 @compiled(forceinline=True)
-def _put_powers(energy: Any, mirror: int, row: int, column: int, powers: Any) -> None:
+def _put_powers(energy: Any, mirror: int, other: int, row: int, column: int, powers: Any) -> None:
     energy[mirror, row, column] += total(powers[0])
-    energy[mirror + 2, row, column] += total(powers[1])
+    energy[other, row, column] += total(powers[1])
 
 
 @compiled(forceinline=True)
 def _add_powers(
     lines: Any, start: int, columns: int, odd: bool, across: Any, turns: Any, at: int, frequency: float, spacing: float,
-    groups: int, energy: Any, mirror: int, row: int,
+    groups: int, energy: Any, row: int,
 ) -> None:  # fmt: skip
-    """Add |B|^2 of the beams of one elevation, of an array that is its only subarray: half steps from `at` on."""
-    azimuths = energy.shape[2]
+    """Add |B|^2 of the beams of one elevation and of their mirror images, of an array that is its only subarray: half
+    steps from `at` on."""
+    azimuths, size, none = energy.shape[2], columns * TERM, (splat(ZERO), splat(ZERO))
     for i in range(0, azimuths, 2):
         j = min(i + 1, azimuths - 1)
         c, s = phasors(across[at + i], frequency, spacing)
         d, t = phasors(across[at + j], frequency, spacing)
-        near, far = (splat(ZERO), splat(ZERO)), (splat(ZERO), splat(ZERO))
+        near, far, near_down, far_down = none, none, none, none
         for group in range(groups):
-            first = start + group * columns * TERM
-            inner, outer = term_sums(lines, first, first + columns * TERM, odd, c, s, d, t)
+            first = start + group * size
+            inner, outer = term_sums(lines, first, first + size, odd, c, s, d, t)
             near, far = _with_powers(near, *upper(inner)), _with_powers(far, *upper(outer))
+            first += GROUPS * size
+            inner, outer = term_sums(lines, first, first + size, odd, c, s, d, t)
+            near_down, far_down = _with_powers(near_down, *upper(inner)), _with_powers(far_down, *upper(outer))
             c, s = groups_on(c, s, turns, at + i)
             d, t = groups_on(d, t, turns, at + j)
-        _put_powers(energy, mirror, row, i, near)
+        _put_powers(energy, 0, 1, row, i, near)
+        _put_powers(energy, 2, 3, row, i, near_down)
         if j > i:
-            _put_powers(energy, mirror, row, j, far)
+            _put_powers(energy, 0, 1, row, j, far)
+            _put_powers(energy, 2, 3, row, j, far_down)
 
 
 @compiled(forceinline=True)
 def _add_powers_of_beams(beams: Any, groups: int, energy: Any, mirror: int) -> None:
-    """Add |B|^2 (elevation, azimuth) of a chunk."""
+    """Add |B|^2 (elevation, azimuth) of a chunk, and of the mirror images along z."""
     _, elevations, azimuths = energy.shape
     for i in range(elevations):
         for j in range(azimuths):
@@ -106,7 +112,7 @@ def _add_powers_of_beams(beams: Any, groups: int, energy: Any, mirror: int) -> N
                 at = (i * azimuths + j) * BEAM + group * 4 * LANES
                 x, y = load(beams, at), load(beams, at + LANES)
                 powers = _with_powers(powers, x, y, load(beams, at + 2 * LANES), load(beams, at + 3 * LANES))
-            _put_powers(energy, mirror, i, j, powers)
+            _put_powers(energy, mirror, mirror + 2, i, j, powers)
 
 
 @compiled
@@ -119,21 +125,21 @@ def lattice_energies(
     mirror: 0 the quadrant above and to port, 1 at -az, 2 at -el, 3 both. pairs: spectra (sensor + 1, bins) as float32
     pairs, bins a multiple of LANES, the last sensor silent; places (mirror, subarray, column, row, 4), from the middle
     of a subarray outwards: sensors at (+z, +y), (+z, -y), (-z, +y), (-z, -y), the silent one for none;
-    weight (sensor + 1,) float32; delay (subarray, column, row, 4) s, of focusing; heights (subarray, column) rows in
-    use; rise (elevation, subarray, side of y, column) and across (subarray, elevation, azimuth): half of what a wave is
-    sooner (s) at the next row up and at the next column to port; middle (subarray, elevation, azimuth): what it is
-    later (s) in the middle of the subarray; frequency, spacing: of bin 0 and between bins (Hz).
+    weight (sensor + 1,) float32; delay (subarray, column, row, side of y) s, of focusing; heights (subarray, column)
+    rows in use; rise (elevation, subarray, side of y, column) and across (subarray, elevation, azimuth): half of what a
+    wave is sooner (s) at the next row up and at the next column to port; middle (subarray, elevation, azimuth): what it
+    is later (s) in the middle of the subarray; frequency, spacing: of bin 0 and between bins (Hz).
     """
     _, count, columns, rows, _ = places.shape
     _, elevations, azimuths = across.shape
     size = 2 * columns * rows * TERM
-    folded, lines = np.empty(GROUPS * size, np.float32), np.empty(2 * GROUPS * columns * TERM, np.float32)
+    folded, lines = np.empty(GROUPS * size, np.float32), np.empty(4 * GROUPS * columns * TERM, np.float32)
     beams = np.empty(elevations * azimuths * BEAM if count > 1 else 0, np.float32)
     up, port, later = group_turns(rise, spacing), group_turns(across, spacing), group_turns(middle, spacing)
     rise, across, middle = rise.ravel(), across.ravel(), middle.ravel()
     delays, energy = np.stack((delay, delay)), np.zeros((4, elevations, azimuths))
-    for mirror in range(2):
-        sets = np.stack((places[mirror], places[mirror + 2]))
+    for mirror in range(min(count, 2)):  # sets are mirror images along z; along y of one array, which is folded along z
+        sets = np.stack((places[mirror], places[mirror + 2 if count > 1 else 1]))
         for low in range(0, bins, CHUNK):
             groups, first = min(GROUPS, (bins - low) // LANES), frequency + low * spacing
             beams[:] = ZERO
@@ -148,10 +154,11 @@ def lattice_energies(
                     inner = (row * count + part) * 2 * columns
                     outer = (min(row + 1, elevations - 1) * count + part) * 2 * columns
                     sums_over_rows(
-                        folded, rows, heights[part], odd_rows, rise, up, inner, outer, first, spacing, groups, lines
-                    )
+                        folded, rows, heights[part], odd_rows, rise, up, inner, outer, first, spacing, groups, lines,
+                        count == 1,
+                    )  # fmt: skip
                     for which in range(min(2, elevations - row)):
-                        start, at = which * GROUPS * columns * TERM, (part * elevations + row + which) * azimuths
+                        start, at = 2 * which * GROUPS * columns * TERM, (part * elevations + row + which) * azimuths
                         if count > 1:
                             _add_beams(
                                 lines, start, columns, odd_columns, across, port, middle, later, at, at + azimuths,
@@ -160,7 +167,7 @@ def lattice_energies(
                         else:
                             _add_powers(
                                 lines, start, columns, odd_columns, across, port, at, first, spacing, groups, energy,
-                                mirror, row + which,
+                                row + which,
                             )  # fmt: skip
             if count > 1:
                 _add_powers_of_beams(beams, groups, energy, mirror)
@@ -172,7 +179,7 @@ def focused_halves(
     pairs: Any, bins: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float
 ) -> Any:
     """What `lattice_beams` steers, float32: an array, focused and folded for each group of frequencies, whose halves,
-    to port and to starboard, are the two sets. As for `lattice_energies`; places and delay (half, column, row, 4)."""
+    to port and to starboard, are the two sets. As for `lattice_energies`; places (half, column, row, 4)."""
     _, columns, rows, _ = places.shape
     size = 2 * columns * rows * TERM
     folded = np.empty(bins // LANES * size, np.float32)
@@ -194,7 +201,7 @@ def lattice_beams(
     and sooner in the other; row (beam,): where the spectrum of a beam is put.
     """
     columns, levels = len(heights), len(rise)
-    size, lines = 2 * columns * rows * TERM, np.empty(2 * GROUPS * columns * TERM, np.float32)
+    size, lines = 2 * columns * rows * TERM, np.empty(4 * GROUPS * columns * TERM, np.float32)
     beams, last = np.empty(np.max(np.diff(bounds)) * BEAM, np.float32), np.empty(2 * LANES, np.float32)
     up, port, later = group_turns(rise, spacing), group_turns(across, spacing), group_turns(middle, spacing)
     rise, count = rise.ravel(), spectra.size // (2 * len(row))
@@ -203,9 +210,9 @@ def lattice_beams(
         chunk = folded[low // LANES * size :]
         for level in range(0, levels, 2):
             inner, outer = level * 2 * columns, min(level + 1, levels - 1) * 2 * columns
-            sums_over_rows(chunk, rows, heights, odd_rows, rise, up, inner, outer, first, spacing, groups, lines)
+            sums_over_rows(chunk, rows, heights, odd_rows, rise, up, inner, outer, first, spacing, groups, lines, False)
             for which in range(min(2, levels - level)):
-                start, at, stop = which * GROUPS * columns * TERM, bounds[level + which], bounds[level + which + 1]
+                start, at, stop = 2 * which * GROUPS * columns * TERM, bounds[level + which], bounds[level + which + 1]
                 beams[:] = ZERO
                 _add_beams(
                     lines, start, columns, odd_columns, across, port, middle, later, at, stop, np.float32(-1.0), first,

@@ -110,6 +110,13 @@ def upper(sums: Any) -> Any:
 
 
 @compiled(forceinline=True)
+def lower(sums: Any) -> Any:
+    """The same of the opposite direction: plus i times the sine sums."""
+    a, a_, b, b_, c, c_, d, d_ = sums
+    return a - c_, a_ + c, b - d_, b_ + d
+
+
+@compiled(forceinline=True)
 def _fold(terms: Any, at: int, plus: Any, minus: Any) -> None:
     """Store a term: sums and differences of what is at + and at -, of both sets."""
     for_sums, for_differences = at, at + 4 * LANES
@@ -124,9 +131,8 @@ def _fold(terms: Any, at: int, plus: Any, minus: Any) -> None:
 
 
 @compiled(forceinline=True)
-def _focused(pairs: Any, at: int, weight: float, delay: float, frequency: float, spacing: float) -> Any:
-    x, y = weighted(pairs, at, weight)
-    c, s = phasors(delay, frequency, spacing)
+def _turned(pairs: Any, at: int, weight: float, c: Any, s: Any) -> Any:
+    x, y = weighted(pairs, 2 * at, weight)
     return turned(x, y, c, s)
 
 
@@ -134,21 +140,23 @@ def _focused(pairs: Any, at: int, weight: float, delay: float, frequency: float,
 def focus(
     pairs: Any, bins: int, low: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float, folded: Any
 ) -> None:  # fmt: skip
-    """Fill `folded` [side of y][column][row][S D] for the group of frequencies from bin `low` on; places, delay
-    (set, column, row, 4)."""
+    """Fill `folded` [side of y][column][row][S D] for the group of frequencies from bin `low` on; places (set, column,
+    row, 4), delay (set, column, row, side of y)."""
     _, columns, rows, _ = places.shape
     for n in range(columns):
         for m in range(rows):
             for side in range(2):
                 a, b = places[0, n, m, side], places[1, n, m, side]
                 c, d = places[0, n, m, side + 2], places[1, n, m, side + 2]
+                e, u = phasors(delay[0, n, m, side], frequency, spacing)
+                f, v = phasors(delay[1, n, m, side], frequency, spacing)
                 above = (
-                    *_focused(pairs, 2 * (a * bins + low), weight[a], delay[0, n, m, side], frequency, spacing),
-                    *_focused(pairs, 2 * (b * bins + low), weight[b], delay[1, n, m, side], frequency, spacing),
+                    *_turned(pairs, a * bins + low, weight[a], e, u),
+                    *_turned(pairs, b * bins + low, weight[b], f, v),
                 )
                 below = (
-                    *_focused(pairs, 2 * (c * bins + low), weight[c], delay[0, n, m, side + 2], frequency, spacing),
-                    *_focused(pairs, 2 * (d * bins + low), weight[d], delay[1, n, m, side + 2], frequency, spacing),
+                    *_turned(pairs, c * bins + low, weight[c], e, u),
+                    *_turned(pairs, d * bins + low, weight[d], f, v),
                 )
                 _fold(folded, ((side * columns + n) * rows + m) * TERM, above, below)
 
@@ -177,9 +185,9 @@ def groups_on(c: Any, s: Any, turns: Any, i: int) -> Any:
 
 
 @compiled(forceinline=True)
-def _put_line(lines: Any, at: int, sums: Any, side: int) -> None:
+def _put_line(lines: Any, at: int, line: Any, side: int) -> None:
     """The term of a column at +y and at -y, which come one after the other."""
-    x, y, p, q = upper(sums)
+    x, y, p, q = line
     if side == 0:
         store(lines, at, x)
         store(lines, at + LANES, y)
@@ -193,11 +201,12 @@ def _put_line(lines: Any, at: int, sums: Any, side: int) -> None:
 @compiled(forceinline=True)
 def sums_over_rows(
     folded: Any, rows: int, heights: Any, odd: bool, rise: Any, turns: Any, inner: int, outer: int,
-    frequency: float, spacing: float, groups: int, lines: Any,
+    frequency: float, spacing: float, groups: int, lines: Any, both: bool,
 ) -> None:  # fmt: skip
     """Sums over rows at two elevations, whose half steps `rise` (s) [side][column], and turns, are from `inner` and
-    `outer` on: lines [two][group][column][s d]."""
+    `outer` on: lines [two][up or down][group][column][s d], those down, at the opposite elevations, where `both`."""
     columns = len(heights)
+    size = GROUPS * columns * TERM
     for n in range(columns):
         for side in range(2):
             i, j = inner + side * columns + n, outer + side * columns + n
@@ -205,8 +214,12 @@ def sums_over_rows(
             d, t = phasors(rise[j], frequency, spacing)
             for group in range(groups):
                 start = ((group * 2 + side) * columns + n) * rows * TERM
-                upper, lower = term_sums(folded, start, start + heights[n] * TERM, odd, c, s, d, t)
+                near, far = term_sums(folded, start, start + heights[n] * TERM, odd, c, s, d, t)
                 c, s = groups_on(c, s, turns, i)
                 d, t = groups_on(d, t, turns, j)
-                _put_line(lines, (group * columns + n) * TERM, upper, side)
-                _put_line(lines, ((GROUPS + group) * columns + n) * TERM, lower, side)
+                at = (group * columns + n) * TERM
+                _put_line(lines, at, upper(near), side)
+                _put_line(lines, at + 2 * size, upper(far), side)
+                if both:
+                    _put_line(lines, at + size, lower(near), side)
+                    _put_line(lines, at + 3 * size, lower(far), side)

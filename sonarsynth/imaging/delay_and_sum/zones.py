@@ -2,9 +2,9 @@
 
 A lattice is fast where the delay of focusing is a property of the sensor, not of the beam. W(u), the delay of a sphere
 less that of the plane wave from the same direction u, changes with u. A zone, half of what is to port and its mirror
-images, takes it from its own centre, and from there to each beam keeps what separates: the slope of W along z in each
-column, and its slope along y. What is left falls as the square of the array, so a large one is cut into subarrays, each
-with slopes of its own about its own middle.
+images, takes of its own centre what is as much above as below the middle of the array, and of each beam what separates:
+the slope of W along z in each column, and from the centre on its slope along y. What is left falls as the square of the
+array, so a large one is cut into subarrays, each with slopes of its own about its own middle.
 """
 
 from __future__ import annotations
@@ -79,9 +79,13 @@ class Lens:
         distance = np.sqrt(np.maximum(self.focus * (self.focus - 2.0 * along) + square, 0.0))
         return np.asarray((square - along * along) / ((distance + self.focus - along) * self.sound_speed))
 
-    def slope_along_z(self, y: Floats, z: Floats, u: Floats, centre: Floats) -> Floats:
-        """Slope along z (s/m) of W(u) - W(centre) at y, about z (...) m."""
-        upper, lower = (self.bulge(y, z + h, u) - self.bulge(y, z + h, centre) for h in _both(self.half_height))
+    def even_bulge(self, y: Floats, z: Floats, off: Floats, u: Floats) -> Floats:
+        """The mean of W (...) in s for u (..., yz) at y, at `off` (...) m above and below z."""
+        return np.asarray(0.5 * (self.bulge(y, z + off, u) + self.bulge(y, z - off, u)))
+
+    def slope_along_z(self, y: Floats, z: Floats, u: Floats) -> Floats:
+        """Slope along z (s/m) of W(u) at y, about z (...) m."""
+        upper, lower = (self.bulge(y, z + h, u) for h in _both(self.half_height))
         return np.asarray(0.5 * (upper - lower) / self.half_height)
 
     def slope_along_y(self, y: Floats, z: Floats, u: Floats, centre: Floats) -> Floats:

@@ -14,7 +14,7 @@ from sonarsynth.products import EnergyImage, Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.locating import MAX_LAG
-from sonarsynth.ranging.location.plane_waves import PlaneWaveFit, cut, part_of, refine, subtract
+from sonarsynth.ranging.location.plane_waves import PlaneWaveFit, part_of, refine, subtract
 from sonarsynth.receiver import Elements, Sonar
 
 FLAT: Final = 0.75
@@ -90,7 +90,7 @@ def deviations(signals: Signals, elements: Elements, sonar: Sonar, front: PlaneW
     a sensor that hears little of the wave stays on the sphere.
     """
     c, band = sonar.assumed_sound_speed, sonar.band
-    aligned = cut(signals, elements, front.delays(elements, c), pulse_times.PULSE_HALF, band)
+    aligned = pulse_times.cut(signals, elements.gain != 0, front.delays(elements, c), pulse_times.PULSE_HALF, band)
     wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
     omega = 2 * np.pi * aligned.frequency
     model = wave.response * wave.template

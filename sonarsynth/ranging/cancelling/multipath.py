@@ -18,7 +18,6 @@ from sonarsynth.ranging.location.plane_waves import (
     PlaneWaveFit,
     WindowSegment,
     beam_contrast,
-    cut,
     look,
     part_of,
     refine,
@@ -124,7 +123,8 @@ def expect(
         if not (np.isfinite(time) and np.isfinite(distance) and distance > 0):
             continue
         direct = PlaneWaveFit(position / distance, 1 / distance, float(time))
-        aligned = cut(signals, elements, direct.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
+        late = direct.delays(elements, c)
+        aligned = pulse_times.cut(signals, elements.gain != 0, late, pulse_times.PULSE_HALF, sonar.band)
         wave = pulse_times.waveform(aligned, elements, c, direct.direction, direct.curvature, direct.time)
         density = 2 * aligned.spacing * np.abs(wave.template) ** 2
         for surface, bottom, image in images(position, receiver.pose, bottom_depth, bounces):

@@ -36,6 +36,10 @@ ASIDE = 1e-3
 """Of half a window that is cut out about a pulse: where one is farther aside of its pulse than that, all are cut anew.
 Cut aside of its pulse, a tail shifts it by 1 % of that: 16 ns, or 1.5 degrees, of a pulse of 3 kHz along the array.
 """
+FEW = 64
+"""Sensors, about, that the first fit is made of where it errs by under 0.01 periods of the band centre; else all."""
+CLEAR = 3e4
+"""Energy of a pulse at a sensor over that of the noise in a bin, above which so few sensors are tried."""
 ROBUST_ROUNDS = 3
 """Reweightings that turn outliers out of the first fit, at most."""
 FIRST_STEPS = 3
@@ -140,9 +144,8 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
     if pulse.share > SHARED and pulse.noise > AUDIBLE * knowledge.quiet:
         return refused(UNRESOLVED)
     row = _placed(wave, pulse, elements, knowledge, bend)
-    return replace(
-        row, time_error=float(np.hypot(row.time_error, _clipping_error(signals, elements, sonar, centre, half)))
-    )
+    clipping = _clipping_error(signals, elements, sonar, centre, half)
+    return replace(row, time_error=float(np.hypot(row.time_error, clipping)))
 
 
 def _placed(
@@ -183,7 +186,7 @@ def fit_pulse(
     Envelope peaks of the sensors give eq. 6 in closed form, then the sphere, robustly; then the sensors are aligned
     and their lags measured coherently, until these settle.
     """
-    first = _first_wave(signals, elements, sonar, centre, half, velocity)
+    first = _first_wave(signals, elements, sonar, centre, half, velocity, quiet)
     if first is None:
         return UNFIT
     c, q, rest, aligned, longer, (wave, off) = sonar.assumed_sound_speed, elements.position, elements, None, 1.0, first
@@ -201,7 +204,7 @@ def fit_pulse(
             if whole is None:
                 return BAND
             aligned, pulse, longer = whole
-        better = fit_wave(expected + pulse.lag, q, c, pulse.weight, wave)
+        better = spherical_wave(expected + pulse.lag, q, c, pulse.weight, wave.direction, wave.curvature)
         if better is None:
             return UNFIT
         wave, last = better, wave
@@ -220,22 +223,29 @@ def fit_pulse(
 
 
 def _first_wave(
-    signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats
+    signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats, quiet: float
 ) -> tuple[Wavefront, float] | None:
     """Wavefront through the envelope peaks of the sensors, as of `fit_pulse`, and the standard error (s) of its times,
     root mean square over the sensors; None where none fits."""
-    c, q, live = sonar.assumed_sound_speed, elements.position, elements.gain != 0
-    cut, start = pulse_times.excerpt(signals, centre, half)
-    delay, height = pulse_times.envelope_peaks(cut, signals.sampling_frequency, sonar.band)
-    loud = height**2 * live  # who hears more counts more
-    times, settled = start + delay, pulse_times.FLOOR
-    wave = robust_wave(times, q, c, loud, steps=FIRST_STEPS, rounds=ROBUST_ROUNDS, settled=settled)
-    if wave is None:
+    c, (cut, start), settled = sonar.assumed_sound_speed, pulse_times.excerpt(signals, centre, half), pulse_times.FLOOR
+    some = cut[:: max(elements.count // FEW, 1)]
+    energy = float(np.einsum("ij,ij->", some, some)) / (len(some) * signals.sampling_frequency)
+    clear = energy * 2.0 * pulse_times.half_length(sonar.band) > CLEAR * quiet
+    for every in (max(elements.count // FEW, 1), 1) if clear else (1,):
+        q, live = elements.position[::every], elements.gain[::every] != 0
+        delay, height = pulse_times.envelope_peaks(cut[::every], signals.sampling_frequency, sonar.band)
+        loud = height**2 * live  # who hears more counts more
+        wave = robust_wave(start + delay, q, c, loud, steps=FIRST_STEPS, rounds=ROBUST_ROUNDS, settled=settled)
+        if wave is not None:
+            off = 1.4826 * float(np.median(np.abs(wave.residual[live]))) * float(np.sqrt(4.0 / np.count_nonzero(live)))
+            if every == 1 or off < 0.01 / sonar.band.centre:
+                break
+    else:
         return None
-    off = 1.4826 * float(np.median(np.abs(wave.residual[live]))) * float(np.sqrt(4.0 / np.count_nonzero(live)))
     if velocity.any():
         passing = _times(wave, q, c)
-        wave = fit_wave(passing, q + (passing - wave.time)[:, None] * velocity, c, loud, wave)
+        q = q + (passing - wave.time)[:, None] * velocity[::every]
+        wave = spherical_wave(passing, q, c, loud, wave.direction, wave.curvature)
     return None if wave is None else (wave, off)
 
 
@@ -257,15 +267,6 @@ def _whole(
     return None
 
 
-def fit_wave(delay: Floats, position: Floats, sound_speed: float, weight: Floats, start: Wavefront) -> Wavefront | None:
-    """Sphere through delays; a plane where there are too few sensors for a sphere."""
-    u, k = start.direction, start.curvature
-    wave = spherical_wave(delay, position, sound_speed, weight, u, k)
-    if wave is None:
-        wave = spherical_wave(delay, position, sound_speed, weight, u, curved=False)
-    return wave
-
-
 def _times(wave: Wavefront, position: Floats, sound_speed: float) -> Floats:
     """When (sensor,) s a wave passes sensors."""
     return wave.time + wavefront_delays(position, wave.direction, wave.curvature, sound_speed)
@@ -278,12 +279,7 @@ def _settled(wave: Wavefront, last: Wavefront, position: Floats, sound_speed: fl
 
 
 def _refit(
-    pulse: Pulse,
-    wave: Wavefront,
-    elements: Elements,
-    speed: float,
-    extra: Floats | float,
-    measured: float | None = None,
+    pulse: Pulse, wave: Wavefront, elements: Elements, speed: float, extra: Floats | float, measured: float = 0.0
 ) -> Wavefront:
     """The straight wave at `speed` (m/s) that is left when delays `extra` (sensor,) in s are taken away.
 
@@ -291,4 +287,5 @@ def _refit(
     """
     q = elements.position
     own = wavefront_delays(q, wave.direction, wave.curvature, measured or speed)
-    return fit_wave(wave.time + own + wave.residual - extra, q, speed, pulse.weight, wave) or wave
+    delay = wave.time + own + wave.residual - extra
+    return spherical_wave(delay, q, speed, pulse.weight, wave.direction, wave.curvature) or wave

@@ -6,17 +6,15 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.fft import ifft, irfft, next_fast_len, rfft
+from scipy.fft import ifft, irfft, next_fast_len
 
 from sonarsynth.conventions import Floats, direction
-from sonarsynth.equations.arrays.spherical_wave import plane_wavefront, tangent_plane, wavefront_delays
+from sonarsynth.equations.arrays.spherical_wave import plane_wavefront, spherical_wave, tangent_plane, wavefront_delays
 from sonarsynth.geometry import unit
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import plane_wave_kernels, pulse_times
-from sonarsynth.ranging.location.locating import fit_wave
-from sonarsynth.ranging.location.pulse_times import AlignedPulse
-from sonarsynth.receiver import Band, Elements, Sonar
+from sonarsynth.receiver import Elements, Sonar
 
 EARLY: Final = 160e-6
 """A wave is looked for so long (s) before and after its expected time."""
@@ -61,29 +59,11 @@ class WindowSegment:
     wave: Floats  # (sensor, 2 half) Pa, about `place`, before the second window
 
 
-def cut(signals: Signals, elements: Elements, time: Floats, half: float, band: Band | None) -> AlignedPulse:
-    """As `pulse_times.align`, for a window of `half` (s) to either side; without a band: all frequencies."""
-    rate = signals.sampling_frequency
-    samples = max(int(half * rate), 4)
-    arrival = (time - signals.start) * rate
-    window = ranging_kernels.cut_out(signals.pressure, arrival, samples, (elements.gain != 0) / rate)
-    f = np.asarray(np.arange(samples + 1) * (0.5 * rate / samples), np.float64)
-    bins = slice(None) if band is None else pulse_times.in_band(f, band)
-    spectrum = np.ascontiguousarray(rfft(window, axis=1)[:, bins])
-    return AlignedPulse(
-        f[bins], ranging_kernels.turned(spectrum, _since(arrival, samples) / rate, f[bins][0], f[1]), time, float(f[1])
-    )
-
-
-def _since(arrival: Floats, samples: int) -> Floats:
-    """From the first sample of a window of 2 `samples` to the arrival (sensor,), in samples."""
-    return np.asarray(arrival - np.floor(arrival) + samples)
-
-
 def look(signals: Signals, elements: Elements, sonar: Sonar, expected: PlaneWaveFit, search: float) -> PlaneWaveFit:
     """The expected wavefront, tilted by up to `search` (rad) and moved in time to where a beam on it hears most."""
     c, u = sonar.assumed_sound_speed, expected.direction
-    aligned = cut(signals, elements, expected.delays(elements, c), pulse_times.PULSE_HALF + EARLY, sonar.band)
+    when = expected.delays(elements, c)
+    aligned = pulse_times.cut(signals, elements.gain != 0, when, pulse_times.PULSE_HALF + EARLY, sonar.band)
     wave = pulse_times.waveform(aligned, elements, c, u, expected.curvature, expected.time)
     step = 0.25 * c / (sonar.band.centre * elements.aperture)  # half a beam width
     steps = min(int(np.ceil(search / step)), STEPS)
@@ -105,12 +85,12 @@ def look(signals: Signals, elements: Elements, sonar: Sonar, expected: PlaneWave
 def refine(signals: Signals, elements: Elements, sonar: Sonar, near: PlaneWaveFit) -> tuple[PlaneWaveFit, float] | None:
     """The sphere that fits the sensors' lags, and the root mean square lag (s) that it leaves; None where none does."""
     c, q = sonar.assumed_sound_speed, elements.position
-    aligned = cut(signals, elements, near.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
+    aligned = pulse_times.cut(signals, elements.gain != 0, near.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
     wave = replace(plane_wavefront(near.direction, near.time), curvature=near.curvature)
     for _ in range(ROUNDS):
         pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
         delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c) + pulse.lag
-        better = fit_wave(delay, q, c, pulse.weight, wave)
+        better = spherical_wave(delay, q, c, pulse.weight, wave.direction, wave.curvature)
         if better is None:
             return None
         wave = better
@@ -126,7 +106,8 @@ def beam_contrast(signals: Signals, elements: Elements, sonar: Sonar, front: Pla
     of the band that the sensors' faces hear best.
     """
     c = sonar.assumed_sound_speed
-    aligned = cut(signals, elements, front.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
+    when = front.delays(elements, c)
+    aligned = pulse_times.cut(signals, elements.gain != 0, when, pulse_times.PULSE_HALF, sonar.band)
     wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
     own, energy, power = plane_wave_kernels.shares(wave.spectrum, wave.response)
     count = int(np.sum(elements.gain != 0))
@@ -156,7 +137,7 @@ def part_of(
     """
     c, rate = sonar.assumed_sound_speed, signals.sampling_frequency
     time = front.delays(elements, c) + lag
-    aligned = cut(signals, elements, time, half, None)
+    aligned = pulse_times.cut(signals, elements.gain != 0, time, half, None)
     toward = front.direction - front.curvature * elements.position
     distance = np.sqrt(np.sum(toward * toward, axis=1))
     sine = toward * (elements.face / (c * distance))[:, None]
@@ -166,7 +147,8 @@ def part_of(
     explained[:, -1] = 0.0  # half the sampling frequency cannot be moved by parts of a sample
     samples = explained.shape[1] - 1
     arrival = (time - signals.start) * rate
-    back = ranging_kernels.turned(explained, -_since(arrival, samples) / rate, 0.0, aligned.spacing)
+    since = arrival - np.floor(arrival) + samples
+    back = ranging_kernels.turned(explained, -since / rate, 0.0, aligned.spacing)
     return WindowSegment(front, arrival, irfft(back, 2 * samples, axis=1))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import fftfreq, ifft, next_fast_len, rfft
 
-from sonarsynth.conventions import Complexes, Floats, Ints
+from sonarsynth.conventions import Bools, Complexes, Floats, Ints
 from sonarsynth.equations.arrays.correlated_errors import correlated_error_factor
 from sonarsynth.equations.arrays.gates import short_spectra
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, parabola, wavefront_delays
@@ -172,24 +172,26 @@ class AlignedPulse:
     spacing: float  # Hz
 
 
-def align(
-    signals: Signals, elements: Elements, band: Band, time: Floats, *, whole: bool = False, longer: float = 1.0
-) -> AlignedPulse:
-    """Cut a window out of each sensor about `time` (sensor,), when its pulse is expected: a short one, times `longer`.
+def align(signals: Signals, elements: Elements, band: Band, time: Floats, longer: float = 1.0) -> AlignedPulse:
+    """A window of each sensor about `time` (sensor,), when its pulse is expected: a short one, times `longer`."""
+    return cut(signals, elements.gain, time, longer * half_length(band), band)
 
-    Frequencies of the band, or `whole`: all of them, from which the waveform can be had. The window moves with the
-    time, not with the samples, so that every sensor's pulse is cut alike.
+
+def cut(signals: Signals, gain: Floats | Bools, time: Floats, half: float, band: Band | None) -> AlignedPulse:
+    """A window of `half` (s) to either side of `time` (sensor,), times gain (sensor,); without a band: all frequencies,
+    from which the waveform can be had.
+
+    The window moves with the time, not with the samples, so that every sensor's pulse is cut alike.
     """
     rate = signals.sampling_frequency
-    half = max(int(longer * (PULSE_HALF if whole else half_length(band)) * rate), 4)
+    samples = max(int(half * rate), 4)
     arrival = (time - signals.start) * rate
-    cut = ranging_kernels.cut_out(signals.pressure, arrival, half, elements.gain / rate)
-    f = _frequencies(2 * half, rate)
-    bins = slice(None) if whole else in_band(f, band)
-    since = (arrival - np.floor(arrival) + half) / rate
-    spectrum = short_spectra(cut, *bins.indices(len(f))[:2])
-    spectrum = ranging_kernels.turned(spectrum, since, f[bins][0], f[1])
-    return AlignedPulse(f[bins], spectrum, time, float(f[1]))
+    window = ranging_kernels.cut_out(signals.pressure, arrival, samples, gain / rate)
+    f = _frequencies(2 * samples, rate)
+    bins = slice(None) if band is None else in_band(f, band)
+    spectrum = rfft(window, axis=1) if band is None else short_spectra(window, *bins.indices(len(f))[:2])
+    since = (arrival - np.floor(arrival) + samples) / rate
+    return AlignedPulse(f[bins], ranging_kernels.turned(spectrum, since, f[bins][0], f[1]), time, float(f[1]))
 
 
 @dataclass(frozen=True, eq=False)
