@@ -79,7 +79,8 @@ def peak_echoes(
     b, t = _maxima(profiles, axes, index, least, dynamic_range, side_lobes)
     top_offset, gain = _tops(power, index, beams, axes.resolved, b, t)
     height = power[b, t] * gain**2
-    energy = _energies(window, profiles, axes, b, height)
+    share = height * np.sqrt(np.pi) / axes.sharpness[2] / (profiles.step * profiles.total[b])  # h exp(-(sharpness t)^2)
+    energy = np.minimum(share, 1.0) * image.energy[profiles.row[b], profiles.column[b]]
     keep = (height >= least[b]) & (energy > residue(window))
     keep[keep] = _own(window, profiles, b[keep], t[keep], height[keep], noise[b[keep]])
     if not axes.resolved[:2].all():
@@ -133,18 +134,11 @@ def _once(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, t: In
     return once
 
 
-def _energies(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, height: Floats) -> Floats:
-    """Energies (peak,) in Pa2 s: of a peak h exp(-(sharpness t)^2), as a share of all that is in its beam."""
-    share = height * np.sqrt(np.pi) / axes.sharpness[2] / (profiles.step * profiles.total[b])
-    return np.asarray(np.minimum(share, 1.0) * window.image.energy[profiles.row[b], profiles.column[b]])
-
-
 def _cut(power: npt.NDArray[np.float32], b: Ints, t: Ints, end: int) -> Bools:
     """Whether peaks (peak,) are what the window left of a louder echo, whose own peak is at its end or beyond."""
     own, last = power[b, t], power.shape[1] - 1
     early = (t < 2 * end) & (power[b, :end].max(axis=1) > own)
-    late = (last - t < 2 * end) & (power[b, -end:].max(axis=1) > own)
-    return np.asarray(early | late)
+    return np.asarray(early | (last - t < 2 * end) & (power[b, -end:].max(axis=1) > own))
 
 
 @dataclass(frozen=True, eq=False)
