@@ -207,10 +207,9 @@ def noise_power(profiles: Profiles, image: EnergyImage) -> Floats:
     """
     end = min(int(pulse_times.PULSE_HALF / profiles.step), profiles.power.shape[1] // 4)
     powers = profiles.power[:, end : profiles.power.shape[1] - end : OVERSAMPLING]
-    half = powers.shape[1] // 2  # bits are in order as powers are, and twice as fast
+    half = powers.shape[1] // 2  # bits are in the order of powers, and parted twice as fast
     parted = np.partition(powers.view(np.int32), half, axis=1).view(np.float32)
-    before = parted[:, :half].max(axis=1) if powers.shape[1] % 2 == 0 else parted[:, half]
-    median = 0.5 * (before + parted[:, half])
+    median = 0.5 * (parted[:, half] + (parted[:, :half].max(axis=1) if powers.shape[1] % 2 == 0 else parted[:, half]))
     place = profiles.row - profiles.row.min(), profiles.column - profiles.column.min()
     level, filled = np.zeros((2, place[0].max() + 1, place[1].max() + 1))
     level[place], filled[place] = median / np.log(2.0), 1.0
