@@ -17,8 +17,8 @@ that did count had twice this share and more."""
 
 
 def suspects(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, counts: Floats) -> tuple[Ints, Floats]:
-    """Which peaks (b: beam, t: delay) may be grating lobes of echoes beyond the grid, the likeliest first, and the
-    frequencies of the lines that they are; counts (peak,): power that lobes must bring a peak to count.
+    """Which peaks (b: beam, t: delay) may be grating lobes of echoes beyond the grid, and the frequencies of the lines
+    that they are; counts (peak,): power that lobes must bring a peak to count.
 
     A lobe brings of an echo a line: that of the frequency at which all sensors of the lattice are in step. Where it is
     is seen in the spectrum of the peak's own beam. A line is f over the rows or columns wide, whichever are fewer, at
@@ -33,8 +33,7 @@ def suspects(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, count
     bins = np.minimum(np.maximum(width, f[line] / (min(elements.rows, elements.columns) * spacing)), len(f))
     brought = power * (bins / profiles.filter.length) ** 2
     may_count = np.flatnonzero(brought > FAINT * counts)
-    likeliest = may_count[np.argsort(counts[may_count] / brought[may_count], kind="stable")]
-    return likeliest, f[line[likeliest]]
+    return may_count, f[line[may_count]]
 
 
 def _orders(window: ReceivedWindow, profiles: Profiles) -> int:

@@ -41,8 +41,6 @@ NOISE_WIDTHS = 3.0
 """Beam widths on either side of a beam whose noise is taken for its own."""
 NOISE_ADDED = 2.0
 """Amplitude of noise, in units of its root mean square, that may be in a peak."""
-FEW, MANY = 12, 48
-"""Peaks that are followed beyond the grid first, and later: what the likeliest are lobes of explains most others."""
 LOBE_BINS, LOBE_STEPS, LOBE_ERROR = 48, 128, 4e-4
 """Frequencies that lobes are summed over; steps a period at the highest that they are tabulated at; error of that."""
 RESOLVED = 1.0
@@ -242,17 +240,14 @@ def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: F
     """Whether peaks (peak,) are more than what the lobes of the array bring of louder ones, in the grid and beyond."""
     least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
     u, delay = profiles.direction[b], profiles.step * t.astype(float)
-    own, asked, loud = _over(window, profiles.width, u, delay, height, least), least, height
-    (rest, line), many = suspects(window, profiles, b, t, least / LOBES), FEW
-    while len(some := np.flatnonzero(own[rest])):
-        some, many = some[: many if len(some) > 2 * many else None], min(2 * many, MANY)
-        p = rest[some]
-        beyond = louder_beyond(window, profiles, b[p], t[p], height[p], line[some])
-        rest, line = rest[some[-1] + 1 :], line[some[-1] + 1 :]
-        if len(beyond[0]):
-            u, delay, loud = (np.concatenate(both) for both in zip((u, delay, loud), beyond, strict=True))
-            asked = np.append(asked, np.full(len(beyond[0]), np.inf))
-            own &= _over(window, profiles.width, u, delay, loud, asked)[: len(own)]
+    own = _over(window, profiles.width, u, delay, height, least)
+    p, line = suspects(window, profiles, b, t, least / LOBES)
+    p, line = p[own[p]], line[own[p]]
+    beyond = louder_beyond(window, profiles, b[p], t[p], height[p], line)
+    if len(beyond[0]):
+        u, delay, height = (np.concatenate(both) for both in zip((u, delay, height), beyond, strict=True))
+        asked = np.append(np.where(own, least, np.inf), np.full(len(u) - len(b), np.inf))
+        own &= _over(window, profiles.width, u, delay, height, asked)[: len(own)]
     return own
 
 
