@@ -52,4 +52,4 @@ class BeamSpectra:
     """Energy (elevation, azimuth) in Pa2 s of the beams of the sonar's grid, of which the image is made."""
     spectra: Callable[[Floats], npt.NDArray[np.complex64]]
     """Spectra (beam, bin) in Pa of beams in directions (beam, xyz), sonar frame, of which echoes are picked: a plane
-    wave from there gives its own."""
+    wave from there gives its own. The array is new each time, and its user's to change."""

@@ -102,20 +102,8 @@ def _loudest_near(profiles: Profiles, image: EnergyImage, top: Ints) -> npt.NDAr
     index[profiles.row, profiles.column] = np.arange(len(top))
     reach = 2 * profiles.width
     up, across = (_cells(grid, reach) for grid in (image.elevation, image.azimuth))
-    return np.asarray(
-        ranging_kernels.loudest_near(
-            profiles.power,
-            top,
-            profiles.about,
-            profiles.row,
-            profiles.column,
-            index,
-            up,
-            across,
-            profiles.direction,
-            reach,
-        )
-    )
+    beams = profiles.row, profiles.column, index, up, across, profiles.direction, reach
+    return np.asarray(ranging_kernels.loudest_near(profiles.power, top, profiles.about, *beams))
 
 
 def _cells(grid: Floats, reach: float) -> int:

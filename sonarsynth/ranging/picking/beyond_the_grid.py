@@ -17,8 +17,8 @@ that did count had twice this share and more."""
 
 
 def suspects(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, counts: Floats) -> tuple[Ints, Floats]:
-    """Which peaks (b: beam, t: delay) may be grating lobes of echoes beyond the grid, the likeliest first, and the
-    frequencies of the lines that they are; counts (peak,): power that lobes must bring a peak to count.
+    """Which peaks (b: beam, t: delay) may be grating lobes of echoes beyond the grid, and the frequencies of the lines
+    that they are; counts (peak,): power that lobes must bring a peak to count.
 
     A lobe brings of an echo a line: that of the frequency at which all sensors of the lattice are in step. Where it is
     is seen in the spectrum of the peak's own beam. A line is f over the rows or columns wide, whichever are fewer, at
@@ -33,8 +33,7 @@ def suspects(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, count
     bins = np.minimum(np.maximum(width, f[line] / (min(elements.rows, elements.columns) * spacing)), len(f))
     brought = power * (bins / profiles.filter.length) ** 2
     may_count = np.flatnonzero(brought > FAINT * counts)
-    likeliest = may_count[np.argsort(counts[may_count] / brought[may_count], kind="stable")]
-    return likeliest, f[line[likeliest]]
+    return may_count, f[line[may_count]]
 
 
 def _orders(window: ReceivedWindow, profiles: Profiles) -> int:
@@ -48,13 +47,11 @@ def louder_beyond(
     window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats, line: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Directions (echo, xyz), delays (s) and heights of echoes beyond the grid that are louder than peaks in it (b:
-    beam, t: delay, height), where these are grating lobes of them at the frequencies line (peak,).
-
-    They come from directions whose components along the lattice are whole multiples of c/(f pitch) off.
-    """
+    beam, t: delay, height), where these are grating lobes of them at the frequencies line (peak,): from directions
+    whose components along the lattice are whole multiples of c/(f pitch) off."""
     elements, c, image = window.elements, window.sonar.assumed_sound_speed, window.image
     most = _orders(window, profiles)
-    orders = np.stack(np.meshgrid(*2 * [np.arange(-most, most + 1)]), axis=-1).reshape(-1, 2)
+    orders = np.mgrid[-most : most + 1, -most : most + 1].reshape(2, -1).T
     along = profiles.direction[b, None, 1:] + orders * (c / (elements.pitch * line))[:, None, None]
     square = np.sum(along**2, axis=2)
     peak, order = np.nonzero((square < 1.0) & orders.any(axis=1))
@@ -66,9 +63,8 @@ def louder_beyond(
     far = np.linalg.norm(u - profiles.direction[b[peak]], axis=1) * (farthest(elements.position) / c / profiles.step)
     first, last = np.maximum(np.ceil(t[peak] - far), 0.0).astype(int), (t[peak] + far).astype(int) + 1
     late, loudest = np.empty(len(u), int), np.empty(len(u))
-    if len(u):
-        for n, power in enumerate(profiles.filter.profiles(u)[1]):
-            late[n] = first[n] + power[first[n] : last[n]].argmax()
-            loudest[n] = power[late[n]]
+    for n, power in enumerate(profiles.filter.profiles(u)[1] if len(u) else ()):
+        late[n] = first[n] + power[first[n] : last[n]].argmax()
+        loudest[n] = power[late[n]]
     louder = loudest > height[peak]
     return u[louder], profiles.step * late[louder], loudest[louder]

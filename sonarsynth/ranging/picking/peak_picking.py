@@ -41,8 +41,6 @@ NOISE_WIDTHS = 3.0
 """Beam widths on either side of a beam whose noise is taken for its own."""
 NOISE_ADDED = 2.0
 """Amplitude of noise, in units of its root mean square, that may be in a peak."""
-FEW, MANY = 12, 48
-"""Peaks that are followed beyond the grid first, and later: what the likeliest are lobes of explains most others."""
 LOBE_BINS, LOBE_STEPS, LOBE_ERROR = 48, 128, 4e-4
 """Frequencies that lobes are summed over; steps a period at the highest that they are tabulated at; error of that."""
 RESOLVED = 1.0
@@ -79,7 +77,8 @@ def peak_echoes(
     b, t = _maxima(profiles, axes, index, least, dynamic_range, side_lobes)
     top_offset, gain = _tops(power, index, beams, axes.resolved, b, t)
     height = power[b, t] * gain**2
-    energy = _energies(window, profiles, axes, b, height)
+    share = height * np.sqrt(np.pi) / axes.sharpness[2] / (profiles.step * profiles.total[b])  # h exp(-(sharpness t)^2)
+    energy = np.minimum(share, 1.0) * image.energy[profiles.row[b], profiles.column[b]]
     keep = (height >= least[b]) & (energy > residue(window))
     keep[keep] = _own(window, profiles, b[keep], t[keep], height[keep], noise[b[keep]])
     if not axes.resolved[:2].all():
@@ -134,18 +133,11 @@ def _once(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, t: In
     return once
 
 
-def _energies(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, height: Floats) -> Floats:
-    """Energies (peak,) in Pa2 s: of a peak h exp(-(sharpness t)^2), as a share of all that is in its beam."""
-    share = height * np.sqrt(np.pi) / axes.sharpness[2] / (profiles.step * profiles.total[b])
-    return np.asarray(np.minimum(share, 1.0) * window.image.energy[profiles.row[b], profiles.column[b]])
-
-
 def _cut(power: npt.NDArray[np.float32], b: Ints, t: Ints, end: int) -> Bools:
     """Whether peaks (peak,) are what the window left of a louder echo, whose own peak is at its end or beyond."""
     own, last = power[b, t], power.shape[1] - 1
     early = (t < 2 * end) & (power[b, :end].max(axis=1) > own)
-    late = (last - t < 2 * end) & (power[b, -end:].max(axis=1) > own)
-    return np.asarray(early | late)
+    return np.asarray(early | (last - t < 2 * end) & (power[b, -end:].max(axis=1) > own))
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,10 +207,9 @@ def noise_power(profiles: Profiles, image: EnergyImage) -> Floats:
     """
     end = min(int(pulse_times.PULSE_HALF / profiles.step), profiles.power.shape[1] // 4)
     powers = profiles.power[:, end : profiles.power.shape[1] - end : OVERSAMPLING]
-    half = powers.shape[1] // 2  # bits are in order as powers are, and twice as fast
+    half = powers.shape[1] // 2  # bits are in the order of powers, and parted twice as fast
     parted = np.partition(powers.view(np.int32), half, axis=1).view(np.float32)
-    before = parted[:, :half].max(axis=1) if powers.shape[1] % 2 == 0 else parted[:, half]
-    median = 0.5 * (before + parted[:, half])
+    median = 0.5 * (parted[:, half] + (parted[:, :half].max(axis=1) if powers.shape[1] % 2 == 0 else parted[:, half]))
     place = profiles.row - profiles.row.min(), profiles.column - profiles.column.min()
     level, filled = np.zeros((2, place[0].max() + 1, place[1].max() + 1))
     level[place], filled[place] = median / np.log(2.0), 1.0
@@ -251,17 +242,14 @@ def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: F
     """Whether peaks (peak,) are more than what the lobes of the array bring of louder ones, in the grid and beyond."""
     least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
     u, delay = profiles.direction[b], profiles.step * t.astype(float)
-    own, asked, loud = _over(window, profiles.width, u, delay, height, least), least, height
-    (rest, line), many = suspects(window, profiles, b, t, least / LOBES), FEW
-    while len(some := np.flatnonzero(own[rest])):
-        some, many = some[: many if len(some) > 2 * many else None], min(2 * many, MANY)
-        p = rest[some]
-        beyond = louder_beyond(window, profiles, b[p], t[p], height[p], line[some])
-        rest, line = rest[some[-1] + 1 :], line[some[-1] + 1 :]
-        if len(beyond[0]):
-            u, delay, loud = (np.concatenate(both) for both in zip((u, delay, loud), beyond, strict=True))
-            asked = np.append(asked, np.full(len(beyond[0]), np.inf))
-            own &= _over(window, profiles.width, u, delay, loud, asked)[: len(own)]
+    own = _over(window, profiles.width, u, delay, height, least)
+    p, line = suspects(window, profiles, b, t, least / LOBES)
+    p, line = p[own[p]], line[own[p]]
+    beyond = louder_beyond(window, profiles, b[p], t[p], height[p], line)
+    if len(beyond[0]):
+        u, delay, height = (np.concatenate(both) for both in zip((u, delay, height), beyond, strict=True))
+        asked = np.append(np.where(own, least, np.inf), np.full(len(u) - len(b), np.inf))
+        own &= _over(window, profiles.width, u, delay, height, asked)[: len(own)]
     return own
 
 
