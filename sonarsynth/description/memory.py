@@ -16,6 +16,13 @@ SAMPLE_BYTES: Final = 24
 3000 to 40 000 samples of 508 hydrophones."""
 PROCESS_BYTES: Final = 300e6
 """Of memory that a process takes before it makes a frame; measured 250 MB."""
+HELD_BYTES: Final = 8
+"""Of memory that a sample of a hydrophone takes in a frame that waits for its next stage; measured 5.4 to 6."""
+TOGETHER: Final = 8
+"""Frames at most that go through each stage together, so that its code and constants are in the caches for all but the
+first."""
+TOGETHER_BYTES: Final = 100e6
+"""Of memory at most that frames take that go through each stage together."""
 SHARD_COPIES: Final = 3
 """Times the bytes of a shard that a process takes to keep its frames and to write them; measured 2.3 to 2.9."""
 
@@ -23,7 +30,13 @@ SHARD_COPIES: Final = 3
 def frame_bytes(facets: int, samples: int, parts: int = 0) -> float:
     """Bytes of memory of a process that makes frames of so many facets, and samples of all hydrophones together; parts:
     of the sound that are kept beside the whole."""
-    return PROCESS_BYTES + BYTES * facets + (SAMPLE_BYTES + 4 * parts) * samples
+    waiting = (frames_together(samples, parts) - 1) * (HELD_BYTES + 4 * parts)
+    return PROCESS_BYTES + BYTES * facets + (SAMPLE_BYTES + 4 * parts + waiting) * samples
+
+
+def frames_together(samples: int, parts: int = 0) -> int:
+    """Frames that go through each stage together; arguments as of `frame_bytes`."""
+    return int(min(max(TOGETHER_BYTES / ((HELD_BYTES + 4 * parts) * max(samples, 1)), 1), TOGETHER))
 
 
 def max_facets() -> int:

@@ -13,13 +13,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from sonarsynth.conventions import Floats
 from sonarsynth.description.method import returned
 from sonarsynth.labels import echo_levels, label, link_budget, path_powers
 from sonarsynth.labels.estimate_labels import Direct
-from sonarsynth.pipeline.echo_image import image_of, image_without_clock
+from sonarsynth.pipeline.echo_image import cloud_of, image_of, image_without_clock, range_image_of
 from sonarsynth.pipeline.frame_chorus import clear_values, frame_chorus, soundscape_values, with_chorus
 from sonarsynth.pipeline.frame_reverberation import frame_reverberation, scattered_paths, with_reverberation
 from sonarsynth.pipeline.handed_on import BeamformedFrame, TracedFrame
@@ -47,19 +45,14 @@ from sonarsynth.pipeline.synthesis import NO_RECORDER, Recorder, digitise, frame
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, frame_tree, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
-from sonarsynth.products import Arrivals, PointCloud, Signals, no_points
-from sonarsynth.ranging import ranging_kernels
-from sonarsynth.ranging.clouds import point_cloud
+from sonarsynth.products import Arrivals, PointCloud, Signals
 from sonarsynth.ranging.location.association import in_record, light_first
-from sonarsynth.ranging.range_image import range_image
-from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.filtered_pulse import snap_levels
 from sonarsynth.threads import in_one_thread
 from sonarsynth.tracing.arrivals import trace
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
     import xarray as xr
 
     from sonarsynth.recipe import Recipe
@@ -87,6 +80,7 @@ __all__ = [
     "stage_timer",
     "trace_at",
     "trace_frame",
+    "trace_paths",
     "values_at",
     "variables",
 ]
@@ -112,6 +106,14 @@ def silent_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> Val
 def trace_frame(plan: Plan, index: int) -> TracedFrame:
     """Every path of a frame, and its truth."""
     return trace_at(*_checked(plan, index))
+
+
+def trace_paths(plan: Plan, index: int) -> tuple[Frame, Arrivals]:
+    """A frame and every path of it, for `trace_at`."""
+    plan, frame = _checked(plan, index)
+    arrivals = trace(context_of(plan, frame), plan.propagation)
+    mark_stage("trace")
+    return frame, arrivals
 
 
 def _checked(plan: Plan, index: int) -> tuple[Plan, Frame]:
@@ -194,10 +196,12 @@ def synthesise(plan: Plan, traced: TracedFrame, recorder: Recorder = NO_RECORDER
     return digitise(plan, traced.frame, signals, recorder)
 
 
-def range_frame(plan: Plan, index: int, traced: TracedFrame, beamformed: BeamformedFrame) -> Values:
-    """The point cloud, and every stored value of the frame."""
+def range_frame(
+    plan: Plan, index: int, traced: TracedFrame, beamformed: BeamformedFrame, cloud: PointCloud | None = None
+) -> Values:
+    """The point cloud, and every stored value of the frame; cloud: its points, where these are made already."""
     plan = plan.at(index)
-    values = in_slots(plan, _beamformed_values(plan, traced, beamformed) | which_values(plan), VARIABLES)
+    values = in_slots(plan, _beamformed_values(plan, traced, beamformed, cloud) | which_values(plan), VARIABLES)
     mark_stage("label")
     return values
 
@@ -213,7 +217,9 @@ def _traced_values(plan: Plan, traced: TracedFrame, direct: Direct, isolated: Fl
     return values | estimate_truth(plan, frame, direct)
 
 
-def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFrame) -> Values:
+def _beamformed_values(
+    plan: Plan, traced: TracedFrame, beamformed: BeamformedFrame, cloud: PointCloud | None
+) -> Values:
     """All stored values, before targets get their slots; `plan` is that of the frame's sequence."""
     frame = traced.frame
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
@@ -236,41 +242,11 @@ def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFr
         values |= range_image_values(plan, range_image_of(plan, frame, beamformed), traced.truth)
         mark_stage("range image")
     if "cloud" in plan.products:
-        cloud = cloud_of(plan, frame, beamformed).loudest(plan.sizes["point"])
-        mark_stage("range")
+        cloud = (cloud_of(plan, frame, beamformed) if cloud is None else cloud).loudest(plan.sizes["point"])
         scattered = scattered_paths(plan, traced.arrivals, traced.reverberation)
         labels = point_labels(plan, frame, traced.arrivals, beamformed.estimates, cloud, scattered)
         values |= cloud_values(cloud, labels, plan.sizes["point"], len(frame.moment.bodies))
     return values
-
-
-def _received(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> ReceivedWindow | None:
-    """What ranging needs; None where the image has no clock, for which no beams are kept."""
-    image, signals, estimates, beams = beamformed.image, beamformed.imaged, beamformed.estimates, beamformed.beams
-    if image is None or signals is None or estimates is None or beams is None:
-        return None
-    elements, sonar, supports = known_elements(plan, frame), plan.scene.sonar, plan.windows.supports
-    some = np.arange(elements.count) % max(elements.count // 64, 1) == 0
-    loudest = ranging_kernels.power_and_peak(signals.pressure, some & (elements.gain != 0))[1]
-    focus, direct = plan.choices.beamforming.focus, beamformed.signals
-    return ReceivedWindow(
-        elements, sonar, image, beams, loudest, direct, estimates, focus, supports.late, supports.direct
-    )
-
-
-def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointCloud:
-    """The points of a frame that has an image; `plan` is that of its sequence."""
-    window, choices = _received(plan, frame, beamformed), plan.choices
-    if window is None:
-        return no_points()
-    track = receiver_of(plan, frame).track
-    return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile, track)
-
-
-def range_image_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> npt.NDArray[np.float32] | None:
-    """The range image of a frame (range, azimuth); none as for `cloud_of`. `plan` is that of its sequence."""
-    window, grid = _received(plan, frame, beamformed), plan.scene.sonar.ranges
-    return None if window is None or grid is None else range_image(window, grid.range, receiver_of(plan, frame).track)
 
 
 def values_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> Values:

@@ -1,14 +1,24 @@
-"""The energy image of the echo window, without the direct pulse where echoes come before it is over."""
+"""The energy image of the echo window, without the direct pulse where echoes come before it is over; and the points and
+the range image that its beams give."""
 
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from sonarsynth.imaging.image_window import energy_image, snapshots_of
-from sonarsynth.planning import Plan
-from sonarsynth.products import BeamSpectra, EnergyImage, Signals, SourceEstimates
+from sonarsynth.pipeline.handed_on import BeamformedFrame
+from sonarsynth.pipeline.stage_times import mark_stage
+from sonarsynth.pipeline.synthesis import known_elements
+from sonarsynth.planning import Plan, receiver_of
+from sonarsynth.products import BeamSpectra, EnergyImage, PointCloud, Signals, SourceEstimates, no_points
+from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
+from sonarsynth.ranging.clouds import point_cloud
+from sonarsynth.ranging.range_image import range_image
+from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.recipe.scene import Frame
 
 
 def image_of(
@@ -53,3 +63,34 @@ def image_without_clock(plan: Plan, elements: Elements, signals: Signals) -> Ene
     stop = signals.start + (signals.pressure.shape[1] - 1) / signals.sampling_frequency
     start = max(stop - plan.windows.echo_duration, signals.start)
     return plan.choices.beamforming.image(signals, elements, plan.scene.sonar, start, stop)
+
+
+def _received(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> ReceivedWindow | None:
+    """What ranging needs; None where the image has no clock, for which no beams are kept."""
+    image, signals, estimates, beams = beamformed.image, beamformed.imaged, beamformed.estimates, beamformed.beams
+    if image is None or signals is None or estimates is None or beams is None:
+        return None
+    elements, sonar, supports = known_elements(plan, frame), plan.scene.sonar, plan.windows.supports
+    some = np.arange(elements.count) % max(elements.count // 64, 1) == 0
+    loudest = ranging_kernels.power_and_peak(signals.pressure, some & (elements.gain != 0))[1]
+    focus, direct = plan.choices.beamforming.focus, beamformed.signals
+    return ReceivedWindow(
+        elements, sonar, image, beams, loudest, direct, estimates, focus, supports.late, supports.direct
+    )
+
+
+def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointCloud:
+    """The points of a frame that has an image; `plan` is that of its sequence."""
+    window, choices = _received(plan, frame, beamformed), plan.choices
+    if window is None:
+        return no_points()
+    track = receiver_of(plan, frame).track
+    cloud = point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile, track)
+    mark_stage("range")
+    return cloud
+
+
+def range_image_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> npt.NDArray[np.float32] | None:
+    """The range image of a frame (range, azimuth); none as for `cloud_of`. `plan` is that of its sequence."""
+    window, grid = _received(plan, frame, beamformed), plan.scene.sonar.ranges
+    return None if window is None or grid is None else range_image(window, grid.range, receiver_of(plan, frame).track)

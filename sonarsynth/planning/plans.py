@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Floats, counted
-from sonarsynth.description.memory import SHARD_COPIES, frame_bytes
+from sonarsynth.description.memory import SHARD_COPIES, frame_bytes, frames_together
 from sonarsynth.environment.absorption import DepthAbsorption
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry.motion import pose
@@ -196,6 +196,11 @@ class Plan:
     def predicted_seconds(self) -> float:
         """Seconds of one core for the whole dataset, by counts of work; `schedule.predict` knows better."""
         return self.recipe.frames * sum(s.seconds for s in self.stages)
+
+    @property
+    def frames_together(self) -> int:
+        """Frames that go through each stage together where a dataset is built."""
+        return frames_together(self.sizes["sensor"] * self.sizes["sample"], self.scene.parts_kept)
 
     @property
     def memory_bytes(self) -> float:

@@ -57,7 +57,8 @@ def job_of(path: Folder, plan: Plan, build: str, frame_timeout: float | None = N
     limit = PATIENCE + 20 * predicted if frame_timeout is None else frame_timeout
     frames = min(BLOCK_SECONDS / max(predicted, 1e-6), plan.shard_frames)
     products = tuple(sorted(plan.products))
-    return Job(str(path), plan.digest, products, build, limit, plan.shard_frames, max(int(frames), 1))
+    block, together = max(int(frames), 1), plan.frames_together
+    return Job(str(path), plan.digest, products, build, limit, plan.shard_frames, block, together)
 
 
 def make_shards(

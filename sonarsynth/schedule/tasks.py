@@ -14,7 +14,6 @@ import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, fields, replace
-from functools import reduce
 from pathlib import Path
 from typing import Any, Final
 
@@ -40,6 +39,7 @@ class Job:
     frame_timeout: float = 0.0  # s that a stage of a frame may take; 0: no limit
     shard_frames: int = 0  # frames of a shard; 0: as planned
     block: int = 1  # frames of a task
+    together: int = 1  # of these, that go through each stage one after the other
 
 
 @dataclass(frozen=True)
@@ -91,9 +91,16 @@ def tasks_of(job: Job) -> list[list[str]]:
 
 @in_one_thread
 def run_stages(job: Job, stages: Sequence[str], before: Sequence[StageResult]) -> list[StageResult]:
-    """Task <stages>-<token>-<first frame>: what some stages make of some frames, one frame after the other; of the last
-    one, values in the types of the store."""
-    return [reduce(lambda so_far, stage: _stage(job, stage, so_far), stages, frame) for frame in before]
+    """Task <stages>-<token>-<first frame>: what some stages make of some frames, of a few before the next few; of the
+    last one, values in the types of the store."""
+    done: list[StageResult] = []
+    for first in range(0, len(before), job.together):
+        some = list(before[first : first + job.together])
+        for name in stages:
+            for step in STAGES[name]:
+                some = [_step(job, name, step, so_far) for so_far in some]
+        done += some
+    return done
 
 
 def render_frames(job: Job, frames: Sequence[int]) -> list[StageResult]:
@@ -108,25 +115,41 @@ def stages_of(products: Iterable[str]) -> list[str]:
 
 
 def _trace(plan: Plan, frame: int, before: Any) -> Any:
+    """The frame and its paths, where anything is heard."""
+    return pipeline.trace_paths(plan, frame) if plan.makes_sound else None
+
+
+def _label(plan: Plan, frame: int, paths: Any) -> Any:
     """What was traced; where nothing is heard, truth."""
     if plan.makes_sound:
-        return pipeline.trace_frame(plan, frame)
+        return pipeline.trace_at(plan.at(frame), *paths)
     return layout_of(plan).check(pipeline.silent_frame(plan, frame))
 
 
 def _beamform(plan: Plan, frame: int, traced: pipeline.TracedFrame) -> Any:
     """What was traced with what was heard; values, where that is the last stage."""
     both = traced, pipeline.beamform_frame(plan, frame, traced)
-    return both if len(stages_of(plan.products)) == 3 else _range(plan, frame, both)
+    return both if len(stages_of(plan.products)) == 3 else _values(plan, frame, both)
 
 
 def _range(plan: Plan, frame: int, before: tuple[pipeline.TracedFrame, pipeline.BeamformedFrame]) -> Any:
+    """That, with the points."""
+    traced, beamformed = before
+    return *before, pipeline.cloud_of(plan.at(frame), traced.frame, beamformed) if "cloud" in plan.products else None
+
+
+def _values(plan: Plan, frame: int, before: Any) -> Any:
     """The values of the frame."""
     return layout_of(plan).check(pipeline.range_frame(plan, frame, *before))
 
 
-STAGES: Final[Mapping[str, Callable[[Plan, int, Any], Any]]] = {"trace": _trace, "beamform": _beamform, "range": _range}
-"""What each stage makes of the plan, the number of a frame and what the stage before made."""
+Step = Callable[[Plan, int, Any], Any]
+STAGES: Final[Mapping[str, Sequence[Step]]] = {
+    "trace": (_trace, _label),
+    "beamform": (_beamform,),
+    "range": (_range, _values),
+}
+"""What each stage makes, step by step, of the plan, the number of a frame and what the step before made."""
 
 
 def write(job: Job, shard: int, blocks: Sequence[Sequence[StageResult]]) -> WrittenShard:
@@ -205,29 +228,34 @@ def peak_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def _stage(job: Job, name: str, before: StageResult) -> StageResult:
+def _step(job: Job, name: str, step: Step, before: StageResult) -> StageResult:
+    """A step of the stage `name` of a frame."""
     if before.failure is not None:
         return before
     wall, cpu = time.perf_counter(), time.thread_time()
     with pipeline.stage_timer() as laps:
         try:
-            with worker_status.noted(job.path, before.frame, name, _limit(job, name)):
-                value, failure = STAGES[name](plan_of(job), before.frame, before.value), None
-            _warm.add(name)
+            with worker_status.noted(job.path, before.frame, name, _limit(job, step, before.seconds.get(name, 0.0))):
+                value, failure = step(plan_of(job), before.frame, before.value), None
+            _warm.add(step)
         except Exception as error:
             value, failure = None, failure_of(before.frame, name, error)
-    seconds = {**before.seconds, name: time.perf_counter() - wall}
-    spent = {**before.cpu, name: time.thread_time() - cpu}
+    wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
+    seconds = {**before.seconds, name: before.seconds.get(name, 0.0) + wall}
+    spent = {**before.cpu, name: before.cpu.get(name, 0.0) + cpu}
     laps = {n: before.parts.get(n, 0.0) + laps.get(n, 0.0) for n in {**before.parts, **laps}}  # labels come twice
     return StageResult(before.frame, value, failure, seconds, spent, laps)
 
 
-_warm: set[str] = set()
+_warm: set[Step] = set()
 
 
-def _limit(job: Job, stage: str) -> float:
-    """Seconds that a stage may take: the first of its kind in a process loads and compiles what it needs."""
-    return job.frame_timeout + (0.0 if stage in _warm or not job.frame_timeout else WARM_UP)
+def _limit(job: Job, step: Step, spent: float) -> float:
+    """Seconds that a step may take of a stage that has taken some already: the first of its kind in a process loads and
+    compiles what it needs."""
+    if not job.frame_timeout:
+        return 0.0
+    return max(job.frame_timeout - spent, 0.01) + (0.0 if step in _warm else WARM_UP)
 
 
 def failure_of(frame: int, stage: str, error: BaseException) -> Failure:

@@ -37,7 +37,7 @@ def nothing_is_rendered(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise AssertionError("a frame was rendered")
 
-    monkeypatch.setattr(pipeline, "trace_frame", refuse)
+    monkeypatch.setattr(pipeline, "trace_paths", refuse)
 
 
 WATER = "scene.world.environment"

@@ -112,6 +112,21 @@ def test_a_task_is_of_one_frame_where_they_are_long(small_plan: Plan) -> None:
     assert block(1e-9) == 64
 
 
+def test_frames_that_go_through_stages_together_are_those_that_go_alone(small_plan: Plan) -> None:
+    job = job_of("nowhere", small_plan, "")
+    assert job.together > 2
+    made = []
+    for together in (1, 2, job.together):
+        asked = replace(job, together=together)
+        tasks.remember(asked, small_plan)
+        made.append(tasks.render_frames(asked, range(5)))
+    for alone, *others in zip(*made, strict=True):
+        for other in others:
+            assert alone.value.keys() == other.value.keys()
+            pairs = ((np.asarray(value), np.asarray(other.value[name])) for name, value in alone.value.items())
+            assert all(contents(one) == contents(same) for one, same in pairs)
+
+
 def test_a_part_and_then_the_whole_is_the_whole_at_once(tmp_path: Path, small_plan: Plan, reference: Path) -> None:
     path = tmp_path / "s.zarr"
     part = build(small_plan, path, frames=[*range(5), 17], workers=0)
@@ -170,7 +185,7 @@ def test_disk_trouble_on_a_worker_ends_the_build(
 @pytest.mark.parametrize(
     ("stage", "distributed"),
     [
-        ("trace_frame", False),
+        ("trace_paths", False),
         pytest.param("range_frame", False, marks=pytest.mark.long),
         pytest.param("beamform_frame", True, marks=pytest.mark.long),
     ],
@@ -222,7 +237,7 @@ def test_values_that_do_not_fit_set_their_frame_aside(
 def test_a_shard_with_no_good_frame_is_not_marked(
     tmp_path: Path, small_plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "trace_frame", lambda made, i: 1 / 0)
+    monkeypatch.setattr(pipeline, "trace_paths", lambda made, i: 1 / 0)
     report = build(small_plan, tmp_path / "s.zarr", frames=range(10), workers=0)
     assert (report.written, report.shards, len(report.failures)) == (0, 0, 10)
     assert store.frames_there(tmp_path / "s.zarr") == []

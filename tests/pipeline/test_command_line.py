@@ -119,7 +119,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_anything_is_planned(
 def test_failed_frames_are_status_3(
     command: Command, small_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "trace_frame", lambda made, i: 1 / 0)
+    monkeypatch.setattr(pipeline, "trace_paths", lambda made, i: 1 / 0)
     answer = command("build", small_file, tmp_path / "s.zarr", "--workers", "0", "--frames", "3")
     assert answer.status == 3
     assert "frame 3 failed in trace: ZeroDivisionError: division by zero" in answer.out
@@ -131,7 +131,7 @@ def test_an_interrupted_build_is_status_130(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pipeline, "trace_frame", stop)
+    monkeypatch.setattr(pipeline, "trace_paths", stop)
     answer = command("build", small_file, tmp_path / "s.zarr", "--workers", "0")
     assert answer.status == 130
     assert one_line(answer) == "interrupted; run the same command again to resume"

@@ -140,9 +140,9 @@ def test_failed_frames_are_known_the_next_time(
 ) -> None:
     from sonarsynth import pipeline
 
-    trace = pipeline.trace_frame
+    trace = pipeline.trace_paths
     with monkeypatch.context() as patch:
-        patch.setattr(pipeline, "trace_frame", lambda plan, i: 1 / 0 if i == 3 else trace(plan, i))
+        patch.setattr(pipeline, "trace_paths", lambda plan, i: 1 / 0 if i == 3 else trace(plan, i))
         assert not schedule.build(small_plan, place, frames=FRAMES, workers=0).ok
     assert store.beside(place, "failed.jsonl").exists()
     again = schedule.build(small_plan, place, frames=FRAMES, workers=0)

@@ -223,8 +223,8 @@ def test_a_store_keeps_the_shards_that_it_was_begun_with(
 
 
 def test_numbers_that_come_out_differently_are_said(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    works = pipeline.trace_frame
-    monkeypatch.setattr(pipeline, "trace_frame", lambda made, i: works(made, i - i % 2))
+    works = pipeline.trace_paths
+    monkeypatch.setattr(pipeline, "trace_paths", lambda made, i: works(made, i - i % 2))
     os.truncate(copy / SHARD, 10)
     report = repair(copy, workers=0)
     assert report.differing == [1]
@@ -232,10 +232,10 @@ def test_numbers_that_come_out_differently_are_said(copy: Path, monkeypatch: pyt
 
 
 def test_a_frame_that_cannot_be_rebuilt_fails(copy: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    works = pipeline.trace_frame
+    works = pipeline.trace_paths
     os.truncate(copy / SHARD, 10)
     with monkeypatch.context() as patch:
-        patch.setattr(pipeline, "trace_frame", lambda made, i: 1 / 0 if i == 9 else works(made, i))
+        patch.setattr(pipeline, "trace_paths", lambda made, i: 1 / 0 if i == 9 else works(made, i))
         report = repair(copy, workers=0)
     assert [f.frame for f in report.failures] == [9]
     assert not report.ok

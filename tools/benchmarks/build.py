@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,9 @@ from benchmarks.timing import RECIPE, gemm, markdown
 from sonarsynth import pipeline, planning, schedule, store
 from sonarsynth.planning import Plan
 from sonarsynth.recipe import reading
+from sonarsynth.schedule import tasks
+from sonarsynth.schedule.making import job_of
+from sonarsynth.schedule.tasks import StageResult
 from sonarsynth.store.encoding import encoded
 
 WARM, FRAMES, BUILDS, STARTS = 8, 32, 3, 3
@@ -40,19 +44,18 @@ def different(first: Path, second: Path) -> list[str]:
     ]
 
 
-def one(plan: Plan, index: int) -> tuple[pipeline.Values, dict[str, float]]:
-    """A frame, and processor seconds by stage."""
-    with pipeline.stage_timer() as seconds:
-        traced = pipeline.trace_frame(plan, index)
-        values = pipeline.range_frame(plan, index, traced, pipeline.beamform_frame(plan, index, traced))
-    return values, dict(seconds)
+def made(plan: Plan, frames: Sequence[int]) -> list[StageResult]:
+    """Some frames, as a worker makes those of a task."""
+    job = job_of("nowhere", plan, "")
+    tasks.remember(job, plan)
+    return tasks.render_frames(job, frames)
 
 
 def stages(plan: Plan, folder: Path) -> tuple[dict[str, float], float]:
     """Processor time (ms) of each stage of a frame, the median of frames, of writing it, the mean; and of compressing
     and writing it in shards of `FRAMES`, as large datasets have them."""
-    made = [one(plan, index) for index in range(WARM + FRAMES)][WARM:]
-    laps, values = [seconds for _, seconds in made], [found for found, _ in made]
+    steps = made(plan, range(WARM + FRAMES))[WARM:]
+    laps, values = [step.parts for step in steps], [step.value for step in steps]
     ms = {stage: 1e3 * float(np.median([lap[stage] for lap in laps])) for stage in pipeline.STAGES if stage in laps[0]}
     compressing, writing = written(plan, folder, values)
     many = written(replace(plan, shard_frames=FRAMES), folder, values)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.build import one
+from benchmarks.build import made
 from benchmarks.timing import RECIPE, gemm, markdown
 from sonarsynth import pipeline, planning
 from sonarsynth.planning import choosing
@@ -59,9 +59,8 @@ def measured(sets: tuple[str, ...]) -> dict[str, Any]:
     began = time.process_time()
     plan = planning.plan(recipe, {"image", "cloud"})
     planned = time.process_time() - began
-    for index in FRAMES:
-        one(plan, index)
-    laps = [one(plan, index)[1] for index in FRAMES]
+    made(plan, FRAMES)
+    laps = [step.parts for step in made(plan, FRAMES)]
     stages = {stage: 1e3 * float(np.median([lap[stage] for lap in laps])) for stage in laps[0]}
     beams = plan.scene.sonar.beams
     sizes = {

@@ -8,12 +8,13 @@ what else the machine does falls on all alike; ratios are medians of those of si
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from benchmarks.build import one
+from benchmarks.build import made
 from benchmarks.timing import CONFIGS, gemm, markdown, once
 from sonarsynth.planning import Plan, plan
 from sonarsynth.recipe import reading
@@ -32,14 +33,14 @@ def bench() -> dict[str, Any]:
     """Measure each sea."""
     plans = {name: _planned("reef.yaml", *settings) for name, settings in SEAS.items()}
     plans["remus.yaml"] = _planned("remus.yaml")
-    for made in plans.values():
-        one(made, FRAMES[0])  # compiles, and fills tables
-    spent = {name: list[dict[str, float]]() for name in plans}
+    for sea in plans.values():
+        made(sea, FRAMES[:1])  # compiles, and fills tables
+    spent = {name: list[Mapping[str, float]]() for name in plans}
     total = {name: list[float]() for name in plans}
     for frame in FRAMES:
-        for name, made in plans.items():
-            (_, stages), seconds = once(partial(one, made, frame))
-            spent[name].append(stages)
+        for name, sea in plans.items():
+            (step,), seconds = once(partial(made, sea, [frame]))
+            spent[name].append(step.parts)
             total[name].append(seconds)
     living = np.array(total["reef.yaml"])
     return {
