@@ -54,8 +54,9 @@ def made(plan: Plan, frames: Sequence[int]) -> list[StageResult]:
 def stages(plan: Plan, folder: Path) -> tuple[dict[str, float], float]:
     """Processor time (ms) of each stage of a frame, the median of frames, of writing it, the mean; and of compressing
     and writing it in shards of `FRAMES`, as large datasets have them."""
-    steps = made(plan, range(WARM + FRAMES))[WARM:]
-    laps, values = [step.parts for step in steps], [step.value for step in steps]
+    shards = [range(first, first + WARM) for first in range(0, WARM + FRAMES, WARM)]
+    laps = [step.parts for shard in shards for step in made(plan, shard)][WARM:]
+    values = [step.value for step in made(plan, range(WARM, WARM + FRAMES))]
     ms = {stage: 1e3 * float(np.median([lap[stage] for lap in laps])) for stage in pipeline.STAGES if stage in laps[0]}
     compressing, writing = written(plan, folder, values)
     many = written(replace(plan, shard_frames=FRAMES), folder, values)
