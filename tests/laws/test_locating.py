@@ -18,6 +18,7 @@ from sonarsynth.geometry.motion import Hover, Track, pose, velocity
 from sonarsynth.planning.notes.source_notes import OBLIQUE, oblique_error
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
+from sonarsynth.ranging.location.locating import _few
 from sonarsynth.ranging.location.refraction import first_rays
 from sonarsynth.ranging.location.source_position import ACCEPTED, UNRESOLVED
 from sonarsynth.ranging.location.triggered import Triggered
@@ -40,6 +41,16 @@ def locate(
     depth = -pose.to_world(np.asarray(source, float))[2] + depth_error
     method, receiver = method or SensorDelays(), Receiver(pose, array, sonar or Sonar(assumed_sound_speed=C))
     return method.locate(signals, receiver, Survey(float(depth), profile), snaps)
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(64, 64), (46, 46), (16, 8), (8, 128), (128, 8), (65, 63), (2, 200)])
+def test_sensors_of_the_first_fit_are_all_over_the_array(columns, rows):
+    """As wide and as high as it is, whatever its rows and columns: those of one row tell no direction."""
+    q = elements(PlanarLattice(columns=columns, rows=rows, pitch=0.05)).position
+    few = q[_few(len(q))]
+    assert len(few) <= 64
+    assert np.all(few[:, 1:].std(axis=0) > 0.9 * q[:, 1:].std(axis=0))
+    assert abs(np.corrcoef(few[:, 1:].T)[0, 1]) < 0.25  # of 64 by chance: 0.13
 
 
 @pytest.mark.parametrize("azimuth", [-0.4, 0.5])

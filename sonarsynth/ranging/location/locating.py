@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, robust_wave, spherical_wave, wavefront_delays
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location import pulse_times
@@ -37,7 +37,9 @@ ASIDE = 1e-3
 Cut aside of its pulse, a tail shifts it by 1 % of that: 16 ns, or 1.5 degrees, of a pulse of 3 kHz along the array.
 """
 FEW = 64
-"""Sensors, about, that the first fit is made of where it errs by under 0.01 periods of the band centre; else all."""
+"""Sensors that the first fit is made of where it errs by under 0.01 periods of the band centre; else all."""
+GOLDEN = 0.6180339887498949
+"""Steps of this part of an array of any rows and columns pick sensors all over it, and not those of one row."""
 CLEAR = 3e4
 """Energy of a pulse at a sensor over that of the noise in a bin, above which so few sensors are tried."""
 ROBUST_ROUNDS = 3
@@ -228,25 +230,31 @@ def _first_wave(
     """Wavefront through the envelope peaks of the sensors, as of `fit_pulse`, and the standard error (s) of its times,
     root mean square over the sensors; None where none fits."""
     c, (cut, start), settled = sonar.assumed_sound_speed, pulse_times.excerpt(signals, centre, half), pulse_times.FLOOR
-    some = cut[:: max(elements.count // FEW, 1)]
+    some = cut[_few(elements.count)]
     energy = float(np.einsum("ij,ij->", some, some)) / (len(some) * signals.sampling_frequency)
     clear = energy * 2.0 * pulse_times.half_length(sonar.band) > CLEAR * quiet
-    for every in (max(elements.count // FEW, 1), 1) if clear else (1,):
-        q, live = elements.position[::every], elements.gain[::every] != 0
-        delay, height = pulse_times.envelope_peaks(cut[::every], signals.sampling_frequency, sonar.band)
+    for rows in (_few(elements.count), slice(None)) if clear else (slice(None),):
+        q, live = elements.position[rows], elements.gain[rows] != 0
+        delay, height = pulse_times.envelope_peaks(cut[rows], signals.sampling_frequency, sonar.band)
         loud = height**2 * live  # who hears more counts more
         wave = robust_wave(start + delay, q, c, loud, steps=FIRST_STEPS, rounds=ROBUST_ROUNDS, settled=settled)
         if wave is not None:
             off = 1.4826 * float(np.median(np.abs(wave.residual[live]))) * float(np.sqrt(4.0 / np.count_nonzero(live)))
-            if every == 1 or off < 0.01 / sonar.band.centre:
+            if len(q) == elements.count or off < 0.01 / sonar.band.centre:
                 break
     else:
         return None
     if velocity.any():
         passing = _times(wave, q, c)
-        q = q + (passing - wave.time)[:, None] * velocity[::every]
+        q = q + (passing - wave.time)[:, None] * velocity[rows]
         wave = spherical_wave(passing, q, c, loud, wave.direction, wave.curvature)
     return None if wave is None else (wave, off)
+
+
+@lru_cache(maxsize=16)
+def _few(count: int) -> Ints | slice:
+    """Some `FEW` of so many sensors, all over the array; all where that is no more than half of them."""
+    return np.unique((np.arange(FEW) * GOLDEN % 1.0 * count).astype(int)) if count >= 2 * FEW else slice(None)
 
 
 def _whole(
