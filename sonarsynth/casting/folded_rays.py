@@ -87,8 +87,8 @@ def ray_cones(
     start: Floats, end: Floats, departure: Floats, length: Floats, spread: Floats, bounces: Ints, turning: Ints,
     curvature: float, sagitta: float, bottom: float, centre: Floats, radius: Floats,
 ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
-    """Cones that hold rays and those beside them, as `occlusion.ray_cones.certain` has them: slope, NaN where no cone
-    is certain, and how far (m) along the departure bodies may be met, and surely would be if they close the cone,
+    """Cones that hold rays and those beside them, as `occlusion.ray_cones.classify_rays` has them: slope, NaN where no
+    cone is certain, and how far (m) along the departure bodies may be met, and surely would be if they close the cone,
     (ray,) each. curvature (1/m): the largest of any ray; sagitta (m): by how much chords may be beside rays; the rest
     as of `may_meet`."""
     slope, reach, far = np.empty(len(start)), np.empty(len(start)), np.empty(len(start))

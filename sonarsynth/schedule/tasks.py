@@ -133,7 +133,7 @@ def _beamform(plan: Plan, frame: int, traced: pipeline.TracedFrame) -> Any:
 
 
 def _range(plan: Plan, frame: int, before: tuple[pipeline.TracedFrame, pipeline.BeamformedFrame]) -> Any:
-    """That, with the points."""
+    """What was traced and heard, with the points where these are asked for."""
     traced, beamformed = before
     return *before, pipeline.cloud_of(plan.at(frame), traced.frame, beamformed) if "cloud" in plan.products else None
 
@@ -144,12 +144,13 @@ def _values(plan: Plan, frame: int, before: Any) -> Any:
 
 
 Step = Callable[[Plan, int, Any], Any]
+"""A part of a stage: of the plan, the number of a frame and what the step before made of it, what this one makes."""
 STAGES: Final[Mapping[str, Sequence[Step]]] = {
     "trace": (_trace, _label),
     "beamform": (_beamform,),
     "range": (_range, _values),
 }
-"""What each stage makes, step by step, of the plan, the number of a frame and what the step before made."""
+"""Steps of each stage, in order."""
 
 
 def write(job: Job, shard: int, blocks: Sequence[Sequence[StageResult]]) -> WrittenShard:

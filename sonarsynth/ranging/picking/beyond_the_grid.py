@@ -16,7 +16,9 @@ FAINT = 0.25
 that did count had twice this share and more."""
 
 
-def suspects(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, counts: Floats) -> tuple[Ints, Floats]:
+def possible_grating_lobes(
+    window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, counts: Floats
+) -> tuple[Ints, Floats]:
     """Which peaks (b: beam, t: delay) may be grating lobes of echoes beyond the grid, and the frequencies of the lines
     that they are; counts (peak,): power that lobes must bring a peak to count.
 

@@ -16,7 +16,7 @@ from sonarsynth.equations.arrays.noise_peaks import peak_level
 from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond, suspects
+from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond, possible_grating_lobes
 from sonarsynth.ranging.picking.peak_kernels import beside, farthest, local_maxima, over_lobes, power_centres
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
 from sonarsynth.ranging.range_profiles import (
@@ -243,7 +243,7 @@ def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: F
     least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
     u, delay = profiles.direction[b], profiles.step * t.astype(float)
     own = _over(window, profiles.width, u, delay, height, least)
-    p, line = suspects(window, profiles, b, t, least / LOBES)
+    p, line = possible_grating_lobes(window, profiles, b, t, least / LOBES)
     p, line = p[own[p]], line[own[p]]
     beyond = louder_beyond(window, profiles, b[p], t[p], height[p], line)
     if len(beyond[0]):

@@ -40,14 +40,14 @@ def hidden(
         return occluded(bodies, start, end, *facets)
     times, turns = (np.zeros(len(start), np.int64) if of is None else of for of in (bounces, turning))
     ray = start, end, departure, length, np.zeros(len(start))
-    verdict = certain(bodies, medium, *ray, bounces=times, turning=turns, facets=facets)
+    verdict = classify_rays(bodies, medium, *ray, bounces=times, turning=turns, facets=facets)
     blocked[verdict == CLOSED] = True
     left = np.flatnonzero(verdict >= UNKNOWN)
     blocked[left] = _along_chords(bodies, medium, start[left], end[left], departure[left], length[left])
     return blocked
 
 
-def certain(
+def classify_rays(
     bodies: tuple[PlacedTarget, ...], medium: Medium, start: Floats, end: Floats, departure: Floats, length: Floats,
     spread: Floats, *, bounces: Ints, turning: Ints, facets: tuple[Ints | None, Ints | None],
 ) -> Ints:  # fmt: skip

@@ -17,7 +17,7 @@ from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements
 from sonarsynth.state import Medium, Receiver, Tolerances
-from sonarsynth.tracing.occlusion.ray_cones import NO_CONE, certain, hidden
+from sonarsynth.tracing.occlusion.ray_cones import NO_CONE, classify_rays, hidden
 from sonarsynth.tracing.receive_paths import DOUBTFUL, SEEN, ReceivePaths, Starts
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ class Occlusion:
             verdict[ahead < -spread] = CLOSED
             rows = np.flatnonzero(ahead > spread)
         leaving = starts.select(rows)
-        verdict[rows] = certain(
+        verdict[rows] = classify_rays(
             self.bodies, self.bending, leaving.point, end[rows], away[rows], length[rows], spread[rows],
             bounces=legs.bounces[rows], turning=legs.turning[rows], facets=(leaving.owner, leaving.facet),
         )  # fmt: skip
