@@ -29,6 +29,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 anew: list[str] = []
 """Names of the kernels that this process compiled, of which nothing was kept."""
+loaded: list[tuple[str, str, tuple[Any, ...]]] = []
+"""Module, name and types of arguments of the kernels that were kept, as this process first called them."""
+when_first_missed: list[Callable[[], None]] = []
+"""What is called, once, when this process meets a kernel of which nothing is kept."""
 
 
 @overload
@@ -75,9 +79,13 @@ class _Cache(FunctionCache):
         found = None
         with self._guard_against_spurious_io_errors():
             found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        if found is None:
-            _say_no_shapes()
-        return found
+        if found is not None:
+            loaded.append((self._py_func.__module__, self._py_func.__name__, tuple(sig)))
+            return found
+        while when_first_missed:
+            when_first_missed.pop()()
+        _say_no_shapes()
+        return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled."""
