@@ -23,8 +23,8 @@ sys.exit("compiled") if compiling.anew else print(*map(compiling_ahead.spelled, 
 def called() -> str:
     """The lines of the list: where all is kept, only what Python calls is looked up, not what that calls in turn."""
     command = [sys.executable, "-c", BUILD]
-    subprocess.run(command, cwd=ROOT, check=False, capture_output=True)
-    return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    first = subprocess.run(command, cwd=ROOT, check=False, capture_output=True, text=True)
+    return first.stdout or subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
 
 
 if __name__ == "__main__":
