@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Callable, Iterator
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
@@ -29,6 +29,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 anew: list[str] = []
 """Names of the kernels that this process compiled, of which nothing was kept."""
+loaded: list[tuple[str, str, tuple[Any, ...]]] = []
+"""Module, name and types of arguments of the kernels that were kept, as this process first called them."""
+when_first_missed: list[Callable[[], None]] = []
+"""What is called, once, when this process meets a kernel of which nothing is kept."""
 
 
 @overload
@@ -46,6 +50,7 @@ def compiled(function: Any = None, /, *, borrows: bool = False, **options: Any) 
     if function is None:
         return partial(compiled, borrows=borrows, **options)
     options["_nrt"] = not borrows  # the runtime that counts references
+    options["no_cfunc_wrapper"] = True  # for C, which nobody asks for: it is compiled as long as that for Python
     kernel = njit(nogil=True, error_model="numpy", **options)(function)
     if isinstance(kernel, Dispatcher):  # it is the function itself where NUMBA_DISABLE_JIT is set
         kernel._cache = _Cache(function)  # type: ignore[attr-defined, no-untyped-call]
@@ -71,8 +76,16 @@ class _Cache(FunctionCache):
         """What was compiled, or None. Numba first reads all that it can compile (0.2 s), as compiling does by itself;
         what is loaded needs only the runtime."""
         rtsys.initialize(target_context)
+        found = None
         with self._guard_against_spurious_io_errors():
-            return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        if found is not None:
+            loaded.append((self._py_func.__module__, self._py_func.__name__, tuple(sig)))
+            return found
+        while when_first_missed:
+            when_first_missed.pop()()
+        _say_no_shapes()
+        return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled."""
@@ -83,6 +96,26 @@ class _Cache(FunctionCache):
         made_of = [_digest(__file__), *sorted(set(_made_of(self._py_func, {self._py_func})))]
         key = super()._index_key(*types_and_processor)  # type: ignore[no-untyped-call]
         return (*key, hashlib.sha256("\n".join(made_of).encode()).hexdigest())
+
+
+@cache
+def _say_no_shapes() -> None:
+    """Of a slice that does not fit where it is put, numba writes the shapes into a text: that took a second to compile
+    for each kernel that puts one somewhere."""
+    from numba.extending import overload
+    from numba.np import arrayobj  # with all that numba can compile, which is loaded by compiling alone
+
+    def differ(values: Any, place: Any) -> None:
+        """Raise ValueError."""
+
+    @overload(differ)
+    def raising(values: Any, place: Any) -> Any:
+        def raised(values: Any, place: Any) -> None:
+            raise ValueError("cannot assign slice from input of different size")
+
+        return raised
+
+    arrayobj.raise_with_shape_context = differ
 
 
 def _made_of(function: Any, seen: set[Any]) -> Iterator[str]:

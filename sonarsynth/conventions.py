@@ -16,6 +16,7 @@ Instrument       the sample grid, the beam grid and the assumed sound speed belo
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
@@ -38,6 +39,22 @@ Bytes = npt.NDArray[np.uint8]
 
 Progress = Callable[[int, int, int], None]
 """Is told how many frames are done, of how many, and how many failed."""
+
+
+class Pace:
+    """How fast frames are finished, from when the first ones were: these waited for workers, and compiled kernels."""
+
+    def __init__(self) -> None:
+        self.first: tuple[float, int] | None = None  # when (s), and how many
+
+    def rate(self, finished: int) -> float | None:
+        """Frames per second, None until others than the first are finished, of so many that are by now."""
+        now = time.monotonic()
+        if self.first is None and finished:
+            self.first = now, finished
+        began, before = self.first or (now, 0)
+        return (finished - before) / max(now - began, 1e-9) if finished > before else None
+
 
 REFERENCE_PRESSURE: Final = 1e-6  # Pa: levels are dB re 1 uPa
 SLOWEST, FASTEST = 100.0, 10e3

@@ -120,7 +120,7 @@ def build(
     as_json: Json = False,
 ) -> None:
     """Build a dataset, or the part of it that is missing. Run the same command again to resume."""
-    from sonarsynth import evaluation, planning, schedule
+    from sonarsynth import compiling_ahead, evaluation, planning, schedule
     from sonarsynth import store as stores
     from sonarsynth.cli import printing
     from sonarsynth.recipe import reading
@@ -133,6 +133,7 @@ def build(
     with reading.locating(source):
         wanted = chosen_frames(frames, sequences, made_from.spanned.first_frames.tolist()) if some else None
     stores.try_writing(stores.folder_of(store))
+    compiling_ahead.use_other_cores()
     with reading.locating(source), printing.planning():
         plan = planning.plan(made_from, chosen)
     prediction, predicting = None, not schedule.brief(plan, wanted) if predicting is None else predicting
@@ -161,11 +162,12 @@ def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_P
 
     For one worker per core. Estimated by timing a few frames on this machine.
     """
-    from sonarsynth import planning, schedule
+    from sonarsynth import compiling_ahead, planning, schedule
     from sonarsynth.cli import printing
     from sonarsynth.recipe import reading
 
     chosen = product_names(products)
+    compiling_ahead.use_other_cores()
     with reading.opened(recipe, settings) as made_from, printing.planning():
         planned = planning.plan(made_from, chosen)
     with printing.planning("timing frames"):

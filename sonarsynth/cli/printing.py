@@ -22,7 +22,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from sonarsynth.conventions import counted, format_bytes
+from sonarsynth.conventions import Pace, counted, format_bytes
 
 if TYPE_CHECKING:
     from sonarsynth.conventions import Progress as Report
@@ -49,13 +49,14 @@ def progress(waiting: str = "starting workers") -> Iterator[Report]:
     if not sys.stderr.isatty():
         yield _Lines()
         return
-    columns = (SpinnerColumn(), BarColumn(), MofNCompleteColumn(), TextColumn("frames  {task.fields[pace]}"))
+    columns = (SpinnerColumn(), BarColumn(), MofNCompleteColumn(), TextColumn("frames{task.fields[pace]}"))
     with Progress(*columns, console=console(stderr=True), transient=True) as bar:
-        task = bar.add_task("frames", total=None, pace=waiting)
-        began = time.monotonic()
+        task = bar.add_task("frames", total=None, pace=f", {waiting}")
+        pace = Pace()
 
         def update(done: int, total: int, failed: int) -> None:
-            bar.update(task, completed=done + failed, total=total, pace=_pace(done, total, failed, began))
+            said = _pace(done, total, failed, pace) if done + failed else f", {waiting}"
+            bar.update(task, completed=done + failed, total=total, pace=said)
 
         yield update
 
@@ -114,23 +115,21 @@ class _Lines:
     """Progress as lines."""
 
     def __init__(self) -> None:
-        self.began = self.said = time.monotonic()
+        self.pace, self.said = Pace(), time.monotonic()
 
     def __call__(self, done: int, total: int, failed: int) -> None:
-        now = time.monotonic()
+        now, said = time.monotonic(), _pace(done, total, failed, self.pace)
         if now - self.said >= SECONDS_BETWEEN_LINES:
             self.said = now
-            sys.stderr.write(f"{done + failed} of {total} frames, {_pace(done, total, failed, self.began)}\n")
+            sys.stderr.write(f"{done + failed} of {total} frames{said}\n")
             sys.stderr.flush()
 
 
-def _pace(done: int, total: int, failed: int, began: float) -> str:
-    """Frames per second, time left, frames that failed."""
+def _pace(done: int, total: int, failed: int, pace: Pace) -> str:
+    """Frames per second and time left, once other frames than the first have shown these; frames that failed."""
     finished = done + failed
-    if not finished:
-        return "none finished yet"
-    rate = finished / max(time.monotonic() - began, 1e-9)
-    text = f"{rate:.3g} frames/s, {duration((total - finished) / rate)} left"
+    rate = pace.rate(finished)
+    text = "" if rate is None else f", {rate:.3g} frames/s, {duration((total - finished) / rate)} left"
     return text + (f", {failed} failed" if failed else "")
 
 

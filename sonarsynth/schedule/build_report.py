@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from sonarsynth import store
-from sonarsynth.conventions import Progress
+from sonarsynth.conventions import Pace, Progress
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import tasks
 from sonarsynth.schedule.tasks import Failure, WrittenShard
@@ -76,8 +76,7 @@ class Log:
     """The log of a build: JSON lines beside the store, one an event, each with the time (UTC)."""
 
     def __init__(self, file: Path) -> None:
-        self.file, self.began = file, time.monotonic()
-        self.said = self.began
+        self.file, self.pace, self.said = file, Pace(), time.monotonic()
 
     def event(self, event: str, **facts: Any) -> None:
         """Add an event."""
@@ -86,10 +85,9 @@ class Log:
 
     def progress(self, done: int, total: int, failed: int) -> None:
         """Say how far it is, now and then."""
-        now = time.monotonic()
+        now, rate = time.monotonic(), self.pace.rate(done + failed)
         if now - self.said >= PROGRESS_EVERY:
             self.said = now
-            rate = (done + failed) / (now - self.began)
             eta = (total - done - failed) / rate if rate else None
             self.event("progress", done=done, of=total, failed=failed, frames_per_second=rate, seconds_left=eta)
 

@@ -9,6 +9,7 @@ import runpy
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,6 +21,8 @@ from sonarsynth.cli import app, printing
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import frame_numbers, product_names
 from sonarsynth.recipe import reading
+from sonarsynth.schedule.build_report import Log
+from sonarsynth.store.files.json_lines import read_lines
 from tests.waiting import HANGING, wait_until
 
 HERE = Path(__file__).parents[2]
@@ -278,3 +281,20 @@ def test_a_first_call_says_that_kernels_are_compiled(
         wait_until(lambda: lines("planning, 0 s"))
         assert runpy.run_path(str(kernel))["one_more"](3.0) == 4.0
         wait_until(lambda: lines("planning (1 kernel compiled so far, once for this machine), "))
+
+
+def test_time_left_is_not_told_from_frames_that_waited_for_workers_and_kernels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was: 5.9 min left, of a second."""
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    log = Log(tmp_path / "log.jsonl")
+    with printing.progress() as said:
+        for seconds, done in ((0.0, 0), (140.0, 8), (150.0, 16), (160.0, 24)):
+            now[0] = 100.0 + seconds
+            for told in (said, log.progress):
+                told(done, 64, 0)
+    lines = ["8 of 64 frames", "16 of 64 frames, 0.8 frames/s, 60 s left", "24 of 64 frames, 0.8 frames/s, 50 s left"]
+    assert capsys.readouterr().err.splitlines() == lines
+    assert [event["seconds_left"] for event in read_lines(tmp_path / "log.jsonl")] == [None, 60.0, 50.0]

@@ -122,10 +122,12 @@ def gauss_newton(
 @compiled
 def curved_or_plane(position: Any, delay: Any, weight: Any, start: Any, speed: float, size: float, steps: int) -> Any:
     """`gauss_newton`, without the curvature where there is no fit with it; and whether there is."""
-    wave = gauss_newton(position, delay, weight, start, speed, size, True, steps)
-    if wave[0]:
-        return True, wave
-    return False, gauss_newton(position, delay, weight, (start[0], 0.0), speed, size, False, steps)
+    for curved in (True, False):  # the compiler makes a second kernel for a second call
+        first = start[0], (start[1] if curved else 0.0)
+        wave = gauss_newton(position, delay, weight, first, speed, size, curved, steps)
+        if wave[0]:
+            break
+    return curved, wave
 
 
 @compiled
@@ -134,18 +136,18 @@ def robust_fit(
 ) -> Any:
     """As `curved_or_plane`, by so many steps; then weights loud (sensor,) are made anew, outliers counting for nothing,
     at most so many times, until no delay moves by more than `settled` (s)."""
-    curved, wave = curved_or_plane(position, delay, loud, start, speed, size, steps)
-    for _ in range(rounds):
-        if not wave[0]:
+    weight, before = loud, np.full(len(delay), np.inf)
+    for n in range(rounds + 1):
+        curved, wave = curved_or_plane(position, delay, weight, start, speed, size, steps if n == 0 else 1)
+        fitted = wave[3] + delays_after_centre(position, wave[1], wave[2], speed)
+        if not wave[0] or n == rounds or np.abs(fitted - before).max() < settled:
             break
-        late, before = np.abs(wave[7]), wave[3] + delays_after_centre(position, wave[1], wave[2], speed)
+        late = np.abs(wave[7])
         order = np.argsort(late)
         share = np.cumsum(loud[order])
         scale = max(6.0 * late[order[np.searchsorted(share, 0.5 * share[-1])]], 1e-7)
         weight = loud * np.maximum(1.0 - (late / scale) ** 2, 0.0) ** 2
-        curved, wave = curved_or_plane(position, delay, weight, (wave[1], wave[2]), speed, size, 1)
-        if np.abs(wave[3] + delays_after_centre(position, wave[1], wave[2], speed) - before).max() < settled:
-            break
+        start, before = (wave[1], wave[2]), fitted
     return curved, wave
 
 
