@@ -29,7 +29,7 @@ HEAD: Final = 200
 """Bytes of the line that says what a worker does."""
 
 LATER, LATEST = 1.1, 1.2
-"""Of its limit, after which a stage is ended: where the limit is set anew, and where one that is set still holds."""
+"""Of the limit of a stage: when it is ended where the thread is new, and at the latest where that was there before."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ Note = Callable[[int, str, float], None]
 
 @contextmanager
 def diary(store: str) -> Iterator[Note]:
-    """Give a `Note` for the stages of a task. A thread waits for the end of a limit: one for as many stages as may be,
-    so that a stage ends up to `LATEST` of its limit later."""
+    """Give a `Note` for the stages of a task. A thread waits for a limit to end, one for as many stages as may be: a
+    stage is ended between its limit and `LATEST` times that."""
     out, ends = _mine(store), 0.0
     if out is None:
         yield lambda frame, stage, limit: None
