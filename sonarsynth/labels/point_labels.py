@@ -120,8 +120,8 @@ def _from_targets(
     for group in np.unique(owner):
         at, middle, then = owner == group, float(heard[owner == group].mean()), float(met[owner == group].mean())
         sonar, placed = listening.track.later(middle), moment.bodies[attributed.target[group]].later(then)
-        away = kernels.distances(made, sonar.pose.position, sonar.velocity, delay - middle)
-        ranges[at] = kernels.means(points[at], *shares, away)[:, 0]
+        away = np.linalg.norm(made - sonar.pose.position - np.outer(delay - middle, sonar.velocity), axis=1)
+        ranges[at] = kernels.means(points[at], *shares, away[:, None])[:, 0]
         array = sonar.pose.position + np.outer(heard[at] - middle, sonar.velocity)
         place = array + turned(sonar.pose.turn_to_world(places[at]), sonar.spin, heard[at] - middle)
         distance[at] = surface_distances(placed, place - np.outer(met[at] - then, placed.velocity))
