@@ -270,18 +270,6 @@ def means(points: Ints, share: Floats, first: Ints, values: Floats) -> Floats:
 
 
 @compiled
-def distances(places: Floats, start: Floats, velocity: Floats, times: Floats) -> Floats:
-    """Distances (row, 1) m of places (row, xyz) from what is at times (row,) s at start + velocity * time (xyz)."""
-    out = np.empty((len(places), 1))
-    for e in range(len(places)):
-        square = 0.0
-        for x in range(3):
-            square += (places[e, x] - start[x] - velocity[x] * times[e]) ** 2
-        out[e, 0] = math.sqrt(square)
-    return out
-
-
-@compiled
 def _compare(
     power: Floats, total: Floats, sums: Complexes, peaks: Complexes, energy: Floats, pulse: Bools, beam_energy: float
 ) -> None:

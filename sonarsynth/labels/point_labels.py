@@ -54,16 +54,11 @@ def label_points(
         brought = attribution(scattered, band, heard, beam, late, energy, SCATTERED_BINS)
         lit = np.where(brought.energy.sum(axis=1) > own, np.append(brought.snap, NO_TARGET)[brought.owner], NO_TARGET)
     explained &= lit == NO_TARGET
-    labels: dict[str, np.ndarray] = {
-        "target": np.full(len(cloud), NO_TARGET, np.int16),
-        "emission": lit.astype(np.int16),
-        "family": np.full(len(cloud), NO_TARGET, np.int8),
-        "lit_by": np.full(len(cloud), NO_TARGET, np.int8),
-        "facet": np.full(len(cloud), NO_TARGET, np.int32),
-        "true_range": np.full(len(cloud), np.nan, np.float32),
-        "distance": np.full(len(cloud), np.nan, np.float32),
-        "origin": np.full(len(cloud), ORIGINS.index("unexplained"), np.int8),
-    }
+    numbers = {"target": np.int16, "emission": np.int16, "family": np.int8, "lit_by": np.int8, "facet": np.int32}
+    labels: dict[str, np.ndarray] = {name: np.full(len(cloud), NO_TARGET, of) for name, of in numbers.items()}
+    labels |= {name: np.full(len(cloud), np.nan, np.float32) for name in ("true_range", "distance")}
+    labels["origin"] = np.full(len(cloud), ORIGINS.index("unexplained"), np.int8)
+    labels["emission"][:] = lit
     labels["origin"][lit != NO_TARGET] = ORIGINS.index("reverberation")
     rows = np.flatnonzero(explained)
     owner = attributed.owner[rows]
@@ -125,8 +120,8 @@ def _from_targets(
     for group in np.unique(owner):
         at, middle, then = owner == group, float(heard[owner == group].mean()), float(met[owner == group].mean())
         sonar, placed = listening.track.later(middle), moment.bodies[attributed.target[group]].later(then)
-        away = kernels.distances(made, sonar.pose.position, sonar.velocity, delay - middle)
-        ranges[at] = kernels.means(points[at], *shares, away)[:, 0]
+        away = np.linalg.norm(made - sonar.pose.position - np.outer(delay - middle, sonar.velocity), axis=1)
+        ranges[at] = kernels.means(points[at], *shares, away[:, None])[:, 0]
         array = sonar.pose.position + np.outer(heard[at] - middle, sonar.velocity)
         place = array + turned(sonar.pose.turn_to_world(places[at]), sonar.spin, heard[at] - middle)
         distance[at] = surface_distances(placed, place - np.outer(met[at] - then, placed.velocity))

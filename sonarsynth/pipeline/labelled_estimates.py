@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from sonarsynth.conventions import Floats
@@ -13,20 +15,24 @@ from sonarsynth.ranging.location.association import in_record
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import envelope_delay
+from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
 
 
 def heard_directly(plan: Plan, arrivals: Arrivals, snaps: tuple[Emission, ...]) -> Direct:
     """The direct paths of a frame, with the time at which the envelope of each pulse peaks in the band."""
+    return direct_paths(arrivals, lambda snap, *way: _envelope(plan, snaps[snap].waveform, *way))
+
+
+@lru_cache(maxsize=64)  # a snap that rests sounds alike in every frame
+def _envelope(plan: Plan, waveform: Waveform, absorption: float, doppler: float) -> float:
+    """As the `envelope` of `direct_paths`, of a pulse."""
     sonar = plan.scene.sonar
 
-    def envelope(snap: int, absorption: float, doppler: float) -> float:
-        def loss(f: Floats) -> Floats:
-            return absorption * (1 + relative_absorption(plan.absorption, f, sonar.band.centre)) - absorption
+    def loss(f: Floats) -> Floats:
+        return absorption * relative_absorption(plan.absorption, f, sonar.band.centre)
 
-        return envelope_delay(snaps[snap].waveform, sonar, loss, doppler)
-
-    return direct_paths(arrivals, envelope)
+    return envelope_delay(waveform, sonar, loss, doppler)
 
 
 def estimate_truth(plan: Plan, frame: Frame, direct: Direct) -> Values:

@@ -40,12 +40,12 @@ def table(group: str, **columns: object) -> Values:
 
 def truth_values(truth: Truth) -> Values:
     """Truth."""
-    groups = {"beam_": "/truth/beams", "snap_": "/truth/emissions", "sonar_": "/truth"}
+    groups = {"beam": "/truth/beams", "snap": "/truth/emissions", "sonar": "/truth"}
     values: Values = {}
     for name, value in vars(truth).items():
-        prefix = next((start for start in groups if name.startswith(start)), "target_")
-        short = name if prefix == "sonar_" else name.removeprefix(prefix)
-        values[groups.get(prefix, "/truth/targets"), short] = np.asarray(value)
+        whose, _, own_name = name.partition("_")
+        short = own_name if whose in ("beam", "snap", "target") else name
+        values[groups.get(whose, "/truth/targets"), short] = np.asarray(value)
     angles = {name: np.rad2deg(getattr(truth, name)) for name in ("image_box", "true_image_box", "full_box", "yaw")}
     return values | table("/truth/targets", **angles)
 

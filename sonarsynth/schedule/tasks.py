@@ -94,12 +94,13 @@ def run_stages(job: Job, stages: Sequence[str], before: Sequence[StageResult]) -
     """Task <stages>-<token>-<first frame>: what some stages make of some frames, of a few before the next few; of the
     last one, values in the types of the store."""
     done: list[StageResult] = []
-    for first in range(0, len(before), job.together):
-        some = list(before[first : first + job.together])
-        for name in stages:
-            for step in STAGES[name]:
-                some = [_step(job, name, step, so_far) for so_far in some]
-        done += some
+    with worker_status.diary(job.path) as note:
+        for first in range(0, len(before), job.together):
+            some = list(before[first : first + job.together])
+            for name in stages:
+                for step in STAGES[name]:
+                    some = [_step(job, name, step, so_far, note) for so_far in some]
+            done += some
     return done
 
 
@@ -229,15 +230,15 @@ def peak_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def _step(job: Job, name: str, step: Step, before: StageResult) -> StageResult:
+def _step(job: Job, name: str, step: Step, before: StageResult, note: worker_status.Note) -> StageResult:
     """A step of the stage `name` of a frame."""
     if before.failure is not None:
         return before
     wall, cpu = time.perf_counter(), time.thread_time()
     with pipeline.stage_timer() as laps:
         try:
-            with worker_status.noted(job.path, before.frame, name, _limit(job, step, before.seconds.get(name, 0.0))):
-                value, failure = step(plan_of(job), before.frame, before.value), None
+            note(before.frame, name, _limit(job, step, before.seconds.get(name, 0.0)))
+            value, failure = step(plan_of(job), before.frame, before.value), None
             _warm.add(step)
         except Exception as error:
             value, failure = None, failure_of(before.frame, name, error)

@@ -12,17 +12,24 @@ import json
 import os
 import re
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, TextIO
+from typing import Final
 
 from sonarsynth.store import here
 from sonarsynth.store.files import scratch
 
 LONGEST: Final = 20_000
 """Characters of a traceback that are kept."""
+
+HEAD: Final = 200
+"""Bytes of the line that says what a worker does."""
+
+LATER, LATEST = 1.1, 1.2
+"""Of the limit of a stage: when it is ended where the thread is new, and at the latest where that was there before."""
 
 
 @dataclass(frozen=True)
@@ -57,32 +64,45 @@ def read(store: str, worker: str) -> Entry | None:
         return None
 
 
+Note = Callable[[int, str, float], None]
+"""Notes the frame and the stage that begin, and after how many seconds (0: none) this process ends."""
+
+
 @contextmanager
-def noted(store: str, frame: int, stage: str, limit: float) -> Iterator[None]:
-    """Note a stage of a frame while it runs; after `limit` seconds (0: no limit) this process ends."""
-    out = _mine(store)
+def diary(store: str) -> Iterator[Note]:
+    """Give a `Note` for the stages of a task. A thread waits for a limit to end, one for as many stages as may be: a
+    stage is ended between its limit and `LATEST` times that."""
+    out, ends = _mine(store), 0.0
     if out is None:
-        yield
+        yield lambda frame, stage, limit: None
         return
-    out.seek(0)
-    out.truncate()
-    out.write(json.dumps({"frame": frame, "stage": stage, "limit": limit}) + "\n")
-    out.flush()
-    if limit > 0:
-        faulthandler.dump_traceback_later(limit, exit=True, file=out)
+
+    def note(frame: int, stage: str, limit: float) -> None:
+        nonlocal ends
+        _write(out, json.dumps({"frame": frame, "stage": stage, "limit": limit}))
+        now = time.monotonic()
+        if limit > 0 and not limit <= ends - now <= LATEST * limit:
+            ends = now + LATER * limit
+            faulthandler.dump_traceback_later(LATER * limit, exit=True, file=out)
+
     try:
-        yield
+        yield note
     finally:
         faulthandler.cancel_dump_traceback_later()
-        out.seek(0)
-        out.truncate()
+        _write(out, "")
 
 
-_open: dict[Path, TextIO] = {}
+def _write(file: int, line: str) -> None:
+    """Put a line in place of the one before, in one call: tracebacks are behind it."""
+    with suppress(OSError):  # a full disk
+        os.pwrite(file, line.ljust(HEAD - 1).encode() + b"\n", 0)
 
 
-def _mine(store: str) -> TextIO | None:
-    """The diary of this process, None where it is not a worker that is started again."""
+_open: dict[Path, int] = {}
+
+
+def _mine(store: str) -> int | None:
+    """The open diary of this process, None where it is not a worker that is started again."""
     distributed = sys.modules.get("distributed")
     if distributed is None:
         return None
@@ -95,13 +115,13 @@ def _mine(store: str) -> TextIO | None:
     file = _file(store, worker.address)
     if file not in _open:
         for old in _open.values():
-            old.close()
+            os.close(old)
         _open.clear()
         try:
-            handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o666)
-            _open[file] = os.fdopen(handle, "w+", encoding="utf-8")
+            _open[file] = os.open(file, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o666)
         except OSError:  # the build has ended
             return None
+        os.lseek(_open[file], HEAD, os.SEEK_SET)
         faulthandler.enable(_open[file])
     return _open[file]
 

@@ -283,6 +283,7 @@ def snap_gains(emissions: tuple[Emission, ...]) -> Floats:
     )
 
 
+@lru_cache(maxsize=64)
 def envelope_delay(
     waveform: Waveform, sonar: Sonar, loss: Callable[[Floats], Floats] | None = None, doppler: float = 0.0
 ) -> float:
@@ -292,9 +293,4 @@ def envelope_delay(
     f, wave = pulse_spectrum(waveform, sonar.antialias, rate, min(samples, LONGEST_ENVELOPE), doppler)
     bins = slice(*np.searchsorted(f, [band.low, np.nextafter(band.high, np.inf)]))
     f, wave = f[bins], wave[bins] if loss is None else wave[bins] * 10.0 ** (-loss(f[bins]) / 20)
-    return _loudest(f.tobytes(), wave.astype(complex).tobytes(), band.low, band.high)
-
-
-@lru_cache(maxsize=64)
-def _loudest(f: bytes, wave: bytes, low: float, high: float) -> float:  # a snap that rests sounds alike in every frame
-    return envelope_peak(np.frombuffer(f), np.frombuffer(wave, complex), low, high)[0]
+    return envelope_peak(f, wave.astype(complex), band.low, band.high)[0]
