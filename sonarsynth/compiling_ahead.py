@@ -76,9 +76,7 @@ def compile_part(part: int, parts: int) -> None:
         if os.getppid() != asked:
             return
         module, name, *arguments = json.loads(line)
-        with suppress(
-            Exception
-        ):  # what is not there any more, or takes other arguments, is compiled where it is called
+        with suppress(Exception):  # what is gone, or takes other arguments, is compiled where it is called
             of = import_module(module)
             getattr(of, name).compile(tuple(_type(text, of) for text in arguments))
 
