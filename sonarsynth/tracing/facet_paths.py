@@ -143,8 +143,8 @@ def facet_paths(
     ways: Ways | None = None,
 ) -> FacetPaths:
     """Facet to array, for every surface element, or those of some owners, that leaves a ray for the array that no body
-    hides, by some ways or all. Of no others than some `snaps` may light (None: any), where that is known of straight,
-    unreflected rays.
+    hides, by some ways or all. Of no others than some `snaps` may light (None: any), where that is known of rays in
+    layers.
 
     Raises ValueError for a body or an array that reaches out of the water.
     """
@@ -171,8 +171,9 @@ def facet_paths(
             facing = may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack)
             every = every.select(facing)
         lit = None
-        if lights and propagation.layered and propagation.bounces:
-            lit = np.concatenate([may_face_receiver(every, light, 0, medium) for light in lights])
+        if lights and propagation.layered and not straight:
+            lit = np.unique(np.concatenate([may_face_receiver(every, light, 0, medium) for light in lights]))
+            every, lit = (every, lit) if propagation.bounces else (every.select(lit), None)
         leaving = receive_paths(every, medium, receiver, propagation, slack, lit).by(families)
         leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
         first = np.diff(leaving.row, prepend=-1) > 0
