@@ -85,8 +85,8 @@ def _subtended(radius: float, distance: float) -> float:
 @compiled(borrows=True)
 def _largest(upper: float, lower: float, node: Floats, curvature: Floats) -> float:
     """The largest curvature of layers that are met between two depths (m)."""
-    largest, layer = 0.0, np.searchsorted(node, upper)
-    for k in range(max(layer - 1, 0), len(curvature)):
+    largest = 0.0
+    for k in range(max(int(np.searchsorted(node, upper)) - 1, 0), len(curvature)):
         if node[k] > lower:
             break
         largest = max(largest, curvature[k])

@@ -199,9 +199,7 @@ def _all_echoes(array: FacetPaths, snap: Emission, components: tuple[tuple[Compo
         wanted[tuple(np.transpose(array.ways))] = True
         some = np.flatnonzero(wanted[out.family[way], array.legs.family[leg]])
         way, leg = np.arange(len(out.facet))[way][some], leg[some]
-    carried = None
-    if array.meeting is not None:
-        out, carried = _carried(array, snap, out, way, leg)
+    out, carried = (out, None) if array.meeting is None else _carried(array, snap, out, way, leg)
     out = out.select(way)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
     groups = echo_batches(array, out, leg, components, carried, factor)
@@ -213,7 +211,7 @@ def _all_echoes(array: FacetPaths, snap: Emission, components: tuple[tuple[Compo
 def _carried(
     array: FacetPaths, snap: Emission, out: TransmitPaths, way: Ints | slice, leg: Ints
 ) -> tuple[TransmitPaths, MotionTerms]:
-    """Ways when and where sound meets what moves, and the remainder of the motion of pairs (pair,) of a way and a leg."""
+    """Ways when and where sound meets what moves, and the rest of the motion of pairs (pair,) of a way and a leg."""
     meeting, facets = array.meeting, array.facets
     assert meeting is not None
     owner, point = facets.owner[out.facet], rows_of(facets.point, out.facet)
@@ -225,7 +223,8 @@ def _carried(
     if snap.directivity is not None or snap.velocity.any():
         departure = unit(out.departure + mirrored(met_out.arrival - out.arrival, out.bounces))
         met_out = met_out.leaving(departure, snap, float(medium.profile.at(depth(snap.position))))
-    return met_out, met_paths(array.legs, leg, *(rows_of(of, way) for of in (met, late, velocity, spin)), meeting)
+    met, late, velocity, spin = (rows_of(column, way) for column in (met, late, velocity, spin))
+    return met_out, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
 
 
 def _towards_probes(array: FacetPaths, leg: Ints, carried: MotionTerms | None, group: EchoBatch, some: slice) -> Floats:
