@@ -10,7 +10,7 @@ from sonarsynth.casting.intersections import EDGE, distance_to_facet, to_sphere
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Bools, Floats, Int32s, Ints
 
-LEAF = 4
+LEAF = 2
 """Facets in a leaf, at least: fewer than twice as many."""
 LEVELS = 64
 """More than a tree has."""

@@ -82,15 +82,29 @@ def _subtended(radius: float, distance: float) -> float:
     return math.asin(min(radius / max(distance, 1e-300), 1.0))
 
 
+@compiled(borrows=True)
+def _largest(upper: float, lower: float, node: Floats, curvature: Floats) -> float:
+    """The largest curvature of layers that are met between two depths (m)."""
+    largest = 0.0
+    for k in range(max(int(np.searchsorted(node, upper)) - 1, 0), len(curvature)):
+        if node[k] > lower:
+            break
+        largest = max(largest, curvature[k])
+    return largest
+
+
 @compiled
 def ray_cones(
     start: Floats, end: Floats, departure: Floats, length: Floats, spread: Floats, bounces: Ints, turning: Ints,
-    curvature: float, sagitta: float, bottom: float, centre: Floats, radius: Floats,
+    layers: tuple[Floats, Floats], sagitta: float, bottom: float, centre: Floats, radius: Floats,
 ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
     """Cones that hold rays and those beside them, as `occlusion.ray_cones.classify_rays` has them: slope, NaN where no
     cone is certain, and how far (m) along the departure bodies may be met, and surely would be if they close the cone,
-    (ray,) each. curvature (1/m): the largest of any ray; sagitta (m): by how much chords may be beside rays; the rest
-    as of `may_meet`."""
+    (ray,) each. layers: depths of their nodes (node,) m, and the largest curvature of rays in each (node - 1,) 1/m;
+    sagitta (m): by how much chords may be beside rays; the rest as of `may_meet`."""
+    curvature = 0.0
+    for bend in layers[1]:
+        curvature = max(curvature, bend)
     slope, reach, far = np.empty(len(start)), np.empty(len(start)), np.empty(len(start))
     for i in range(len(start)):
         longest, shortest, n, rise = length[i] + spread[i], length[i] - spread[i], bounces[i], departure[i, 2]
@@ -101,6 +115,10 @@ def ray_cones(
         reach[i] = longest if full else min(first, longest)
         far[i] = 0.98 * (shortest if full else min(first - 2.0 * wide, shortest))
         angle = _subtended(spread[i], length[i]) + 0.5 * curvature * reach[i]
+        if 0.0 < angle < WIDEST:  # of that cone, only the layers that it comes to bend rays
+            aside, down = reach[i] * math.tan(angle), -reach[i] * rise
+            upper, lower = -start[i, 2] + min(down, 0.0) - aside, -start[i, 2] + max(down, 0.0) + aside
+            angle += 0.5 * reach[i] * (_largest(upper, lower, *layers) - curvature)
         if full:  # the line from end to end is in it as well
             x, y, z = end[i, 0] - start[i, 0], end[i, 1] - start[i, 1], end[i, 2] - start[i, 2]
             distance = math.sqrt(x * x + y * y + z * z)

@@ -34,8 +34,9 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     """
     bodies, sonar_pose, beams = context.bodies, context.receiver.pose, context.receiver.sonar.beams
     medium, sonar_track = context.medium, context.receiver.track
+    model = propagation.direct if propagation.bends else None
     connect = partial(propagation.direct.connect, medium.profile, medium.depth)
-    bent = connect if propagation.bends else None
+    bent = None if model is None else connect
     moving = bodies if sonar_track else tuple(body.frozen for body in bodies)
     straight_lines = medium.profile.uniform and propagation.straight(medium.profile)
     travel = (
@@ -50,7 +51,7 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     nearest = beam_views(seen, beams)
     way, turn = mean_motion(sonar_track, when)
     lit = [
-        [lit_fraction(b, a.visible, placed, snap, medium, bent) for b, a in zip(placed, appearances, strict=True)]
+        [lit_fraction(n, a.visible, placed, snap, medium, model) for n, a in enumerate(appearances)]
         for snap, placed in zip(context.snaps, there, strict=True)
     ]
     return Truth(

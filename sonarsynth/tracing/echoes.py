@@ -199,9 +199,8 @@ def _all_echoes(array: FacetPaths, snap: Emission, components: tuple[tuple[Compo
         wanted[tuple(np.transpose(array.ways))] = True
         some = np.flatnonzero(wanted[out.family[way], array.legs.family[leg]])
         way, leg = np.arange(len(out.facet))[way][some], leg[some]
-    out, carried = out.select(way), None
-    if array.meeting is not None:
-        out, carried = _carried(array, snap, out, leg)
+    out, carried = (out, None) if array.meeting is None else _carried(array, snap, out, way, leg)
+    out = out.select(way)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
     groups = echo_batches(array, out, leg, components, carried, factor)
     few = np.concatenate([g.over(_towards_probes(array, leg, carried, g, FEW)) for g in groups])
@@ -209,8 +208,10 @@ def _all_echoes(array: FacetPaths, snap: Emission, components: tuple[tuple[Compo
     return _EchoBlock(array, groups, out, leg, factor, few, pulses, carried)
 
 
-def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -> tuple[TransmitPaths, MotionTerms]:
-    """Ways (pair,) when and where the sound meets what moves, and the remainder of the motion."""
+def _carried(
+    array: FacetPaths, snap: Emission, out: TransmitPaths, way: Ints | slice, leg: Ints
+) -> tuple[TransmitPaths, MotionTerms]:
+    """Ways when and where sound meets what moves, and the rest of the motion of pairs (pair,) of a way and a leg."""
     meeting, facets = array.meeting, array.facets
     assert meeting is not None
     owner, point = facets.owner[out.facet], rows_of(facets.point, out.facet)
@@ -222,6 +223,7 @@ def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -
     if snap.directivity is not None or snap.velocity.any():
         departure = unit(out.departure + mirrored(met_out.arrival - out.arrival, out.bounces))
         met_out = met_out.leaving(departure, snap, float(medium.profile.at(depth(snap.position))))
+    met, late, velocity, spin = (rows_of(column, way) for column in (met, late, velocity, spin))
     return met_out, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
 
 

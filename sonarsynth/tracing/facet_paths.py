@@ -143,8 +143,8 @@ def facet_paths(
     ways: Ways | None = None,
 ) -> FacetPaths:
     """Facet to array, for every surface element, or those of some owners, that leaves a ray for the array that no body
-    hides, by some ways or all. Of no others than some `snaps` may light (None: any), where that is known of straight,
-    unreflected rays.
+    hides, by some ways or all. Of no others than some `snaps` may light (None: any), where that is known of rays in
+    layers.
 
     Raises ValueError for a body or an array that reaches out of the water.
     """
@@ -170,9 +170,9 @@ def facet_paths(
         if propagation.layered and not straight:
             facing = may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack)
             every = every.select(facing)
-        lit = None
-        if lights and propagation.layered and propagation.bounces:
-            lit = np.concatenate([may_face_receiver(every, light, 0, medium) for light in lights])
+        lit = _lit(every, lights, medium) if lights and propagation.layered and not straight else None
+        if lit is not None and not propagation.bounces:
+            every, lit = every.select(lit), None
         leaving = receive_paths(every, medium, receiver, propagation, slack, lit).by(families)
         leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
         first = np.diff(leaving.row, prepend=-1) > 0
@@ -189,6 +189,11 @@ def _in_front(surface: Scatterers, rows: Ints, receiver: Receiver, slack: float,
     """Those of some elements (row,) that the array may see and some of these places light, as of `in_front`."""
     eye, *seen_by = surface.pose.to_body([receiver.pose.position, *lights])
     return np.asarray(in_front(rows, surface.position, surface.normal, eye, slack, np.reshape(seen_by, (-1, 3))))
+
+
+def _lit(facets: Facets, lights: list[Floats], medium: Medium) -> Ints:
+    """Those (facet,) that direct rays from some places (xyz) may light."""
+    return np.unique(np.concatenate([may_face_receiver(facets, light, 0, medium) for light in lights]))
 
 
 def bending(medium: Medium, propagation: Propagation, receiver: Receiver) -> Medium:

@@ -23,6 +23,7 @@ from sonarsynth.propagation.images import family
 from sonarsynth.propagation.reflections import Reflections, reflections
 from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Medium, Receiver
+from sonarsynth.tracing.occlusion.ray_cones import layers_that_bend
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
@@ -243,12 +244,16 @@ def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Me
     """Those (facet,) that may have a ray on their outer side to a point (xyz), or within `slack` (m) of it; exactly so
     in uniform water, unreflected.
 
-    A ray rises and falls by (bounces + 2) bottom depths at most over its distance, so somewhere it has that slope or
-    less, and by Snell's law its cosine is nowhere less than there times the ratio of the extreme sound speeds.
+    A curve of curvature k leaves its chord of r m by an angle of sine k r/2 at most (Schur's theorem: for k r < 0.6 no
+    ray without reflections is longer than half a circle). Others rise and fall by (bounces + 2) bottom depths at most
+    over their distance, so somewhere they have that slope or less, and by Snell's law their cosine is nowhere less than
+    there times the ratio of the extreme sound speeds.
     """
-    if not bounces and medium.profile.uniform:
-        every = np.arange(len(facets.facet))
-        return np.asarray(in_front(every, facets.point, facets.normal, position, slack, np.empty((0, 3))))
+    bend = 0.0 if bounces or medium.profile.uniform else float(layers_that_bend(medium.profile)[1].max())
+    farthest = np.sqrt(((facets.point - position) ** 2).sum(axis=1).max(initial=0.0)) if bend else 0.0
+    if not bounces and bend * farthest < 0.6:
+        every, bow = np.arange(len(facets.facet)), 0.5 * bend * farthest**2
+        return np.asarray(in_front(every, facets.point, facets.normal, position, slack + bow, np.empty((0, 3))))
     level = position[:2] - facets.point[:, :2]
     distance = np.hypot(level[:, 0], level[:, 1])
     flattest = distance / np.hypot(distance, (bounces + 2) * medium.depth)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.sea import Absorption, Environment, Isovelocity
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.products import Arrivals
+from sonarsynth.products import Arrivals, Kind
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import POINT, Elements, Sonar
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting
@@ -24,6 +24,7 @@ from sonarsynth.state import Emission, FrameContext, Medium, OcclusionPoint, Rec
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.tracing.arrivals import trace
+from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.facet_paths import facet_paths
 from tests.echoes import EAST, PROFILE, ROMANIS, C
 from tests.laws.test_synthesis import some_of
@@ -128,11 +129,15 @@ def test_facets_with_a_diffuse_floor_are_heard_where_the_centre_does_not_see_the
         assert set(found.facet[seen]) == set(alone(law, int(sensor)).facet)
 
 
-def test_paths_that_serve_any_snap_serve_those_that_are_known() -> None:
+@pytest.mark.parametrize("profile", [PROFILE, Profile(np.array([0.0, 200.0]), np.array([1540.0, 1500.0]))])
+def test_paths_that_serve_any_snap_serve_those_that_are_known(profile: Profile) -> None:
     """Facets that only hydrophones beside the centre face are among them: reflected sound may light them."""
     ball = PlacedTarget("ball", BALL, Pose(PLACE + [8.0, 0.3, 0.2], EAST), np.zeros(3))
     receiver, law = Receiver(Pose(PLACE, EAST), ARRAY, SONAR), (MirrorLobe(),)
-    medium, sees = Medium(WATER, PROFILE), Tolerances(occlusion="sensors")
+    medium, sees = Medium(WATER, profile), Tolerances(occlusion="sensors")
     context = FrameContext(0.0, (ball,), (SNAP,), medium, receiver, law, sees)
     known, every = (facet_paths(context, AutoTracing(), snaps=snaps) for snaps in ((SNAP,), None))
     assert set(known.facets.facet) < set(every.facets.facet)
+    found, sought = (echoes(array, 0, (law[0].parts,), Kind.ECHO) for array in (known, every))
+    np.testing.assert_array_equal(found.facet, sought.facet)
+    np.testing.assert_array_equal(found.amplitude, sought.amplitude)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sonarsynth.casting.cones import CLOSED, EMPTY, UNKNOWN, classify_cones
+from sonarsynth.casting.folded_rays import ray_cones
 from sonarsynth.casting.ray_casting import occluded
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.environment.sea import Environment, Profile
@@ -20,7 +21,7 @@ from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
 from sonarsynth.tracing.facet_paths import bending
-from sonarsynth.tracing.occlusion.ray_cones import chords, hidden
+from sonarsynth.tracing.occlusion.ray_cones import SAGITTA_TOLERANCE, chords, hidden, layers_that_bend, spheres
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion, cells, rim
 from sonarsynth.tracing.receive_paths import ReceivePaths, facets_of, receive_paths
 
@@ -187,6 +188,38 @@ def test_rays_are_hidden_where_their_chords_meet_a_body(water: Profile) -> None:
     met[ray_of[piece[occluded(bodies, points[piece], points[piece + 1])]]] = True
     assert (met != blocked).mean() < 1e-3  # chords are beside rays by a little
     assert 0.05 < met.mean() < 0.95
+
+
+def cones_of(profile: Profile, legs: ReceivePaths, clear: Floats) -> tuple[Floats, Floats]:
+    """Slopes and reach (leg,) of the cones of rays among some bodies."""
+    ray = clear, np.broadcast_to(SONAR.position, clear.shape), legs.departure, legs.length, np.zeros(len(clear))
+    limits = layers_that_bend(profile), SAGITTA_TOLERANCE, BOTTOM_DEPTH
+    slope, reach, _ = ray_cones(*ray, legs.bounces, legs.turning, *limits, *spheres(some_bodies(1)))
+    return slope, reach
+
+
+@pytest.mark.parametrize("gradient", [-0.05, -3.0])  # 1/s, of the layers that the rays begin in
+def test_cones_hold_their_rays_and_are_no_wider_for_a_steep_layer_elsewhere(gradient: float) -> None:
+    depth, bodies = np.array([0.0, 24.0, 26.0, BOTTOM_DEPTH]), some_bodies(1)
+    above = 1540.0 + gradient * depth[:2]
+    plain, layered = (Profile(depth, np.array([*above, c, c])) for c in (above[1] - 0.01, above[1] - 40.0))
+    facets = facets_of(tuple(Scatterers.of_body(body, FacetLaw()) for body in bodies), slice(0, 10**9))
+    medium = Medium(WATER, layered)
+    legs = receive_paths(facets, medium, Receiver(SONAR, array_of(61)), Refracted(bounces=2))
+    clear = facets.clear[legs.row]
+    slope, reach = cones_of(layered, legs, clear)
+    ray, points = chords(medium, clear, legs.departure, legs.length)
+    away = points - clear[ray]
+    along = np.einsum("ij,ij->i", away, legs.departure[ray])
+    aside = np.linalg.norm(away - along[:, None] * legs.departure[ray], axis=1)
+    same = np.diff(ray, prepend=-1) == 0
+    gone = np.cumsum(np.where(same, np.linalg.norm(np.diff(points, axis=0, prepend=0.0), axis=1), 0.0))
+    gone -= gone[np.searchsorted(ray, ray)]
+    held = np.isfinite(slope[ray]) & (gone > 0.0) & (gone <= reach[ray])
+    assert (aside <= slope[ray] * along + 2.0 * SAGITTA_TOLERANCE)[held].all()
+    assert held.sum() > 100
+    sure = np.isfinite(slope) & (legs.bounces == 0)
+    assert np.median(slope[sure]) < 1.5 * np.median(cones_of(plain, legs, clear)[0][sure])
 
 
 def test_parts_of_an_array_hold_all_of_it() -> None:

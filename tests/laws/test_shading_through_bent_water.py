@@ -14,7 +14,7 @@ from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.tracing.occlusion.ray_cones import hidden
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion
-from sonarsynth.tracing.receive_paths import Facets, ReceivePaths, facets_of, receive_paths
+from sonarsynth.tracing.receive_paths import Facets, ReceivePaths, facets_of, may_face_receiver, receive_paths
 from tests.laws.test_shading_by_cones import SONAR, WATER, array_of, body, some_bodies
 
 DEPTHS = np.array([0.0, 8.0, 12.0, 17.0, 22.0, 30.0])
@@ -81,6 +81,17 @@ def test_the_array_sees_what_each_hydrophone_sees(profile: Profile, bounces: int
         odd += len(np.setxor1d(found[~hidden[:, sensor]], alone))
         seen += len(alone)
     assert odd <= 1e-3 * seen
+
+
+@BENT
+def test_facets_that_rays_can_leave_for_the_array_are_found_and_few_others(profile: Profile) -> None:
+    _, facets = some_facets(1)
+    end = np.broadcast_to(SONAR.position, facets.point.shape)
+    rays = Refracted().connect(profile, WATER.depth, facets.point, end)
+    ahead = np.einsum("ij,ij->i", facets.normal[rays.pair], rays.departure) > 0.0
+    found = may_face_receiver(facets, SONAR.position, 0, Medium(WATER, profile))
+    assert set(rays.pair[ahead]) <= set(found)
+    assert len(found) < 1.05 * len(set(rays.pair[ahead]))
 
 
 @pytest.mark.parametrize("far", [4.5, 20.0])  # 0.8 and 17 mm off the straight line in the middle

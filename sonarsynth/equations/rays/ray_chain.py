@@ -76,7 +76,7 @@ def offsets(c: Floats, first: int, last: int, fastest: float, d: Floats) -> None
         d[i] = (fastest - c[i]) * (fastest + c[i])
 
 
-@compiled(borrows=True)
+@compiled(fastmath={"reassoc", "nsz"}, forceinline=True, borrows=True)
 def sweep(
     s_m: float, p: float, d: Floats, k: Floats, first: int, last: int, turn_up: float, turn_down: float
 ) -> tuple[float, float]:
@@ -161,35 +161,23 @@ def bounds(
     return full1 + turn1, full2 + turn2, full2 + turn1, full1 + turn2, slopes[0], slopes[1]
 
 
-@compiled(borrows=True)
-def time_of(
+@compiled(fastmath={"reassoc", "nsz"}, forceinline=True, borrows=True)
+def time_and_length(
     s_m: float, p: float, c: Floats, d: Floats, dz: Floats, crossings: Floats, first: int, last: int,
     turn_up: float, turn_down: float,
-) -> float:  # fmt: skip
-    """Travel time (s) of a ray along its chain and the half layers that it turns in."""
+) -> tuple[float, float]:  # fmt: skip
+    """Travel time (s) and arc length (m) of a ray along its chain and the half layers that it turns in."""
     a, b = s_m * s_m, p * p
     s1 = math.sqrt(a + b * d[first])
     time = 2.0 * turn_time(s1 / (p * c[first]), turn_up) if turn_up > 0.0 else 0.0
-    for i in range(first, last):
-        s2 = math.sqrt(a + b * d[i + 1])
-        if dz[i] > 0.0:
-            time += crossings[i] * layer_time(p, c[i], c[i + 1], s1, s2, dz[i])
-        s1 = s2
-    return time + (2.0 * turn_time(s1 / (p * c[last]), turn_down) if turn_down > 0.0 else 0.0)
-
-
-@compiled(borrows=True)
-def length_of(
-    s_m: float, p: float, c: Floats, d: Floats, dz: Floats, crossings: Floats, first: int, last: int,
-    turn_up: float, turn_down: float,
-) -> float:  # fmt: skip
-    """Arc length (m) of a ray along its chain and the half layers that it turns in."""
-    a, b = s_m * s_m, p * p
-    s1 = math.sqrt(a + b * d[first])
     length = 2.0 * turn_length(p, s1 / (p * c[first]), turn_up) if turn_up > 0.0 else 0.0
     for i in range(first, last):
         s2 = math.sqrt(a + b * d[i + 1])
         if dz[i] > 0.0:
+            time += crossings[i] * layer_time(p, c[i], c[i + 1], s1, s2, dz[i])
             length += crossings[i] * layer_length(p, c[i], c[i + 1], s1, s2, dz[i])
         s1 = s2
-    return length + (2.0 * turn_length(p, s1 / (p * c[last]), turn_down) if turn_down > 0.0 else 0.0)
+    if turn_down > 0.0:
+        time += 2.0 * turn_time(s1 / (p * c[last]), turn_down)
+        length += 2.0 * turn_length(p, s1 / (p * c[last]), turn_down)
+    return time, length

@@ -13,7 +13,7 @@ import numpy as np
 
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.equations.rays.ray_chain import GRAZING, offsets, sweep, time_of
+from sonarsynth.equations.rays.ray_chain import GRAZING, offsets, sweep, time_and_length
 from sonarsynth.equations.rays.ray_families import ABOVE, BELOW, BETWEEN, COLUMNS, family_of, weigh
 from sonarsynth.equations.rays.ray_search import settled, straight
 from sonarsynth.equations.rays.ray_vertices import (
@@ -123,7 +123,8 @@ def rays_beside(
         if not descends:
             start_node, end_node = end_node, start_node
         leaves, arrives = math.sqrt(s_m * s_m + p * p * d[start_node]), math.sqrt(s_m * s_m + p * p * d[end_node])
-        time[j] = time_of(s_m, p, c, d, chain.dz, chain.crossings, first, last, turn_up, turn_down) + p * misfit
+        along, _ = time_and_length(s_m, p, c, d, chain.dz, chain.crossings, first, last, turn_up, turn_down)
+        time[j] = along + p * misfit
         amplitude[j] = math.sqrt(c[start_node] * c[end_node] / (over_p * abs(slope) * leaves * arrives))
         upward = up == 1 if vertices > 0 else not descends
         near = p + misfit / slope  # ds/dp = -p c^2/s

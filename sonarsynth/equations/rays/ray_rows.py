@@ -8,7 +8,7 @@ import numpy as np
 
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.equations.rays.ray_chain import length_of, sweep, time_of
+from sonarsynth.equations.rays.ray_chain import sweep, time_and_length
 
 FIELDS = 15
 TIME, LENGTH, SLOWNESS, START_SINE, END_SINE, START_SPEED, END_SPEED, AMPLITUDE = range(8)
@@ -35,8 +35,7 @@ def emit(
     infinity, and a reflection leaves it as it is.
     """
     over_p, slope = sweep(s_m, p, d, k, first, last, turn_up, turn_down)
-    time = time_of(s_m, p, c, d, dz, crossings, first, last, turn_up, turn_down)
-    length = length_of(s_m, p, c, d, dz, crossings, first, last, turn_up, turn_down)
+    time, length = time_and_length(s_m, p, c, d, dz, crossings, first, last, turn_up, turn_down)
     at_start, at_end = math.sqrt(s_m * s_m + p * p * d[start]), math.sqrt(s_m * s_m + p * p * d[end])
     amplitude = math.sqrt(c[start] * c[end] / (over_p * abs(slope) * at_start * at_end))
     caustics = 0.0

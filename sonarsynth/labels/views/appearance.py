@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonarsynth.casting.ray_casting import OFFSET, met_again, occluded
-from sonarsynth.columns import alike
+from sonarsynth.columns import alike, picked
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import in_blocks
@@ -17,9 +17,10 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.views import view_kernels
 from sonarsynth.labels.views.box_in_view import facet_boxes, whole_box
 from sonarsynth.products import Paths
+from sonarsynth.propagation import Propagation
 from sonarsynth.state import Emission, Medium
 from sonarsynth.tracing.occlusion.ray_cones import hidden
-from sonarsynth.tracing.receive_paths import usable
+from sonarsynth.tracing.receive_paths import Facets, may_face_receiver, usable
 
 Connect = Callable[[Floats, Floats], Paths]
 """Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
@@ -109,34 +110,36 @@ def _offset(body: PlacedTarget) -> float:
 
 
 def lit_fraction(
-    body: PlacedTarget,
+    number: int,
     visible: Ints,
     bodies: tuple[PlacedTarget, ...],
     snap: Emission,
     medium: Medium,
-    connect: Connect | None,
+    bent: Propagation | None,
 ) -> float:
-    """Share of the area of the visible facets of a body that direct paths of an emission reach: on the outer side, and
-    past all bodies. NaN where none is visible; connect: None where rays are straight."""
+    """Share of the area of the visible facets of a body, of that number, that direct paths of an emission reach: on the
+    outer side, and past all bodies. NaN where none is visible; bent: the model of these paths, None where they are
+    straight."""
+    body, mesh = bodies[number], bodies[number].mesh
     if not len(visible):
         return float("nan")
     if not snap.illuminates:
         return 0.0
-    lit, area = np.zeros(len(body.mesh.faces), bool), body.mesh.area
+    lit, area = np.zeros(len(mesh.faces), bool), mesh.area
     for block in in_blocks(len(visible)):
         rows = visible[block]
-        if connect is None:
+        if bent is None:
             faced, clear = _leaving(body, bodies, rows, snap.position)
         else:
-            position = body.pose.to_world(body.mesh.centroid[rows])
-            normal = body.pose.turn_to_world(body.mesh.normal[rows])
-            paths = connect(alike(snap.position, len(position)), position)
-            towards = -paths.arrival
-            lighting = np.flatnonzero(usable(paths) & (np.einsum("ij,ij->i", towards, normal[paths.pair]) > 0.0))
-            pair = paths.pair[lighting]
-            start, end = (position + _offset(body) * normal)[pair], alike(snap.position, len(pair))
-            clear = ~hidden(bodies, medium, start, end, towards[lighting], paths.length[lighting])
-            faced = rows[pair]
+            position, normal = body.pose.to_world(mesh.centroid[rows]), body.pose.turn_to_world(mesh.normal[rows])
+            facets = Facets(alike(number, len(rows)), rows, position, position + _offset(body) * normal, normal)
+            if bent.layered:
+                facets = facets.select(may_face_receiver(facets, snap.position, 0, medium))
+            paths = bent.connect(medium.profile, medium.depth, alike(snap.position, len(facets.facet)), facets.point)
+            paths = paths.select(picked(usable(paths) & facets.lit(paths.pair, paths.arrival)))
+            leaving, faced = facets.starts(paths.pair, -paths.arrival), facets.facet[paths.pair]
+            ray = leaving.point, alike(snap.position, len(faced)), -paths.arrival, paths.length
+            clear = ~hidden(bodies, medium, *ray, facets=(leaving.owner, leaving.facet))
         lit[faced[clear]] = True
     return float(area[lit].sum() / area[visible].sum())
 

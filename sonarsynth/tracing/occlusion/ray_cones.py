@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from sonarsynth.casting import folded_rays
@@ -57,7 +59,7 @@ def classify_rays(
     Arguments as of `hidden`, for the rays to the middle; those beside them, unfolded, end within `spread` of them and
     leave as straight rays to there would.
     """
-    limits = _curvature(medium.profile), SAGITTA_TOLERANCE, medium.depth
+    limits = layers_that_bend(medium.profile), SAGITTA_TOLERANCE, medium.depth
     cones = folded_rays.ray_cones(start, end, departure, length, spread, bounces, turning, *limits, *spheres(bodies))
     verdict, sure = np.full(len(start), NO_CONE), picked(np.isfinite(cones[0]))
     slope, reach, far = (column[sure] for column in cones)
@@ -88,13 +90,12 @@ def overlapping(bodies: tuple[PlacedTarget, ...]) -> list[tuple[int, tuple[Place
     ]
 
 
-def _curvature(profile: Profile) -> float:
-    """Largest curvature (1/m) of any ray."""
-    if profile.uniform:
-        return 0.0
+@lru_cache(maxsize=64)
+def layers_that_bend(profile: Profile) -> tuple[Floats, Floats]:
+    """Depths of the nodes (node,) m of a profile, and the largest curvature of rays in each layer (node - 1,) 1/m."""
     with np.errstate(divide="ignore", invalid="ignore"):
         gradient = np.abs(np.diff(profile.speed)) / np.diff(profile.depth)
-    return float(np.nanmax(gradient, initial=0.0)) / float(profile.speed.min())
+    return profile.depth, np.nan_to_num(gradient, nan=0.0, posinf=np.inf) / profile.speed.min()
 
 
 def _along_chords(
