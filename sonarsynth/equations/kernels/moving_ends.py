@@ -42,7 +42,8 @@ def meet(
             t = start + elongation(length[i], a, v[0] * t, v[1] * t, v[2] * t) * per_metre
         x, y, z = length[i] * a[0] + v[0] * t, length[i] * a[1] + v[1] * t, length[i] * a[2] + v[2] * t
         late[i], far[i] = t, math.sqrt(x * x + y * y + z * z)
-        towards[i, 0], towards[i, 1], towards[i, 2] = x / far[i], y / far[i], z / far[i]
+        one = 1.0 / far[i]
+        towards[i, 0], towards[i, 1], towards[i, 2] = x * one, y * one, z * one
     return late, towards, far
 
 

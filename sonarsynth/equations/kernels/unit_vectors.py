@@ -31,11 +31,11 @@ def straight_rays(
                 k -= 1
             time[k], length[k], family[k] = late, far, n
         for k in range(first, first + families):
-            far, z = length[k], climb[family[k], i]
-            inverse[k] = 1.0 / far
-            departure[k, 0], departure[k, 1], departure[k, 2] = x / far, y / far, z / far
-            arrival[k, 0], arrival[k, 1], arrival[k, 2] = x / far, y / far, -z / far if odd[family[k]] else z / far
-            grazing[k] = math.asin(abs(z) / far) if family[k] > 0 else math.nan
+            one, z = 1.0 / length[k], climb[family[k], i]
+            inverse[k] = one
+            departure[k, 0], departure[k, 1], departure[k, 2] = x * one, y * one, z * one
+            arrival[k, 0], arrival[k, 1], arrival[k, 2] = x * one, y * one, -z * one if odd[family[k]] else z * one
+            grazing[k] = math.asin(abs(z) / length[k]) if family[k] > 0 else math.nan
         first += families
     return family, time, length, departure, arrival, inverse, grazing
 
@@ -66,8 +66,8 @@ def to_images(length: Floats, departure: Floats, mirrored: Bools, offset: Floats
             x = length[i] * departure[i, 0] + offset[j, 0]
             y = length[i] * departure[i, 1] + offset[j, 1]
             z = length[i] * departure[i, 2] + up
-            far = math.sqrt(x * x + y * y + z * z)
-            out[i, j, 0], out[i, j, 1], out[i, j, 2] = x / far, y / far, z / far
+            one = 1.0 / math.sqrt(x * x + y * y + z * z)
+            out[i, j, 0], out[i, j, 1], out[i, j, 2] = x * one, y * one, z * one
     return out
 
 
@@ -77,10 +77,9 @@ def _put_turned(x: float, y: float, z: float, turn: Floats, rotation: Floats, ou
     rotation (xyz, axis)."""
     tx, ty, tz = turn[0], turn[1], turn[2]
     x, y, z = x - (ty * z - tz * y), y - (tz * x - tx * z), z - (tx * y - ty * x)
-    far = math.sqrt(x * x + y * y + z * z)
-    x, y, z = x / far, y / far, z / far
+    one = 1.0 / math.sqrt(x * x + y * y + z * z)
     for n in range(3):
-        out[n] = rotation[0, n] * x + rotation[1, n] * y + rotation[2, n] * z
+        out[n] = one * (rotation[0, n] * x + rotation[1, n] * y + rotation[2, n] * z)
 
 
 @compiled
