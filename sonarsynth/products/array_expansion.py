@@ -160,5 +160,5 @@ def stacked(blocks: Sequence[Any]) -> Any:
     """Rows of all blocks, one after the other; columns that some of them lack are 0."""
     if blocks[0].ndim == 2:
         width = max(block.shape[1] for block in blocks)
-        blocks = [b if b.shape[1] == width else np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in blocks]
+        blocks = [b if b.shape[1] == width else np.concatenate([b, np.zeros((len(b), width - b.shape[1]))], axis=1) for b in blocks]
     return np.concatenate(blocks)

@@ -168,11 +168,9 @@ def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, medium: Medi
     c_facet, c_array = profile.at(depth(legs.point)), float(profile.at(depth(pose.position)))
     moved, begun = of.velocity * of.late[:, None], of.met + of.late
     gone = begun - meeting.arrival_time + legs.travel_time - dot(moved, legs.departure) / c_facet
-    source = pose.turn_to_world(legs.radius[:, None] * legs.direction)
-    late, apparent = moving_ends.hear(legs.length, legs.arrival, source, gone, u, c_array, moved, legs.bounces)
-    radius, departure = np.sqrt(dot(apparent, apparent)), of.departure(legs.length, legs.departure)
+    late, arrival, radius = moving_ends.hear(legs.length, legs.arrival, gone, u, c_array, moved, legs.bounces)
+    departure = of.departure(legs.length, legs.departure)
     legs = bounced_anew(legs, depth(legs.point), legs.departure, departure, medium, centre)
-    arrival = -apparent / radius[:, None]
     direction = -pose.turn_to_body(arrival)
     if meeting.sonar.spin.any():
         direction = direction - np.cross(pose.turn_to_body(meeting.sonar.spin), direction) * late[:, None]

@@ -111,7 +111,8 @@ class _EchoBlock:
     def levels(self) -> EchoLevels:
         """What decides which echoes are kept."""
         row, amplitude = _columns(self.groups, "row", "amplitude")
-        strongest = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
+        at_probes = np.abs(self.few.T, order="C").max(axis=0, initial=0.0)
+        strongest = np.maximum(at_probes, np.abs(amplitude)) * self.factor[row]
         owner = self.array.facets.owner[self.out.facet[row]]
         strength = strongest * in_band(self.pulses, self.array.context.receiver.band)
         heard = self.array.legs.open[self.leg[row]] < DOUBTFUL

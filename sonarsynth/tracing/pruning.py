@@ -36,7 +36,9 @@ def loud_ones(levels: EchoLevels, negligible: float) -> Bools:
     keep = np.ones(len(strength), bool)
     for number, exponent in product(np.flatnonzero(np.bincount(owner)), (1, 2)):
         rows = np.flatnonzero((owner == number) & (coherent == (exponent == 1)))
-        loudest = strength[rows].max(initial=0.0)
+        if not len(rows):
+            continue
+        loudest = strength[rows].max()
         size = (strength[rows] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared
         most = size[heard[rows]]
         least = negligible * most.sum() if exponent == 2 else np.sqrt(negligible) * most.max(initial=0.0)

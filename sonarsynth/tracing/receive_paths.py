@@ -208,7 +208,7 @@ def facets_of(
 ) -> Facets:
     """Some of the surface elements of all, one owner after the other; chosen: of an owner's, by its number."""
     last = np.cumsum([0, *map(len, scattering)])
-    of = [np.arange(*np.clip([block.start - n, block.stop - n], 0, m - n)) for n, m in pairwise(last.tolist())]
+    of = [np.arange(max(block.start - n, 0), min(block.stop, m) - n) for n, m in pairwise(last.tolist())]
     of = [chosen(number, rows) for number, rows in enumerate(of)]
     owner, none = np.repeat(np.arange(len(scattering)), [len(rows) for rows in of]), np.empty((0, 3))
     places = [(none, none, none)] + [
