@@ -12,9 +12,9 @@ from sonarsynth.conventions import Bools, Floats, Ints
 
 @compiled
 def straight_rays(
-    level: Floats, climb: Floats, mean: Floats, odd: Ints
+    away: Floats, climb: Floats, mean: Floats, odd: Ints
 ) -> tuple[Ints, Floats, Floats, Floats, Floats, Floats, Floats]:
-    """Ways so far over ground (pair, xy) m and up (family, pair) m at a mean slowness (family, pair) s/m, sorted by
+    """Ways so far over ground as `away` (pair, xyz) m, and up (family, pair) m at a mean slowness (family, pair) s/m, sorted by
     pair, then by travel time: family, travel times, lengths, unit vectors along them (ray, xyz) where they begin, NaN
     of none, and where they end, there upside down of odd (family,) ones, one over the lengths, and grazing angles."""
     families, count = climb.shape
@@ -22,7 +22,7 @@ def straight_rays(
     time, length, inverse, grazing = np.empty((4, families * count))
     departure, arrival = np.empty((2, families * count, 3))
     for i in range(count):
-        x, y = level[i, 0], level[i, 1]
+        x, y = away[i, 0], away[i, 1]
         for n in range(families):
             far = math.sqrt(x * x + y * y + climb[n, i] * climb[n, i])
             late, k = far * mean[n, i], first + n
