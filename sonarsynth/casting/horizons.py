@@ -41,8 +41,7 @@ def _over_facet(middle: Floats, normal: Floats, side: Floats, corner: Floats) ->
     """The same of a facet with these corners (3, xyz)."""
     height = -math.inf
     for x in range(3):
-        if max(side[x] * (corner[0, x] - middle[x]), side[x] * (corner[1, x] - middle[x]),
-               side[x] * (corner[2, x] - middle[x])) < -BESIDE:  # fmt: skip
+        if max(side[x] * corner[0, x], side[x] * corner[1, x], side[x] * corner[2, x]) < side[x] * middle[x] - BESIDE:
             return 0.0
     for j in range(3):
         x, y, z = corner[j, 0] - middle[0], corner[j, 1] - middle[1], corner[j, 2] - middle[2]

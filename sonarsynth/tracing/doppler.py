@@ -86,19 +86,14 @@ class MotionTerms(Columns):
         """Directions (path, ..., xyz) to the array or probes of it, of rays of some length (path,) m that left in
         directions `away`, world; with the pose of the body that was traced, as it sees them when it has turned, in
         its axes."""
-        turn, rotation = (np.zeros_like(self.spin), np.eye(3)) if body is None else (self.turn, body.rotation)
+        late, rotation = (np.zeros_like(self.late), np.eye(3)) if body is None else (self.late, body.rotation)
         places = away if away.ndim == 3 else away[:, None]
-        return np.asarray(moved(length, places, self.apart, turn, rotation).reshape(away.shape))
-
-    @property
-    def turn(self) -> Floats:
-        """(path, xyz) rad: by how much the body has turned."""
-        return np.asarray(self.late[:, None] * self.spin)
+        return np.asarray(moved(length, places, self.apart, late, self.spin, rotation).reshape(away.shape))
 
     def arrival(self, direction: Floats, body: Pose) -> Floats:
         """Directions (path, xyz) of rays, world, as the body that has turned sees them, in its axes."""
         if self.spin.any():
-            direction = unit(direction - np.cross(self.turn, direction))
+            direction = unit(direction - np.cross(self.late[:, None] * self.spin, direction))
         return body.turn_to_body(direction)
 
 

@@ -235,7 +235,7 @@ def _towards_probes(array: FacetPaths, leg: Ints, carried: MotionTerms | None, g
         return motion.departure(legs.length[rows], fronts.departure(rows, some), body)
     offset = array.context.receiver.pose.turn_to_world(fronts.place.probe.position[some])
     ray = legs.length[rows], rows_of(legs.departure, rows), legs.bounces[rows] % 2 == 1
-    return np.asarray(to_moved_images(*ray, offset, motion.apart, motion.turn, body.rotation))
+    return np.asarray(to_moved_images(*ray, offset, motion.apart, motion.late, motion.spin, body.rotation))
 
 
 def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:

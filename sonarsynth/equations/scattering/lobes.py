@@ -37,9 +37,9 @@ def slope_lobe(incident: Floats, scattered: Floats, normal: Floats, slope: float
     """
     from sonarsynth.equations.scattering import lobes_kernels
 
-    vectors, shape = _rows(incident, scattered, normal)
-    square = np.empty(vectors[0].shape[:2])
-    lobes_kernels.tilts(*vectors, square)
+    (a, b, n), shape = _rows(incident, scattered, normal)
+    square = np.empty(a.shape[:2])
+    lobes_kernels.tilts(a, b, n, square)
     lobe = np.exp(square * (-0.5 / slope**2))
     lobe *= np.square(square + 1.0, out=square)
     lobe /= 8.0 * np.pi * slope**2

@@ -1,4 +1,4 @@
-"""The lobes of `lobes`, compiled: many directions a facet. Between both kernels NumPy takes all exponentials at once."""
+"""The lobes of `lobes`, compiled: many directions a facet. Between both kernels NumPy takes all exponentials."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def amplitudes(
     incident: Floats, scattered: Floats, normal: Floats, area: Floats, lobe: Floats, share: float, floor: float,
     beyond: bool, out: Floats,
 ) -> None:  # fmt: skip
-    """sqrt(area |share lobe + floor cos cos|) where lit and seen, or `beyond` that lit alone, of vectors (row, column, xyz)
-    into out (row, column)."""
+    """sqrt(area |share lobe + floor cos cos|) where lit and seen, or `beyond` that lit alone, of vectors (row, column,
+    xyz) into out (row, column)."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             a, b, n = incident[i, j], scattered[i, j], normal[i, j]
