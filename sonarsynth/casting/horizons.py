@@ -13,8 +13,8 @@ from sonarsynth.conventions import Floats, Int32s, Ints
 
 FLAT = 1e-7
 """Of the body's size: what stands no higher over the plane of a facet is below rays that start off it (`OFFSET`)."""
-BESIDE = 2e-6
-"""Of the body's size: by so much what is beside an octant is still in it, by more than rays start off their facet."""
+BESIDE = 1e-4
+"""Of the body's size: what is so little beside an octant counts as in it: more than rays start off their facets."""
 
 
 @compiled(borrows=True)

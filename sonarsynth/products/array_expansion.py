@@ -161,5 +161,5 @@ def stacked(blocks: Sequence[Any]) -> Any:
     if blocks[0].ndim == 2:
         width = max(block.shape[1] for block in blocks)
         lacking = [np.zeros((len(block), width - block.shape[1])) for block in blocks]
-        blocks = [np.hstack(pair) if pair[1].size else pair[0] for pair in zip(blocks, lacking, strict=True)]
+        blocks = [np.hstack(pair) if pair[1].shape[1] else pair[0] for pair in zip(blocks, lacking, strict=True)]
     return np.concatenate(blocks)
