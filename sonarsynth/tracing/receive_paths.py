@@ -58,14 +58,6 @@ class ReceivePaths(Columns):
     occluded: Bytes  # (leg, byte) as of `Arrivals`
     open: Ints  # (leg,) not 0: bodies hide it from hydrophones, not known yet which (`sensor_occlusion.Occlusion`)
 
-    def numbered(self, row: Ints) -> ReceivePaths:
-        """The legs with other numbers (leg,) for the points that they start from."""
-        return self.but(row=row)
-
-    def seen(self, occluded: Bytes, open: Ints) -> ReceivePaths:
-        """The legs, hidden from some hydrophones, which are not known yet for some."""
-        return self.but(occluded=occluded, open=open)
-
     @property
     def bounces(self) -> Ints:
         """(leg,) reflections from surface and bottom."""
