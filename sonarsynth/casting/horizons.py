@@ -13,6 +13,8 @@ from sonarsynth.conventions import Floats, Int32s, Ints
 
 FLAT = 1e-7
 """Of the body's size: what stands no higher over the plane of a facet is below rays that start off it (`OFFSET`)."""
+BESIDE = 1e-4
+"""Of the body's size: what is so little beside an octant counts as in it: more than rays start off their facets."""
 
 
 @compiled(borrows=True)
@@ -24,18 +26,23 @@ def _steepest(height: float, square: float) -> float:
 
 
 @compiled(borrows=True)
-def _over_box(middle: Floats, normal: Floats, node: Floats) -> float:
-    """The same of what is in a box."""
+def _over_box(middle: Floats, normal: Floats, side: Floats, node: Floats) -> float:
+    """The same of what is in a box; 0 where that is not in the octant about the middle with these signs, side (xyz)."""
     height = 0.0
     for x in range(3):
+        if side[x] * (node[x] - middle[x]) + node[3 + x] < -BESIDE:
+            return 0.0
         height += normal[x] * (node[x] - middle[x]) + abs(normal[x]) * node[3 + x]
     return _steepest(height, to_box(middle, node))
 
 
 @compiled(borrows=True)
-def _over_facet(middle: Floats, normal: Floats, corner: Floats) -> float:
+def _over_facet(middle: Floats, normal: Floats, side: Floats, corner: Floats) -> float:
     """The same of a facet with these corners (3, xyz)."""
     height = -math.inf
+    for x in range(3):
+        if max(side[x] * corner[0, x], side[x] * corner[1, x], side[x] * corner[2, x]) < side[x] * middle[x] - BESIDE:
+            return 0.0
     for j in range(3):
         x, y, z = corner[j, 0] - middle[0], corner[j, 1] - middle[1], corner[j, 2] - middle[2]
         height = max(height, normal[0] * x + normal[1] * y + normal[2] * z)
@@ -46,12 +53,12 @@ def _over_facet(middle: Floats, normal: Floats, corner: Floats) -> float:
 
 @compiled(borrows=True)
 def _horizon(
-    middle: Floats, normal: Floats, last: int, nodes: Floats, order: Int32s, corners: Floats, stack: Ints,
-    over: Floats,
+    middle: Floats, normal: Floats, side: Floats, last: int, nodes: Floats, order: Int32s, corners: Floats,
+    stack: Ints, over: Floats,
 ) -> tuple[float, int]:  # fmt: skip
-    """The horizon of a facet, and the facet that makes it; last: that of another, which is tried first."""
+    """The horizon of a facet in an octant, and the facet that makes it; last: that of another, which is tried first."""
     leaves, count, steepest = len(nodes) // 2, len(order), last
-    highest, depth, stack[0], over[0] = _over_facet(middle, normal, corners[last]), 1, 1, 1.0
+    highest, depth, stack[0], over[0] = _over_facet(middle, normal, side, corners[last]), 1, 1, 1.0
     while depth > 0:
         depth -= 1
         node = stack[depth]
@@ -59,11 +66,12 @@ def _horizon(
             continue
         if node >= leaves:
             for k in range((node - leaves) * count // leaves, (node - leaves + 1) * count // leaves):
-                sine = _over_facet(middle, normal, corners[order[k]])
+                sine = _over_facet(middle, normal, side, corners[order[k]])
                 if sine > highest:
                     highest, steepest = sine, order[k]
             continue
-        one, other = _over_box(middle, normal, nodes[2 * node]), _over_box(middle, normal, nodes[2 * node + 1])
+        one = _over_box(middle, normal, side, nodes[2 * node])
+        other = _over_box(middle, normal, side, nodes[2 * node + 1])
         low = 2 * node + (1 if one > other else 0)
         stack[depth], over[depth] = low, min(one, other)
         stack[depth + 1], over[depth + 1] = 4 * node + 1 - low, max(one, other)
@@ -73,10 +81,11 @@ def _horizon(
 
 @compiled
 def horizons(vertices: Floats, faces: Int32s, nodes: Floats, order: Int32s) -> Floats:
-    """Bound (facet,) on the sine of the elevation, over the plane of each facet and seen from its middle, of any part
-    of the same mesh; 0 where nothing is above that plane. nodes, order: `facet_tree`."""
-    horizon, steepest, stack, over = np.empty(len(faces)), 0, np.empty(LEVELS, np.int64), np.empty(LEVELS)
-    corners, middle = np.empty((len(faces), 3, 3)), np.empty(3)
+    """Bounds (facet, octant) on the sine of the elevation, over the plane of each facet and seen from its middle, of
+    any part of the same mesh that is in an octant about the middle; 0 where nothing there is above that plane. Bits of
+    the number of an octant: whether x, y and z are below 0 in it. nodes, order: `facet_tree`."""
+    horizon, stack, over = np.empty((len(faces), 8)), np.empty(LEVELS, np.int64), np.empty(LEVELS)
+    corners, middle, side, steepest = np.empty((len(faces), 3, 3)), np.empty(3), np.empty(3), np.zeros(8, np.int64)
     for f in range(len(faces)):
         for j in range(3):
             corners[f, j] = vertices[faces[f, j]]
@@ -85,6 +94,11 @@ def horizons(vertices: Floats, faces: Int32s, nodes: Floats, order: Int32s) -> F
         normal /= math.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
         for x in range(3):
             middle[x] = (corners[f, 0, x] + corners[f, 1, x] + corners[f, 2, x]) / 3.0
-        highest, steepest = _horizon(middle, normal, steepest, nodes, order, corners, stack, over)
-        horizon[f] = highest if normal[0] == normal[0] else 1.0  # of a facet without an area nothing is known
+        for octant in range(8):
+            for x in range(3):
+                side[x] = -1.0 if octant >> x & 1 else 1.0
+            highest, steepest[octant] = _horizon(
+                middle, normal, side, steepest[octant], nodes, order, corners, stack, over
+            )
+            horizon[f, octant] = highest if normal[0] == normal[0] else 1.0  # without an area nothing is known
     return horizon

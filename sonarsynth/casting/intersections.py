@@ -124,13 +124,22 @@ def to_sphere(o: Floats, d: Floats) -> float:
 
 @compiled(borrows=True)
 def over_horizon(direction: Floats, slope: float, facet: int, normal: Floats, horizon: Floats) -> bool:
-    """Whether all of a cone of rays, along a direction of any length, leaves a facet above all of its mesh; slope: its
-    radius over the distance along it, 0 of a ray; horizon (facet,): `horizons`."""
-    square = along = 0.0
+    """Whether all of a cone of rays, along a direction of any length, leaves a facet above all of its mesh that is in
+    the octants of the cone; slope: its radius over the distance along it, 0 of a ray; horizon (facet, octant):
+    `horizons`."""
+    square, along, octant = 0.0, 0.0, 0
     for x in range(3):
         square, along = square + direction[x] ** 2, along + direction[x] * normal[facet, x]
-    lowest = along - slope * math.sqrt(max(square - along * along, 0.0)) if slope > 0.0 else along
-    return bool(lowest > (horizon[facet] + CLEAR) * math.sqrt(square * (1.0 + slope * slope)))
+        octant |= (direction[x] < 0.0) << x
+    lowest, highest = along, horizon[facet, octant]
+    if slope > 0.0:
+        lowest, radius = along - slope * math.sqrt(max(square - along * along, 0.0)), slope * math.sqrt(square)
+        for octant in range(8):
+            within = True
+            for x in range(3):
+                within = within and (-direction[x] if octant >> x & 1 else direction[x]) >= -radius
+            highest = max(highest, horizon[facet, octant]) if within else highest
+    return bool(lowest > (highest + CLEAR) * math.sqrt(square * (1.0 + slope * slope)))
 
 
 @compiled

@@ -73,7 +73,7 @@ class CastingMesh:
 
     @cached_property
     def horizon(self) -> Floats:
-        """(facet,) how high the mesh stands over each facet; see `horizons`."""
+        """(facet, octant) how high the mesh stands over each facet; see `horizons`."""
         from sonarsynth.casting.horizons import horizons
 
         return horizons(self.vertices, self.faces, *self.tree)
@@ -239,7 +239,7 @@ def occluded(
             continue
         ready, pose = casting_mesh(body.mesh), body.pose
         own = np.full(len(a), NO_TARGET) if facet is None else np.where(owner == number, facet, NO_TARGET)
-        horizon = np.empty(0) if facet is None else ready.horizon
+        horizon = np.empty((0, 8)) if facet is None else ready.horizon
         count = intersections.into_mesh(
             a, b, hidden, own, body.mesh.normal, horizon, pose.rotation, pose.position, ready.centre, ready.size,
             origin, heading, far, segment,

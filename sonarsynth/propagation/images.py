@@ -40,10 +40,9 @@ def images(start: Floats, end: Floats, bottom_depth: float, bounces: int) -> lis
 
 def lengths(start: Floats, end: Floats, bottom_depth: float, bounces: int) -> Floats:
     """Lengths (family, pair) m of all of `images` between points (pair, xyz) of the world."""
-    level = np.linalg.norm((end - start)[:, :2], axis=1)
+    x, y, z = (end - start).T
     ways = images(depth(start), depth(end), bottom_depth, bounces)[1:] if bounces else []
-    reflected = [np.hypot(level, way.climb) for way in ways]
-    return np.stack([np.linalg.norm(end - start, axis=1), *reflected])
+    return np.array([np.sqrt(x * x + y * y + climb * climb) for climb in (z, *(way.climb for way in ways))])
 
 
 def family(surface: Ints, bottom: Ints, falls: Bools) -> Ints:

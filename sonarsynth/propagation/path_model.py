@@ -92,7 +92,7 @@ class PathModel(Method):
     def reflected(self, bounces: int) -> Self:
         """The same model, of paths with at most so many reflections."""
         model: Any = self
-        changed: Self = replace(model, bounces=bounces)
+        changed: Self = model if bounces == self.bounces else replace(model, bounces=bounces)
         return changed
 
     def cost(self, size: FrameSize) -> float:

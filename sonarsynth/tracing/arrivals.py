@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonarsynth.columns import picked
 from sonarsynth.conventions import NO_TARGET, depth
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.scattering.facet_geometry import PulseResponse
@@ -102,7 +103,7 @@ def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) 
     context, meeting = array.context, array.meeting
     medium, receiver, snap = context.medium, context.receiver, context.snaps[index]
     legs = rays_to_centre(medium, snap.position[None, :], receiver, array.propagation).by(ways)
-    legs = legs.select(np.flatnonzero(directed(snap, legs.departure)[0] * legs.spreading))
+    legs = legs.select(picked(directed(snap, legs.departure)[0] * legs.spreading != 0.0))
     view = array.view(blocking_bodies(context, snap.position))
     legs = view.visible(legs, Starts(legs.point))
     legs = view.settled(legs, Starts(legs.point))

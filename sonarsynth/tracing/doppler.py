@@ -86,19 +86,14 @@ class MotionTerms(Columns):
         """Directions (path, ..., xyz) to the array or probes of it, of rays of some length (path,) m that left in
         directions `away`, world; with the pose of the body that was traced, as it sees them when it has turned, in
         its axes."""
-        turn, rotation = (np.zeros_like(self.spin), np.eye(3)) if body is None else (self.turn, body.rotation)
+        late, rotation = (np.zeros_like(self.late), np.eye(3)) if body is None else (self.late, body.rotation)
         places = away if away.ndim == 3 else away[:, None]
-        return np.asarray(moved(length, places, self.apart, turn, rotation).reshape(away.shape))
-
-    @property
-    def turn(self) -> Floats:
-        """(path, xyz) rad: by how much the body has turned."""
-        return np.asarray(self.late[:, None] * self.spin)
+        return np.asarray(moved(length, places, self.apart, late, self.spin, rotation).reshape(away.shape))
 
     def arrival(self, direction: Floats, body: Pose) -> Floats:
         """Directions (path, xyz) of rays, world, as the body that has turned sees them, in its axes."""
         if self.spin.any():
-            direction = unit(direction - np.cross(self.turn, direction))
+            direction = unit(direction - np.cross(self.late[:, None] * self.spin, direction))
         return body.turn_to_body(direction)
 
 
@@ -168,11 +163,9 @@ def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, medium: Medi
     c_facet, c_array = profile.at(depth(legs.point)), float(profile.at(depth(pose.position)))
     moved, begun = of.velocity * of.late[:, None], of.met + of.late
     gone = begun - meeting.arrival_time + legs.travel_time - dot(moved, legs.departure) / c_facet
-    source = pose.turn_to_world(legs.radius[:, None] * legs.direction)
-    late, apparent = moving_ends.hear(legs.length, legs.arrival, source, gone, u, c_array, moved, legs.bounces)
-    radius, departure = np.sqrt(dot(apparent, apparent)), of.departure(legs.length, legs.departure)
+    late, arrival, radius = moving_ends.hear(legs.length, legs.arrival, gone, u, c_array, moved, legs.bounces)
+    departure = of.departure(legs.length, legs.departure)
     legs = bounced_anew(legs, depth(legs.point), legs.departure, departure, medium, centre)
-    arrival = -apparent / radius[:, None]
     direction = -pose.turn_to_body(arrival)
     if meeting.sonar.spin.any():
         direction = direction - np.cross(pose.turn_to_body(meeting.sonar.spin), direction) * late[:, None]

@@ -111,7 +111,8 @@ class _EchoBlock:
     def levels(self) -> EchoLevels:
         """What decides which echoes are kept."""
         row, amplitude = _columns(self.groups, "row", "amplitude")
-        strongest = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
+        at_probes = np.abs(self.few.T, order="C").max(axis=0, initial=0.0)
+        strongest = np.maximum(at_probes, np.abs(amplitude)) * self.factor[row]
         owner = self.array.facets.owner[self.out.facet[row]]
         strength = strongest * in_band(self.pulses, self.array.context.receiver.band)
         heard = self.array.legs.open[self.leg[row]] < DOUBTFUL
@@ -236,7 +237,7 @@ def _towards_probes(array: FacetPaths, leg: Ints, carried: MotionTerms | None, g
         return motion.departure(legs.length[rows], fronts.departure(rows, some), body)
     offset = array.context.receiver.pose.turn_to_world(fronts.place.probe.position[some])
     ray = legs.length[rows], rows_of(legs.departure, rows), legs.bounces[rows] % 2 == 1
-    return np.asarray(to_moved_images(*ray, offset, motion.apart, motion.turn, body.rotation))
+    return np.asarray(to_moved_images(*ray, offset, motion.apart, motion.late, motion.spin, body.rotation))
 
 
 def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:

@@ -64,7 +64,7 @@ class FacetPaths:
             return self
         first, last = (int(n) for n in np.searchsorted(self.legs.row, (rows.start, rows.stop)))
         legs = self.legs.select(slice(first, last))
-        legs, facets = legs.numbered(legs.row - rows.start), self.facets.select(rows)
+        legs, facets = legs.but(row=legs.row - rows.start), self.facets.select(rows)
         return replace(self, legs=legs, facets=facets, first=self.first + first)
 
     def view(self, bodies: tuple[PlacedTarget, ...]) -> Occlusion:
@@ -91,13 +91,13 @@ class FacetPaths:
             return self.legs.select(leg), in_sight
         pending = self.legs.select(number)
         starts = self.facets.starts(pending.row, pending.departure)
-        pending = self.view(self.context.bodies).settled(pending.numbered(np.arange(len(number))), starts)
+        pending = self.view(self.context.bodies).settled(pending.but(row=np.arange(len(number))), starts)
         found = np.isin(row, pending.row)
         in_sight[doubtful] = found
         legs = self.legs.select(leg[in_sight])
         occluded = legs.occluded.copy()
         occluded[legs.open > 0] = pending.occluded[np.searchsorted(pending.row, row[found])]
-        return legs.seen(occluded, np.zeros_like(legs.open)), in_sight
+        return legs.but(occluded=occluded, open=np.zeros_like(legs.open)), in_sight
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ def facet_paths(
         leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
         first = np.diff(leaving.row, prepend=-1) > 0
         reached = leaving.row[first]
-        columns[0].append(leaving.numbered(count - 1 + np.cumsum(first)))
+        columns[0].append(leaving.but(row=count - 1 + np.cumsum(first)))
         columns[1].append(every.select(reached))
         count += len(reached)
     legs, facets = concatenate(columns[0]), concatenate(columns[1])

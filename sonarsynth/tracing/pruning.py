@@ -36,11 +36,13 @@ def loud_ones(levels: EchoLevels, negligible: float) -> Bools:
     keep = np.ones(len(strength), bool)
     for number, exponent in product(np.flatnonzero(np.bincount(owner)), (1, 2)):
         rows = np.flatnonzero((owner == number) & (coherent == (exponent == 1)))
-        loudest = strength[rows].max(initial=0.0)
+        if not len(rows):
+            continue
+        loudest = strength[rows].max()
         size = (strength[rows] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared
         most = size[heard[rows]]
         least = negligible * most.sum() if exponent == 2 else np.sqrt(negligible) * most.max(initial=0.0)
-        faint = np.flatnonzero(size <= least)  # of all others none can be left out
-        order = faint[np.argsort(size[faint], kind="stable")]
-        keep[rows[order[np.cumsum(size[order]) <= least]]] = False
+        faint = np.sort(size[size <= least])  # of all others none can be left out
+        kept = np.append(faint, np.nextafter(least, np.inf))[np.count_nonzero(np.cumsum(faint) <= least)]
+        keep[rows[size < kept]] = False  # of equal ones all are kept, or none
     return keep

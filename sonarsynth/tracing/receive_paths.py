@@ -59,14 +59,6 @@ class ReceivePaths(Columns):
     occluded: Bytes  # (leg, byte) as of `Arrivals`
     open: Ints  # (leg,) not 0: bodies hide it from hydrophones, not known yet which (`sensor_occlusion.Occlusion`)
 
-    def numbered(self, row: Ints) -> ReceivePaths:
-        """The legs with other numbers (leg,) for the points that they start from."""
-        return self.but(row=row)
-
-    def seen(self, occluded: Bytes, open: Ints) -> ReceivePaths:
-        """The legs, hidden from some hydrophones, which are not known yet for some."""
-        return self.but(occluded=occluded, open=open)
-
     @property
     def bounces(self) -> Ints:
         """(leg,) reflections from surface and bottom."""
@@ -209,7 +201,7 @@ def facets_of(
 ) -> Facets:
     """Some of the surface elements of all, one owner after the other; chosen: of an owner's, by its number."""
     last = np.cumsum([0, *map(len, scattering)])
-    of = [np.arange(*np.clip([block.start - n, block.stop - n], 0, m - n)) for n, m in pairwise(last.tolist())]
+    of = [np.arange(max(block.start - n, 0), min(block.stop, m) - n) for n, m in pairwise(last.tolist())]
     of = [chosen(number, rows) for number, rows in enumerate(of)]
     owner, none = np.repeat(np.arange(len(scattering)), [len(rows) for rows in of]), np.empty((0, 3))
     places = [(none, none, none)] + [

@@ -140,7 +140,7 @@ def assemble(
         direction=legs.direction,
         radius=legs.radius,
         expansion=over,
-        amplitude=first * scattering * second * boundary * 10.0 ** (-loss / 20.0),
+        amplitude=first * scattering * second * boundary * np.exp(loss * (-np.log(10.0) / 20.0)),
         spreading_out=first,
         spreading_in=second,
         scattering=scattering,

@@ -126,3 +126,13 @@ def test_no_echo_is_faint_beside_what_nobody_may_hear(seed: int) -> None:
     alone = loud_ones(EchoLevels(*(column[heard] for column in (strength, coherent, owner, heard, owner))), 1e-3)
     assert not alone.all()
     assert keep[heard][alone].all()
+
+
+def test_of_equally_faint_echoes_all_are_left_out_or_none() -> None:
+    """Of those of a body that both sides of show alike, say; whatever the order that they come in."""
+    for faint, left_out in ((9, True), (11, False)):  # each is a tenth of what is negligible
+        strength = np.append(np.full(faint, 1e-2), 1.0)
+        none, every = np.zeros(faint + 1, bool), np.ones(faint + 1, bool)
+        keep = loud_ones(EchoLevels(strength, none, none.astype(int), every, none.astype(int)), 1e-3)
+        assert keep[-1]
+        assert (keep[:-1] != left_out).all()

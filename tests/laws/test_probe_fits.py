@@ -73,18 +73,18 @@ def test_images_of_probes_are_seen_from_where_a_facet_has_moved_to() -> None:
     """To first order in what its body has turned by, which is small."""
     length, departure = RNG.uniform(5.0, 30.0, 6), unit(RNG.normal(size=(6, 3)))
     mirrored, offset = np.arange(6) % 2 == 1, RNG.normal(0.0, 0.3, (4, 3))
-    apart, turn = RNG.normal(0.0, 0.1, (6, 3)), RNG.normal(0.0, 1e-3, (6, 3))
+    apart, late, spin = RNG.normal(0.0, 0.1, (6, 3)), RNG.normal(0.0, 1e-2, 6), RNG.normal(0.0, 0.1, (6, 3))
     axes = rotation_matrix(unit(RNG.normal(size=4)))
     image = np.where(mirrored[:, None, None], offset * [1.0, 1.0, -1.0], offset)
     towards = (length[:, None] * departure)[:, None] + image + apart[:, None]
-    expected = unit(towards - np.cross(turn[:, None], towards)) @ axes
+    expected = unit(towards - np.cross((late[:, None] * spin)[:, None], towards)) @ axes
     ray = length, departure, mirrored, offset
-    np.testing.assert_allclose(to_moved_images(*ray, apart, turn, axes), expected, atol=1e-14)
+    np.testing.assert_allclose(to_moved_images(*ray, apart, late, spin, axes), expected, atol=1e-14)
     still = np.zeros((6, 3))
-    np.testing.assert_allclose(to_moved_images(*ray, still, still, np.eye(3)), to_images(*ray), atol=1e-15)
+    np.testing.assert_allclose(to_moved_images(*ray, still, late, still, np.eye(3)), to_images(*ray), atol=1e-15)
     centre = departure[:, None].copy()
-    at_centre = to_moved_images(length, departure, mirrored, np.zeros((1, 3)), apart, turn, axes)
-    np.testing.assert_allclose(moved(length, centre, apart, turn, axes), at_centre, atol=1e-14)
+    at_centre = to_moved_images(length, departure, mirrored, np.zeros((1, 3)), apart, late, spin, axes)
+    np.testing.assert_allclose(moved(length, centre, apart, late, spin, axes), at_centre, atol=1e-14)
 
 
 def test_paths_over_different_arrays_are_not_joined() -> None:

@@ -42,19 +42,19 @@ def meet(
             t = start + elongation(length[i], a, v[0] * t, v[1] * t, v[2] * t) * per_metre
         x, y, z = length[i] * a[0] + v[0] * t, length[i] * a[1] + v[1] * t, length[i] * a[2] + v[2] * t
         late[i], far[i] = t, math.sqrt(x * x + y * y + z * z)
-        towards[i, 0], towards[i, 1], towards[i, 2] = x / far[i], y / far[i], z / far[i]
+        one = 1.0 / far[i]
+        towards[i, 0], towards[i, 1], towards[i, 2] = x * one, y * one, z * one
     return late, towards, far
 
 
 @compiled
 def hear(
-    length: Floats, arrival: Floats, source: Floats, gone: Floats, velocity: Floats, speed: float, moved: Floats,
-    bounces: Ints,
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """When an array at a velocity (xyz) m/s hears rays whose starts have moved (ray, xyz) m: s (ray,) after it is where
-    rays lead, and their sources (ray, xyz) m, or images of these, as it sees them then. source (ray, xyz) m: as it sees
-    them by the rays; gone (ray,) s: as of `meet`, with what the starts are nearer; speed: of sound at the array."""
-    late, seen = np.empty(len(gone)), np.empty((len(gone), 3))
+    length: Floats, arrival: Floats, gone: Floats, velocity: Floats, speed: float, moved: Floats, bounces: Ints
+) -> tuple[Floats, Floats, Floats]:
+    """When an array at a velocity (xyz) m/s hears rays whose starts, or images of these, have moved (ray, xyz) m: s
+    (ray,) after it is where rays lead, and directions of arrival (ray, xyz) and lengths (ray,) m then. gone (ray,) s:
+    as of `meet`, with what the starts are nearer; speed: of sound at the array."""
+    late, towards, far = np.empty(len(gone)), np.empty((len(gone), 3)), np.empty(len(gone))
     ux, uy, uz = velocity[0], velocity[1], velocity[2]
     for i in range(len(gone)):
         a = arrival[i]
@@ -63,8 +63,8 @@ def hear(
         start = t = gone[i] * speed * per_metre
         for _ in range(ROUNDS):
             t = start + elongation(length[i], a, ux * t - x, uy * t - y, uz * t - z) * per_metre
-        late[i] = t
-        seen[i, 0] = source[i, 0] + (x - ux * t)
-        seen[i, 1] = source[i, 1] + (y - uy * t)
-        seen[i, 2] = source[i, 2] + (z - uz * t)
-    return late, seen
+        x, y, z = length[i] * a[0] + (ux * t - x), length[i] * a[1] + (uy * t - y), length[i] * a[2] + (uz * t - z)
+        late[i], far[i] = t, math.sqrt(x * x + y * y + z * z)
+        one = 1.0 / far[i]
+        towards[i, 0], towards[i, 1], towards[i, 2] = x * one, y * one, z * one
+    return late, towards, far

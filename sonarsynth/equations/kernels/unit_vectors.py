@@ -12,17 +12,18 @@ from sonarsynth.conventions import Bools, Floats, Ints
 
 @compiled
 def straight_rays(
-    level: Floats, climb: Floats, mean: Floats, odd: Ints
+    away: Floats, climb: Floats, mean: Floats, odd: Ints
 ) -> tuple[Ints, Floats, Floats, Floats, Floats, Floats, Floats]:
-    """Ways so far over ground (pair, xy) m and up (family, pair) m at a mean slowness (family, pair) s/m, sorted by
-    pair, then by travel time: family, travel times, lengths, unit vectors along them (ray, xyz) where they begin, NaN
-    of none, and where they end, there upside down of odd (family,) ones, one over the lengths, and grazing angles."""
+    """Ways as far over ground as `away` (pair, xyz) m and up (family, pair) m at a mean slowness (family, pair) s/m,
+    sorted by pair, then by travel time: family, travel times, lengths, unit vectors along them (ray, xyz) where they
+    begin, NaN of none, and where they end, there upside down of odd (family,) ones, one over the lengths, and grazing
+    angles."""
     families, count = climb.shape
     family, first = np.empty(families * count, np.int64), 0
     time, length, inverse, grazing = np.empty((4, families * count))
     departure, arrival = np.empty((2, families * count, 3))
     for i in range(count):
-        x, y = level[i, 0], level[i, 1]
+        x, y = away[i, 0], away[i, 1]
         for n in range(families):
             far = math.sqrt(x * x + y * y + climb[n, i] * climb[n, i])
             late, k = far * mean[n, i], first + n
@@ -31,11 +32,11 @@ def straight_rays(
                 k -= 1
             time[k], length[k], family[k] = late, far, n
         for k in range(first, first + families):
-            far, z = length[k], climb[family[k], i]
-            inverse[k] = 1.0 / far
-            departure[k, 0], departure[k, 1], departure[k, 2] = x / far, y / far, z / far
-            arrival[k, 0], arrival[k, 1], arrival[k, 2] = x / far, y / far, -z / far if odd[family[k]] else z / far
-            grazing[k] = math.asin(abs(z) / far) if family[k] > 0 else math.nan
+            one, z = 1.0 / length[k], climb[family[k], i]
+            inverse[k] = one
+            departure[k, 0], departure[k, 1], departure[k, 2] = x * one, y * one, z * one
+            arrival[k, 0], arrival[k, 1], arrival[k, 2] = x * one, y * one, -z * one if odd[family[k]] else z * one
+            grazing[k] = math.asin(abs(z) / length[k]) if family[k] > 0 else math.nan
         first += families
     return family, time, length, departure, arrival, inverse, grazing
 
@@ -66,40 +67,40 @@ def to_images(length: Floats, departure: Floats, mirrored: Bools, offset: Floats
             x = length[i] * departure[i, 0] + offset[j, 0]
             y = length[i] * departure[i, 1] + offset[j, 1]
             z = length[i] * departure[i, 2] + up
-            far = math.sqrt(x * x + y * y + z * z)
-            out[i, j, 0], out[i, j, 1], out[i, j, 2] = x / far, y / far, z / far
+            one = 1.0 / math.sqrt(x * x + y * y + z * z)
+            out[i, j, 0], out[i, j, 1], out[i, j, 2] = x * one, y * one, z * one
     return out
 
 
 @compiled(forceinline=True)
-def _put_turned(x: float, y: float, z: float, turn: Floats, rotation: Floats, out: Floats) -> None:
-    """Put in out (axis,) the unit vector along x, y, z, turned back by small angles (xyz,) rad, in axes with this
-    rotation (xyz, axis)."""
-    tx, ty, tz = turn[0], turn[1], turn[2]
+def _put_turned(x: float, y: float, z: float, late: float, spin: Floats, rotation: Floats, out: Floats) -> None:
+    """Put in out (axis,) the unit vector along x, y, z, turned back by small angles late spin (xyz,) rad, in axes with
+    this rotation (xyz, axis)."""
+    tx, ty, tz = late * spin[0], late * spin[1], late * spin[2]
     x, y, z = x - (ty * z - tz * y), y - (tz * x - tx * z), z - (tx * y - ty * x)
-    far = math.sqrt(x * x + y * y + z * z)
-    x, y, z = x / far, y / far, z / far
+    one = 1.0 / math.sqrt(x * x + y * y + z * z)
     for n in range(3):
-        out[n] = rotation[0, n] * x + rotation[1, n] * y + rotation[2, n] * z
+        out[n] = one * (rotation[0, n] * x + rotation[1, n] * y + rotation[2, n] * z)
 
 
 @compiled
-def moved(length: Floats, away: Floats, apart: Floats, turn: Floats, rotation: Floats) -> Floats:
+def moved(length: Floats, away: Floats, apart: Floats, late: Floats, spin: Floats, rotation: Floats) -> Floats:
     """Unit vectors (leg, place, xyz) of length (leg,) times away (leg, place, xyz) plus apart (leg, xyz), turned back
-    by small angles (leg, xyz) rad, in axes with this rotation (xyz, axis)."""
+    by what a spin (leg, xyz) rad/s turns in late (leg,) s, in axes with this rotation (xyz, axis)."""
     out = np.empty(away.shape)
     for i in range(away.shape[0]):
         for j in range(away.shape[1]):
             x = length[i] * away[i, j, 0] + apart[i, 0]
             y = length[i] * away[i, j, 1] + apart[i, 1]
             z = length[i] * away[i, j, 2] + apart[i, 2]
-            _put_turned(x, y, z, turn[i], rotation, out[i, j])
+            _put_turned(x, y, z, late[i], spin[i], rotation, out[i, j])
     return out
 
 
 @compiled
 def to_moved_images(
-    length: Floats, departure: Floats, mirrored: Bools, offset: Floats, apart: Floats, turn: Floats, rotation: Floats
+    length: Floats, departure: Floats, mirrored: Bools, offset: Floats, apart: Floats, late: Floats, spin: Floats,
+    rotation: Floats,
 ) -> Floats:  # fmt: skip
     """As `to_images`, of places that are farther by apart (leg, xyz), turned back and in axes as of `moved`."""
     out = np.empty((len(length), len(offset), 3))
@@ -109,5 +110,5 @@ def to_moved_images(
             x = length[i] * departure[i, 0] + offset[j, 0] + apart[i, 0]
             y = length[i] * departure[i, 1] + offset[j, 1] + apart[i, 1]
             z = length[i] * departure[i, 2] + up + apart[i, 2]
-            _put_turned(x, y, z, turn[i], rotation, out[i, j])
+            _put_turned(x, y, z, late[i], spin[i], rotation, out[i, j])
     return out

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
 
@@ -14,7 +16,7 @@ def _above(z: float, value: Floats, integral: Floats, step: float) -> float:
     """Integral of a value over depth from the surface to z (m), in water mirrored at surface and bottom; up to each of
     the even nodes it is `integral`, and the value is linear between them."""
     bottom = step * (len(value) - 1)
-    layer = z // bottom
+    layer = math.floor(z / bottom)
     down = layer % 2 == 0
     inside = z - bottom * layer if down else bottom * (layer + 1) - z
     cell = min(max(int(inside / step), 0), len(value) - 2)

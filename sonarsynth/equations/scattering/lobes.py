@@ -38,9 +38,12 @@ def slope_lobe(incident: Floats, scattered: Floats, normal: Floats, slope: float
     from sonarsynth.equations.scattering import lobes_kernels
 
     (a, b, n), shape = _rows(incident, scattered, normal)
-    out = np.empty(a.shape[:2])
-    lobes_kernels.slope_lobes(a, b, n, slope, out)
-    return out.reshape(shape)
+    square = np.empty(a.shape[:2])
+    lobes_kernels.tilts(a, b, n, square)
+    lobe = np.exp(square * (-0.5 / slope**2))
+    lobe *= np.square(square + 1.0, out=square)
+    lobe /= 8.0 * np.pi * slope**2
+    return lobe.reshape(shape)
 
 
 def lobe_amplitude(
@@ -65,7 +68,7 @@ def lobe_amplitude(
     (a, b, n), shape = _rows(incident, scattered, np.broadcast_to(normal, (*vector_shape[:-1], 3)))
     size = np.broadcast_to(area, shape).reshape(a.shape[:2])
     out = np.empty(a.shape[:2])
-    lobes_kernels.amplitudes(a, b, n, size, slope, share, albedo, beyond, out)
+    lobes_kernels.amplitudes(a, b, n, size, slope_lobe(a, b, n, slope), share, albedo / np.pi, beyond, out)
     return out.reshape(shape)
 
 
@@ -74,7 +77,8 @@ def _rows(*vectors: Floats) -> tuple[list[Floats], tuple[int, ...]]:
     full = np.broadcast_shapes(*(np.shape(v) for v in vectors))
     columns = full[-2] if len(full) > 2 else 1
     rows = int(np.prod(full[:-1])) // max(columns, 1)
-    return [np.broadcast_to(v, full).reshape(rows, columns, 3) for v in vectors], full[:-1]
+    wide = (v if v.shape == full else np.broadcast_to(v, full) for v in vectors)
+    return [v.reshape(rows, columns, 3) for v in wide], full[:-1]
 
 
 def lambert(incident: Floats, scattered: Floats, normal: Floats, albedo: float) -> Floats:

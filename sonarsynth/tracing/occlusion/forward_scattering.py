@@ -59,6 +59,6 @@ def forward_paths(array: FacetPaths) -> FacetPaths | None:
     legs = view.visible(legs, Starts(every.clear[legs.row]))
     legs = view.settled(legs, Starts(every.clear[legs.row]))
     reached, row = np.unique(legs.row, return_inverse=True)
-    legs, facets = legs.numbered(row), every.select(reached)
+    legs, facets = legs.but(row=row), every.select(reached)
     over = expansion_source(legs, facets.owner[legs.row], array.bending, receiver, propagation)
     return replace(array, legs=legs, wavefronts=over, facets=facets)

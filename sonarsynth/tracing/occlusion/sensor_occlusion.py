@@ -74,7 +74,7 @@ class Occlusion:
         pending = np.where(mixed & ~in_sight & (verdict == UNKNOWN), DOUBTFUL, np.where(mixed, SEEN, 0))
         rows = np.flatnonzero(in_sight | (pending == DOUBTFUL))
         none = np.zeros((len(rows), 1 + self.elements.count // 8), np.uint8)
-        return legs.select(rows).seen(none, pending[rows])
+        return legs.select(rows).but(occluded=none, open=pending[rows])
 
     def settled(self, legs: ReceivePaths, starts: Starts) -> ReceivePaths:
         """The same legs, none of them open: those that are, looked at from each hydrophone, and left out where none
@@ -89,7 +89,7 @@ class Occlusion:
         for block in self._parts(legs, rows, len(self._points)):
             dark = self._dark(legs, starts, block)
             occluded[block], in_sight[block] = np.packbits(dark, axis=1), ~dark.all(axis=1)
-        return legs.seen(occluded, np.zeros_like(legs.open)).select(picked(in_sight))
+        return legs.but(occluded=occluded, open=np.zeros_like(legs.open)).select(picked(in_sight))
 
     @property
     def _points(self) -> Floats:
