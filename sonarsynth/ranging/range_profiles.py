@@ -184,7 +184,7 @@ def echo_filter(received: ReceivedWindow) -> EchoFilter:
     wave = wave[np.rint(f * samples / window.sampling_frequency).astype(int)]
     taper, matched = matched_filter(f, wave, spacing, sonar.band)
     share = np.abs(wave * matched) + np.finfo(float).tiny
-    parts = PARTS // max(round(spacing * samples / window.sampling_frequency), 1)
+    parts = 2 * PARTS // max(round(spacing * samples / window.sampling_frequency), 1)
     length = parts * next_fast_len(-(-OVERSAMPLING // 2 * len(f) // parts))
     count = min(int(window.duration / (0.5 / (length * spacing))) + 1, 2 * length)
     unity = float((share.sum() * window.sampling_frequency / length) ** 2)  # beams are in Pa, the pulse in Pa s

@@ -16,6 +16,7 @@ from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.arrays.noise_peaks import expected_peaks, peak_level
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.planning import plan
 from sonarsynth.ranging import Peaks, SensorDelays
 from sonarsynth.ranging.location.triggered import Triggered
@@ -106,6 +107,33 @@ def test_a_slope_at_the_rim_of_the_beams_looked_at_is_no_peak():
         some = points(targets, strengths=(1.0, 0.5), picking=Peaks(threshold=threshold))
         far = np.linalg.norm(some.position[:, None] - all_of_them.position, axis=2).min(axis=1)
         assert 1 <= len(some) <= 2 and (far < 1e-3).all()
+
+
+@pytest.mark.parametrize(("before", "after"), [(2e-3, 6e-3), (1.4e-3, 6e-3), (6e-3, 1.4e-3)])
+def test_points_of_the_part_of_a_window_that_has_sound_are_those_of_the_whole(before, after):
+    """Wherever in the window that is; a click that no beam hears of, at one end, makes all of the window count."""
+    targets = spherical(20.0, 0.05, 0.02), spherical(20.2, 0.09, -0.03), spherical(20.5, -0.11, 0.08)
+    signals, first, last, known = heard(targets, (1.0, 0.5, 0.3))
+    quiet = np.zeros((ARRAY.count, 1200), np.float32)
+    count = 1e-4 * np.abs(signals.pressure).max()
+    rounded = np.hstack([quiet, np.round(signals.pressure / count) * count, quiet]).astype(np.float32)
+    click = rounded.copy()
+    start = signals.start - quiet.shape[1] / signals.sampling_frequency
+    sample = round((first - before + 2e-4 - start) * signals.sampling_frequency)
+    click[0, sample - 30 : sample] += np.float32(2e-6 * np.abs(rounded).max())
+    silent, sounding = (replace(signals, pressure=p, start=start) for p in (rounded, click))
+    window, clouds = (first - before, last + after), []
+    few, many = (snapshots_of(x, sonar(), *window).without_silence(5e-4).frequency for x in (silent, sounding))
+    assert len(few) <= 0.5 * len(many) + 1
+    for received in (silent, sounding):
+        image = FocusedDelayAndSum().image(received, ARRAY, sonar(), *window)
+        clouds.append(cloud_of(received, image, known, ARRAY, sonar(), POSE, WATER, direct=silent))
+    part, whole = clouds
+    assert len(part) == len(whole) >= 3
+    for name in ("range", "azimuth", "elevation"):
+        off = getattr(part, name) - getattr(whole, name)
+        assert np.all(np.abs(off) < 0.02 * getattr(whole, f"{name}_error")), name
+    np.testing.assert_allclose(part.energy, whole.energy, rtol=2e-3)
 
 
 def test_two_echoes_in_one_direction_are_two_points_and_closer_than_the_pulse_one():
