@@ -200,16 +200,16 @@ def _tangents(elevation: float, azimuth: float) -> Floats:
 
 
 def noise_power(profiles: Profiles, image: EnergyImage, *, silent: bool = False) -> Floats:
-    """Mean power (beam,) of noise: the median over delays over ln 2, its mean over the beams within `NOISE_WIDTHS`.
-    What single precision rounds off at least; and that where more than half of a window, which is left out, is silent.
+    """Mean power (beam,) of noise: the median over delays over ln 2, its mean over the beams within `NOISE_WIDTHS`; of
+    a window of which half or more is silent, and left out, what single precision rounds off.
 
     An ordered statistic, so that echoes, which are short, count little; of many beams, since a peak is far out in the
     tail: a level 5 % off at 13 times the mean is twice the false alarms. Source: Rohling (1983), IEEE Transactions on
     Aerospace and Electronic Systems 19, 608.
     """
-    rounding = max(np.finfo(np.float32).eps ** 2 * float(profiles.power.max()), float(np.finfo(np.float32).tiny))
+    least = np.finfo(np.float32)
     if silent:
-        return np.full(len(profiles.power), rounding)
+        return np.full(len(profiles.power), least.eps**2 * float(profiles.power.max()) + least.tiny)
     end = min(int(pulse_times.PULSE_HALF / profiles.step), profiles.power.shape[1] // 4)
     powers = profiles.power[:, end : profiles.power.shape[1] - end : OVERSAMPLING]
     half = powers.shape[1] // 2  # bits are in the order of powers, and parted twice as fast
@@ -220,7 +220,7 @@ def noise_power(profiles: Profiles, image: EnergyImage, *, silent: bool = False)
     level[place], filled[place] = median / np.log(2.0), 1.0
     cells = [2 * int(NOISE_WIDTHS * 2 * profiles.width / step) + 1 if step else 1 for step in _steps(image)]
     around, of = (uniform_filter(x, cells, mode="constant")[place] for x in (level, filled))
-    return np.asarray(np.maximum(around / of, rounding))
+    return np.asarray(np.maximum(around / of, least.tiny))
 
 
 def _steps(image: EnergyImage) -> tuple[float, float]:
