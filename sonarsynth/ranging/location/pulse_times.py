@@ -249,7 +249,7 @@ def measure(
     left, noise = float(unexplained.sum()), 2.0 * float(across.sum())
     power = left + float(wave.power @ np.abs(wave.template) ** 2)
     share = min(left, noise) / power if power > 0 else 1.0
-    free = max((np.count_nonzero(elements.gain) - 1) * len(omega), 1)
+    free = max((int(np.count_nonzero(elements.gain)) - 1) * len(omega), 1)
     many = noise / free, left / free
     return Pulse(aligned.frequency, wave.template, time, lag, weight, *many, wave.power, share, None, deaf)
 

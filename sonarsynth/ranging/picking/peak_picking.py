@@ -41,8 +41,8 @@ NOISE_WIDTHS = 3.0
 """Beam widths on either side of a beam whose noise is taken for its own."""
 NOISE_ADDED = 2.0
 """Amplitude of noise, in units of its root mean square, that may be in a peak."""
-LOBE_BINS, LOBE_STEPS, LOBE_ERROR = 48, 128, 4e-4
-"""Frequencies that lobes are summed over; steps a period at the highest that they are tabulated at; error of that."""
+LOBE_BINS, LOBE_STEPS = 48, 128
+"""Frequencies that lobes are summed over; steps a period at the highest that they are tabulated at: to 4e-4."""
 RESOLVED = 1.0
 """An axis of the grid as long as this, in units of the roughness of noise along it, has peaks along it."""
 CENTRE_WINDOW = 1.4
@@ -263,25 +263,22 @@ def _over(
 ) -> Bools:
     """Whether `least` (peak,) is more than what lobes bring of louder peaks from directions (peak, xyz), at delays
     (peak,) in s, of heights (peak,)."""
-    loud = np.argsort(-height, kind="stable")
-    c, own = window.sonar.assumed_sound_speed, np.empty(len(height), bool)
-    position, weight, f, taper, table = _lobes(window.elements, window.sonar)
-    near, rate = 2.0 * width / c, LOBE_STEPS * window.sonar.band.high
+    loud, sonar, own = np.argsort(-height, kind="stable"), window.sonar, np.empty(len(height), bool)
+    c, rate, lasting = sonar.assumed_sound_speed, LOBE_STEPS * sonar.band.high, 2.0 / (sonar.band.high - sonar.band.low)
+    position, weight, table = _lobes(window.elements, sonar)
     peaks = direction[loud] / c, delay[loud], height[loud]
-    own[loud] = over_lobes(*peaks, position, weight, f, taper, near, least[loud] / LOBES, table, rate, LOBE_ERROR)
+    own[loud] = over_lobes(*peaks, position, weight, 2.0 * width / c, lasting, least[loud] / LOBES, table, rate)
     return own
 
 
 @lru_cache(maxsize=8)
-def _lobes(elements: Elements, sonar: Sonar) -> tuple[Floats, ...]:
-    """What `over_lobes` takes of an array: positions (sensor, xyz) and weights (sensor,) of live sensors; frequencies
-    (bin,), their taper, and the table of what they sum to."""
+def _lobes(elements: Elements, sonar: Sonar) -> tuple[Floats, Floats, Floats]:
+    """What `over_lobes` takes of an array: positions (sensor, xyz) and weights (sensor,) of live sensors, the table."""
     band, live, rate = sonar.band, np.flatnonzero(elements.gain), LOBE_STEPS * sonar.band.high
-    position, f = elements.position[live], np.linspace(band.low, band.high, LOBE_BINS)
+    position = elements.position[live]
     longest = 4.0 * farthest(position) / sonar.assumed_sound_speed + 2.0 / (band.high - band.low)
-    taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
     table = _lobe_table(band.low, band.high, rate, int(np.ceil(longest * rate)) + 2)
-    return position, live_gain(elements.gain)[live], f, taper, table
+    return position, live_gain(elements.gain)[live], table
 
 
 def _lobe_table(low: float, high: float, rate: float, steps: int) -> Floats:
