@@ -11,7 +11,9 @@ import numpy.typing as npt
 from sonarsynth.conventions import Floats
 
 PARTS = 12
-"""Of a window, to one of which, or to as many as divide them, it is cut where the rest is silent."""
+"""Parts of a window: it is cut to one of them, or to so many as divide them, where the rest is silent."""
+FEWEST = 64
+"""Bins that are left then, at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +51,14 @@ class Snapshots:
         """Every k-th bin, which are all that a k-th of the window has: of that which has the sound and `margin` (s)
         before and after it, to the beginning of which phases then refer. As it is where no k over 1 is possible.
 
-        Silent is what single precision leaves of the loudest. Windows are halved, or cut into `PARTS` of k, and begin
-        at a quarter of a `PARTS`-th: so their delays are among those of the whole.
+        Silent is what single precision leaves of the loudest. `PARTS` is a multiple of k, and what is left begins at a
+        quarter of such a part: so its delays are among those of the whole.
         """
         heard = np.flatnonzero(self.sample_power > np.finfo(np.float32).eps ** 2 * self.sample_power.max(initial=0.0))
         around, whole = margin * self.sampling_frequency, self.sampling_frequency / self.spacing
         first, stop = (heard[0] - around, heard[-1] + 1 + around) if len(heard) else (0.0, whole)
-        for k in (k for k in range(PARTS, 1, -1) if PARTS % k == 0 and first >= 0.0 and stop <= self.samples):
+        most = min(PARTS, len(self.frequency) // FEWEST) if first >= 0.0 and stop <= self.samples else 1
+        for k in (k for k in range(most, 1, -1) if PARTS % k == 0):
             begin = int(4 * PARTS * min(first, self.samples - whole / k) / whole) / (4 * PARTS * self.spacing)
             if begin >= 0.0 and (begin + 1.0 / (k * self.spacing)) * self.sampling_frequency >= stop:
                 every = slice(-round(self.frequency[0] / self.spacing) % k, None, k)
