@@ -38,10 +38,10 @@ class Steering(Method):
 
     def beams(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> BeamSpectra:
         """Beams of a window of the signals, computed when their energies or spectra are asked for."""
-        steered = self.steered(snapshots, elements, sonar)
+        steered, image = self.steered(snapshots, elements, sonar), partial(self._image, snapshots, elements, sonar)
         if type(self).steered is not Steering.steered:
-            steered = partial(self._checked_spectra, steered, len(snapshots.frequency))
-        return BeamSpectra(snapshots, partial(self._image, snapshots, elements, sonar), steered)
+            return BeamSpectra(snapshots, image, partial(self._checked_spectra, steered, len(snapshots.frequency)))
+        return BeamSpectra(snapshots, image, steered, partial(self.beams, elements=elements, sonar=sonar))
 
     def _checked_spectra(
         self, steered: Callable[[Floats], npt.NDArray[np.complex64]], bins: int, direction: Floats

@@ -10,6 +10,11 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
 
+PARTS = 12
+"""Parts of a window: it is cut to one of them, or to so many as divide them, where the rest is silent."""
+FEWEST = 64
+"""Bins that are left then, at least."""
+
 
 @dataclass(frozen=True, eq=False)
 class Snapshots:
@@ -42,6 +47,29 @@ class Snapshots:
         unknown = np.ones_like(self.sample_power)
         return replace(self, frequency=self.frequency[bins], spectra=self.spectra[:, bins], sample_power=unknown)
 
+    def without_silence(self, margin: float) -> Snapshots:
+        """Every k-th bin, which are all that a k-th of the window has: of that which has the sound and `margin` (s)
+        before and after it, to the beginning of which phases then refer. As it is where no k over 1 is possible.
+
+        Silent is what single precision leaves of the loudest. `PARTS` is a multiple of k, and what is left begins at a
+        quarter of such a part: so its delays are among those of the whole.
+        """
+        heard = np.flatnonzero(self.sample_power > np.finfo(np.float32).eps ** 2 * self.sample_power.max(initial=0.0))
+        around, whole = margin * self.sampling_frequency, self.sampling_frequency / self.spacing
+        first, stop = (heard[0] - around, heard[-1] + 1 + around) if len(heard) else (0.0, whole)
+        most = min(PARTS, len(self.frequency) // FEWEST) if first >= 0.0 and stop <= self.samples else 1
+        for k in (k for k in range(most, 1, -1) if PARTS % k == 0):
+            begin = int(4 * PARTS * min(first, self.samples - whole / k) / whole) / (4 * PARTS * self.spacing)
+            if begin >= 0.0 and (begin + 1.0 / (k * self.spacing)) * self.sampling_frequency >= stop:
+                every = slice(-round(self.frequency[0] / self.spacing) % k, None, k)
+                frequency, unknown = self.frequency[every], np.ones_like(self.sample_power)
+                spectra = self.spectra[:, every] * np.exp(2j * np.pi * frequency * begin).astype(np.complex64)
+                return replace(
+                    self, frequency=frequency, spacing=k * self.spacing, spectra=spectra, start=self.start + begin,
+                    sample_power=unknown,
+                )  # fmt: skip
+        return self
+
 
 @dataclass(frozen=True, eq=False)
 class BeamSpectra:
@@ -53,3 +81,11 @@ class BeamSpectra:
     spectra: Callable[[Floats], npt.NDArray[np.complex64]]
     """Spectra (beam, bin) in Pa of beams in directions (beam, xyz), sonar frame, of which echoes are picked: a plane
     wave from there gives its own. The array is new each time, and its user's to change."""
+    others: Callable[[Snapshots], BeamSpectra] | None = None
+    """The same of other snapshots of the window, where beams of a bin are made of that bin alone."""
+
+    def without_silence(self, margin: float) -> BeamSpectra:
+        """Beams of the part of the window that has sound, as `Snapshots.without_silence`; all, where that is not known
+        to have the same echoes."""
+        part = self.snapshots.without_silence(margin) if self.others else self.snapshots
+        return self.others(part) if self.others and part is not self.snapshots else self

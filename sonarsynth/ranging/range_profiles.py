@@ -18,6 +18,7 @@ from sonarsynth.equations.arrays.apertures import live_gain
 from sonarsynth.equations.arrays.gates import fast_length
 from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage, Signals, SourceEstimates
+from sonarsynth.products.steered_spectra import PARTS
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.plane_waves import PlaneWaveFit
@@ -178,13 +179,13 @@ def echo_filter(received: ReceivedWindow) -> EchoFilter:
     """
     window, sonar, elements = received.beams.snapshots, received.sonar, received.elements
     f, spacing = window.frequency, window.spacing
-    lowest = round(f[0] / spacing)
     samples = fast_length(window.samples)
     wave = direct_spectrum(received.direct, received.estimates, elements, sonar, samples, received.pulse)
-    wave = wave[lowest : lowest + len(f)]
+    wave = wave[np.rint(f * samples / window.sampling_frequency).astype(int)]
     taper, matched = matched_filter(f, wave, spacing, sonar.band)
     share = np.abs(wave * matched) + np.finfo(float).tiny
-    length = next_fast_len(OVERSAMPLING // 2 * len(f))
+    parts = 2 * PARTS // max(round(spacing * samples / window.sampling_frequency), 1)
+    length = parts * next_fast_len(-(-OVERSAMPLING // 2 * len(f) // parts))
     count = min(int(window.duration / (0.5 / (length * spacing))) + 1, 2 * length)
     unity = float((share.sum() * window.sampling_frequency / length) ** 2)  # beams are in Pa, the pulse in Pa s
     return EchoFilter(received, share / share.sum(), matched, taper, unity, length, count)

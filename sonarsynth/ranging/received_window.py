@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,3 +30,8 @@ class ReceivedWindow:
         """Whether there is a snap to range by."""
         estimates = self.estimates
         return bool(len(estimates.time) and np.isfinite(estimates.time[0]) and np.isfinite(estimates.position[0]).all())
+
+    def without_silence(self) -> ReceivedWindow:
+        """What is left where beams of a part of the window have all of its sound; itself where none do."""
+        beams = self.beams.without_silence(self.elements.aperture / self.sonar.assumed_sound_speed)
+        return self if beams is self.beams else replace(self, beams=beams)

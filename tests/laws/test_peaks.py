@@ -16,10 +16,12 @@ from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.arrays.noise_peaks import expected_peaks, peak_level
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.planning import plan
 from sonarsynth.ranging import Peaks, SensorDelays
 from sonarsynth.ranging.location.triggered import Triggered
-from sonarsynth.ranging.picking.peak_kernels import lobe_power, local_maxima
+from sonarsynth.ranging.picking.peak_kernels import local_maxima, over_lobes
+from sonarsynth.ranging.picking.peak_picking import LOBE_STEPS, _lobes
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.receiver.hydrophones import PositionTable
 from sonarsynth.state import Receiver, Survey
@@ -108,6 +110,33 @@ def test_a_slope_at_the_rim_of_the_beams_looked_at_is_no_peak():
         assert 1 <= len(some) <= 2 and (far < 1e-3).all()
 
 
+@pytest.mark.parametrize(("before", "after"), [(2e-3, 6e-3), (1.4e-3, 6e-3), (6e-3, 1.4e-3)])
+def test_points_of_the_part_of_a_window_that_has_sound_are_those_of_the_whole(before, after):
+    """Wherever in the window that is; a click that no beam hears of, at one end, makes all of the window count."""
+    targets = spherical(20.0, 0.05, 0.02), spherical(20.2, 0.09, -0.03), spherical(20.5, -0.11, 0.08)
+    signals, first, last, known = heard(targets, (1.0, 0.5, 0.3))
+    quiet = np.zeros((ARRAY.count, 1200), np.float32)
+    count = 1e-4 * np.abs(signals.pressure).max()
+    rounded = np.hstack([quiet, np.round(signals.pressure / count) * count, quiet]).astype(np.float32)
+    click = rounded.copy()
+    start = signals.start - quiet.shape[1] / signals.sampling_frequency
+    sample = round((first - before + 2e-4 - start) * signals.sampling_frequency)
+    click[0, sample - 30 : sample] += np.float32(2e-6 * np.abs(rounded).max())
+    silent, sounding = (replace(signals, pressure=p, start=start) for p in (rounded, click))
+    window, clouds = (first - before, last + after), []
+    few, many = (snapshots_of(x, sonar(), *window).without_silence(5e-4).frequency for x in (silent, sounding))
+    assert len(few) <= 0.5 * len(many) + 1
+    for received in (silent, sounding):
+        image = FocusedDelayAndSum().image(received, ARRAY, sonar(), *window)
+        clouds.append(cloud_of(received, image, known, ARRAY, sonar(), POSE, WATER, direct=silent))
+    part, whole = clouds
+    assert len(part) == len(whole) >= 3
+    for name in ("range", "azimuth", "elevation"):
+        off = getattr(part, name) - getattr(whole, name)
+        assert np.all(np.abs(off) < 0.02 * getattr(whole, f"{name}_error")), name
+    np.testing.assert_allclose(part.energy, whole.energy, rtol=2e-3)
+
+
 def test_two_echoes_in_one_direction_are_two_points_and_closer_than_the_pulse_one():
     far = [spherical(r, 0.05, 0.02) for r in (20.0, 20.1)]
     cloud = points(tuple(far))
@@ -192,21 +221,23 @@ def test_local_maxima_are_those_of_a_filter():
     assert {(int(row[i]), int(column[i]), int(s)) for i, s in zip(b, t, strict=True)} == set(map(tuple, expected))
 
 
-def test_what_lobes_bring_is_what_a_beam_hears_of_a_wave():
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_what_lobes_bring_is_what_a_beam_hears_of_a_wave(share):
     """Against beams of a wave with that spectrum, made sensor by sensor, at the grating lobe and elsewhere."""
-    array = elements(PlanarLattice(columns=12, rows=8, pitch=0.05, face=0.0))
+    array, instrument = elements(PlanarLattice(columns=12, rows=8, pitch=0.05, face=0.0)), sonar()
     f, taper = np.linspace(25e3, 85e3, 48), np.sin(np.pi * (np.arange(48) + 0.5) / 48) ** 2
     u = direction(np.array([0.1, -0.38, 0.3]), np.array([0.0, 0.02, 0.1]))
     delay, power = np.array([0.0, 2e-5, -1e-5]), np.array([3.0, 2.0, 1.0])
-    weight = np.full(96, 1.0 / 96)
-    got = [lobe_power(i, u / C, delay, power, array.position, weight, f, taper, 1e-5) for i in range(3)]
-    expected = np.zeros(3)
+    position, weight, table = _lobes(array, instrument)
+    brought = np.zeros(3)
     for i in range(3):
         for j in range(i):
             wave = taper * np.exp(2j * np.pi * f * (array.position @ (u[i] - u[j]) / C + delay[i] - delay[j])[:, None])
-            expected[i] += power[j] * abs(weight @ wave.sum(axis=1) / taper.sum()) ** 2
-    np.testing.assert_allclose(got, expected, rtol=1e-9)
-    assert got[0] == 0.0 and got[1] > 1e-4
+            brought[i] += power[j] * abs(weight @ wave.sum(axis=1) / taper.sum()) ** 2
+    assert brought[1] > 1e-4
+    least, rate = share * brought + [1e-12, 0.0, 0.0], LOBE_STEPS * instrument.band.high
+    own = over_lobes(u / C, delay, power, position, weight, 1e-5, 2.0 / 60e3, least, table, rate)
+    assert own.tolist() == [True, share > 1.0, share > 1.0]
 
 
 def test_a_grating_lobe_is_no_echo_and_an_echo_there_is():

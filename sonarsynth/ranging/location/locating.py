@@ -192,16 +192,16 @@ def fit_pulse(
     if first is None:
         return UNFIT
     c, q, rest, aligned, longer, (wave, off) = sonar.assumed_sound_speed, elements.position, elements, None, 1.0, first
+    expected = _times(wave, q, c)
     for _ in range(ROUNDS):
         if velocity.any():
-            q = rest.position + (_times(wave, q, c) - wave.time)[:, None] * velocity
-            elements = replace(rest, position=q)
-        expected = _times(wave, q, c)
+            q = rest.position + (expected - wave.time)[:, None] * velocity
+            elements, expected = replace(rest, position=q), _times(wave, q, c)
         aside = ASIDE * longer * pulse_times.half_length(sonar.band)
-        if aligned is None or np.abs(expected - aligned.time).max() > aside:
+        if anew := aligned is None or np.abs(expected - aligned.time).max() > aside:
             aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=longer)
         pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
-        if pulse.lasts and not (pulse.share > LOST and pulse.noise > AUDIBLE * longer * quiet):
+        if anew and pulse.lasts and not (pulse.share > LOST and pulse.noise > AUDIBLE * longer * quiet):
             whole = _whole(signals, elements, sonar, wave)
             if whole is None:
                 return BAND
@@ -209,8 +209,8 @@ def fit_pulse(
         better = spherical_wave(expected + pulse.lag, q, c, pulse.weight, wave.direction, wave.curvature)
         if better is None:
             return UNFIT
-        wave, last = better, wave
-        if _settled(wave, last, q, c):
+        wave, last, expected = better, expected, _times(better, q, c)
+        if np.abs(expected - last).max() < pulse_times.FLOOR:  # lags err by more without noise; the next by far less
             break
     rms = np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum())
     if not rms < MAX_LAG / sonar.band.centre:
@@ -239,7 +239,8 @@ def _first_wave(
         loud = height**2 * live  # who hears more counts more
         wave = robust_wave(start + delay, q, c, loud, steps=FIRST_STEPS, rounds=ROBUST_ROUNDS, settled=settled)
         if wave is not None:
-            off = 1.4826 * float(np.median(np.abs(wave.residual[live]))) * float(np.sqrt(4.0 / np.count_nonzero(live)))
+            late = np.sort(np.abs(wave.residual[live]))
+            off = 1.4826 * float(late[len(late) // 2]) * (4.0 / len(late)) ** 0.5
             if len(q) == elements.count or off < 0.01 / sonar.band.centre:
                 break
     else:
@@ -278,12 +279,6 @@ def _whole(
 def _times(wave: Wavefront, position: Floats, sound_speed: float) -> Floats:
     """When (sensor,) s a wave passes sensors."""
     return wave.time + wavefront_delays(position, wave.direction, wave.curvature, sound_speed)
-
-
-def _settled(wave: Wavefront, last: Wavefront, position: Floats, sound_speed: float) -> bool:
-    """Whether a fit moved a wave by less, at every sensor, than lags err by without noise; the next by far less."""
-    moved = _times(wave, position, sound_speed) - _times(last, position, sound_speed)
-    return float(np.abs(moved).max()) < pulse_times.FLOOR
 
 
 def _refit(

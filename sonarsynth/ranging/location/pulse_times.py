@@ -245,13 +245,13 @@ def measure(
     omega = 2 * np.pi * aligned.frequency
     slope, weight, unexplained, across = ranging_kernels.lag_sums(wave.spectrum, wave.response, wave.template, omega)
     lag = slope / np.where(weight > 0, weight, np.inf)
-    live = elements.gain != 0
     # gains and responses that are not the model's are in phase, and no noise; half of noise, or of another wave, is not
-    left, noise = float(np.sum(unexplained[live])), 2.0 * float(np.sum(across[live]))
+    left, noise = float(unexplained.sum()), 2.0 * float(across.sum())
     power = left + float(wave.power @ np.abs(wave.template) ** 2)
     share = min(left, noise) / power if power > 0 else 1.0
-    mean, rest = (float(value / max((np.sum(live) - 1) * len(omega), 1)) for value in (noise, left))
-    return Pulse(aligned.frequency, wave.template, time, lag, weight, mean, rest, wave.power, share, None, deaf)
+    free = max((int(np.count_nonzero(elements.gain)) - 1) * len(omega), 1)
+    many = noise / free, left / free
+    return Pulse(aligned.frequency, wave.template, time, lag, weight, *many, wave.power, share, None, deaf)
 
 
 def lag_variance(wave: Wavefront, pulse: Pulse, elements: Elements, rounding: float, half: float = PULSE_HALF) -> float:

@@ -82,43 +82,6 @@ def beside(power: Any, index: Any, row: Any, column: Any, b: Any, t: Any) -> Any
 
 
 @compiled
-def lobe_power(
-    i: int, direction: Any, delay: Any, power: Any, position: Any, weight: Any, frequency: Any, taper: Any, near: Any
-) -> Any:
-    """Power that louder peaks bring to peak i by the side lobes and grating lobes of the array.
-
-    direction (peak, xyz) over the speed of sound, s/m; delay (peak,) s; power (peak,), descending; position (sensor,
-    xyz) m; weight (sensor,) of sum one; frequency (bin,) evenly spaced, taper (bin,) of an echo's amplitude there;
-    near: two peaks within that (s/m) of each other are in one beam. A wave from v is heard by a beam to u at the delay
-    t as |sum_f T(f) sum_q w_q exp(i 2 pi f (x_q.(u - v) + t))|^2/(sum_f T)^2.
-    """
-    sensors, bins = len(weight), len(frequency)
-    reach = farthest(position)
-    spacing = frequency[1] - frequency[0]
-    lasting = 2.0 / (frequency[-1] - frequency[0])
-    taper_sum, brought = np.sum(taper), 0.0
-    for j in range(i):
-        apart = direction[i] - direction[j]
-        far = np.sqrt(np.sum(apart**2))
-        late = delay[i] - delay[j]
-        if far <= near or abs(late) > reach * far + lasting:
-            continue
-        response = np.zeros(bins, np.complex128)
-        for q in range(sensors):
-            x = position[q, 0] * apart[0] + position[q, 1] * apart[1] + position[q, 2] * apart[2] + late
-            phasor = weight[q] * np.exp(2j * np.pi * frequency[0] * x)
-            turn = np.exp(2j * np.pi * spacing * x)
-            for k in range(bins):
-                response[k] += phasor
-                phasor *= turn
-        total = 0j
-        for k in range(bins):
-            total += taper[k] * response[k]
-        brought += power[j] * (total.real**2 + total.imag**2) / taper_sum**2
-    return brought
-
-
-@compiled
 def farthest(position: Any) -> Any:
     """Largest distance (m) of positions (sensor, xyz) from the origin."""
     reach = 0.0
@@ -143,24 +106,23 @@ def _lobe(x: Any, y: Any, z: Any, at: Any, across: Any, weight: Any, real: Any, 
 
 @compiled
 def over_lobes(
-    direction: Any, delay: Any, power: Any, position: Any, weight: Any, frequency: Any, taper: Any, near: Any,
-    least: Any, table: Any, rate: float, error: float,
+    direction: Any, delay: Any, power: Any, position: Any, weight: Any, near: float, lasting: float, least: Any,
+    table: Any, rate: float,
 ) -> Any:  # fmt: skip
-    """Whether `least` (peak,) is more than what louder peaks bring: that of `lobe_power`, in a tenth of the time; true
-    where it is infinite.
+    """Whether `least` (peak,) is more than what louder peaks bring by the side lobes and grating lobes of the array.
 
-    table (2, delay): real and imaginary part of sum_f T(f) exp(i 2 pi f t)/sum_f T at delays in steps of 1/rate, the
-    middle at 0, linear in between to within `error`. That bounds what each louder peak may bring: what is left in doubt
-    is computed as by `lobe_power`.
+    direction (peak, xyz) over the speed of sound, s/m; delay (peak,) s; power (peak,), descending; position (sensor,
+    xyz) m; weight (sensor,) of sum one; near: two peaks within that (s/m) of each other are in one beam; lasting (s): a
+    pulse brings nothing so much earlier or later. A wave from v is heard by a beam to u at the delay t as
+    |sum_f T(f) sum_q w_q exp(i 2 pi f (x_q.(u - v) + t))|^2/(sum_f T)^2, of which table (2, delay) has real and
+    imaginary part of sum_f T(f) exp(i 2 pi f t)/sum_f T at delays in steps of 1/rate, the middle at 0, linear between.
     """
-    peaks = len(power)
-    own, reach = np.zeros(peaks, np.bool_), farthest(position)
-    lasting = 2.0 / (frequency[-1] - frequency[0])
+    own, reach = np.zeros(len(power), np.bool_), farthest(position)
     across, sensor_weight = np.ascontiguousarray(position.T).astype(np.float32), weight.astype(np.float32)
     real, imaginary = table[0].astype(np.float32), table[1].astype(np.float32)
     middle = 0.5 * (table.shape[1] - 1)
-    for i in range(peaks):
-        low = high = 0.0
+    for i in range(len(power)):
+        brought = 0.0
         for j in range(i if least[i] < np.inf else 0):
             x, y = direction[i, 0] - direction[j, 0], direction[i, 1] - direction[j, 1]
             z, late = direction[i, 2] - direction[j, 2], delay[i] - delay[j]
@@ -169,14 +131,10 @@ def over_lobes(
                 continue
             x, y, z = np.float32(x * rate), np.float32(y * rate), np.float32(z * rate)
             size = _lobe(x, y, z, np.float32(late * rate + middle), across, sensor_weight, real, imaginary)
-            low += power[j] * max(size - error, 0.0) ** 2
-            high += power[j] * (size + error) ** 2
-            if low >= least[i]:
+            brought += power[j] * size**2
+            if brought >= least[i]:
                 break
-        if low < least[i]:
-            own[i] = high < least[i] or least[i] > lobe_power(
-                i, direction, delay, power, position, weight, frequency, taper, near
-            )
+        own[i] = brought < least[i]
     return own
 
 

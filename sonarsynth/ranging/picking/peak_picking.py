@@ -41,8 +41,8 @@ NOISE_WIDTHS = 3.0
 """Beam widths on either side of a beam whose noise is taken for its own."""
 NOISE_ADDED = 2.0
 """Amplitude of noise, in units of its root mean square, that may be in a peak."""
-LOBE_BINS, LOBE_STEPS, LOBE_ERROR = 48, 128, 4e-4
-"""Frequencies that lobes are summed over; steps a period at the highest that they are tabulated at; error of that."""
+LOBE_BINS, LOBE_STEPS = 48, 128
+"""Frequencies that lobes are summed over; steps a period at the highest that they are tabulated at: to 4e-4."""
 RESOLVED = 1.0
 """An axis of the grid as long as this, in units of the roughness of noise along it, has peaks along it."""
 CENTRE_WINDOW = 1.4
@@ -68,9 +68,10 @@ def peak_echoes(
     beams, left_out = loudest_beams(image, wide)
     if not len(beams[0]):
         return no_echoes(image, left_out)
+    whole, window = window, window.without_silence()
     profiles = range_profiles(window, beams)
     axes = Axes.of(window, profiles)
-    noise = noise_power(profiles, image)
+    noise = noise_power(profiles, image, silent=window is not whole)
     least = noise * peak_level(false_alarms, axes.sizes(profiles))
     power, index = profiles.power, np.full(image.energy.shape, -1)
     index[beams] = np.arange(len(power))
@@ -198,13 +199,17 @@ def _tangents(elevation: float, azimuth: float) -> Floats:
     return np.array([[-se * ca, -se * sa, ce], [-ce * sa, ce * ca, 0.0]])
 
 
-def noise_power(profiles: Profiles, image: EnergyImage) -> Floats:
-    """Mean power (beam,) of noise: the median over delays over ln 2, its mean over the beams within `NOISE_WIDTHS`.
+def noise_power(profiles: Profiles, image: EnergyImage, *, silent: bool = False) -> Floats:
+    """Mean power (beam,) of noise: the median over delays over ln 2, its mean over the beams within `NOISE_WIDTHS`; of
+    a window of which half or more is silent, and left out, what single precision rounds off.
 
     An ordered statistic, so that echoes, which are short, count little; of many beams, since a peak is far out in the
     tail: a level 5 % off at 13 times the mean is twice the false alarms. Source: Rohling (1983), IEEE Transactions on
     Aerospace and Electronic Systems 19, 608.
     """
+    least = np.finfo(np.float32)
+    if silent:
+        return np.full(len(profiles.power), least.eps**2 * float(profiles.power.max()) + least.tiny)
     end = min(int(pulse_times.PULSE_HALF / profiles.step), profiles.power.shape[1] // 4)
     powers = profiles.power[:, end : profiles.power.shape[1] - end : OVERSAMPLING]
     half = powers.shape[1] // 2  # bits are in the order of powers, and parted twice as fast
@@ -215,7 +220,7 @@ def noise_power(profiles: Profiles, image: EnergyImage) -> Floats:
     level[place], filled[place] = median / np.log(2.0), 1.0
     cells = [2 * int(NOISE_WIDTHS * 2 * profiles.width / step) + 1 if step else 1 for step in _steps(image)]
     around, of = (uniform_filter(x, cells, mode="constant")[place] for x in (level, filled))
-    return np.asarray(np.maximum(around / of, np.finfo(np.float32).tiny))
+    return np.asarray(np.maximum(around / of, least.tiny))
 
 
 def _steps(image: EnergyImage) -> tuple[float, float]:
@@ -258,25 +263,22 @@ def _over(
 ) -> Bools:
     """Whether `least` (peak,) is more than what lobes bring of louder peaks from directions (peak, xyz), at delays
     (peak,) in s, of heights (peak,)."""
-    loud = np.argsort(-height, kind="stable")
-    c, own = window.sonar.assumed_sound_speed, np.empty(len(height), bool)
-    position, weight, f, taper, table = _lobes(window.elements, window.sonar)
-    near, rate = 2.0 * width / c, LOBE_STEPS * window.sonar.band.high
+    loud, sonar, own = np.argsort(-height, kind="stable"), window.sonar, np.empty(len(height), bool)
+    c, rate, lasting = sonar.assumed_sound_speed, LOBE_STEPS * sonar.band.high, 2.0 / (sonar.band.high - sonar.band.low)
+    position, weight, table = _lobes(window.elements, sonar)
     peaks = direction[loud] / c, delay[loud], height[loud]
-    own[loud] = over_lobes(*peaks, position, weight, f, taper, near, least[loud] / LOBES, table, rate, LOBE_ERROR)
+    own[loud] = over_lobes(*peaks, position, weight, 2.0 * width / c, lasting, least[loud] / LOBES, table, rate)
     return own
 
 
 @lru_cache(maxsize=8)
-def _lobes(elements: Elements, sonar: Sonar) -> tuple[Floats, ...]:
-    """What `over_lobes` takes of an array: positions (sensor, xyz) and weights (sensor,) of live sensors; frequencies
-    (bin,), their taper, and the table of what they sum to."""
+def _lobes(elements: Elements, sonar: Sonar) -> tuple[Floats, Floats, Floats]:
+    """What `over_lobes` takes of an array: positions (sensor, xyz) and weights (sensor,) of live sensors, the table."""
     band, live, rate = sonar.band, np.flatnonzero(elements.gain), LOBE_STEPS * sonar.band.high
-    position, f = elements.position[live], np.linspace(band.low, band.high, LOBE_BINS)
+    position = elements.position[live]
     longest = 4.0 * farthest(position) / sonar.assumed_sound_speed + 2.0 / (band.high - band.low)
-    taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
     table = _lobe_table(band.low, band.high, rate, int(np.ceil(longest * rate)) + 2)
-    return position, live_gain(elements.gain)[live], f, taper, table
+    return position, live_gain(elements.gain)[live], table
 
 
 def _lobe_table(low: float, high: float, rate: float, steps: int) -> Floats:
