@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from sonarsynth.equations.arrays.bistatic_range import bistatic_range, excess_path
+from sonarsynth.equations.arrays.bistatic_range import bistatic_range, excess_path, path_by_beam
 from sonarsynth.geometry import unit
 
 
@@ -86,6 +86,8 @@ def test_sensitivities_are_derivatives(seed):
     by_angle = slope(lambda e: bistatic_range(x, np.cos(e) * beam + np.sin(e) * away, source).range)
     assert np.allclose(found.by_path, by_path, rtol=1e-6)
     assert np.allclose(found.by_angle, by_angle, rtol=1e-5, atol=1e-6 * b.max())
+    turned = slope(lambda e: excess_path(np.cos(e) * beam + np.sin(e) * away, r, source))
+    assert np.allclose(np.sum(path_by_beam(beam, r, source) * away, axis=1), turned, rtol=1e-5, atol=1e-6 * b.max())
     for axis in np.eye(3):
         by_axis = slope(lambda e, axis=axis: bistatic_range(x, beam, source + e * b[:, None] * axis).range) / b
         assert np.allclose(found.by_source @ axis, by_axis, rtol=1e-5, atol=1e-5)

@@ -72,3 +72,10 @@ def excess_path(beam: npt.ArrayLike, range: npt.ArrayLike, source: npt.ArrayLike
     b = np.linalg.norm(position, axis=-1)
     to_source = np.linalg.norm(r[..., None] * u - position, axis=-1)
     return np.asarray(r * (1 + (r - 2 * np.sum(u * position, axis=-1)) / (to_source + b)))
+
+
+def path_by_beam(beam: Floats, range: Floats, source: Floats) -> Floats:
+    """Change (..., xyz) in m of the excess path as a unit vector `beam` (..., xyz) turns, at a constant range (...) m:
+    -r S/|S - r u|, of which what is along the beam is no turn. NaN where the range is."""
+    away = np.linalg.norm(range[..., None] * beam - source, axis=-1)
+    return np.asarray(-(range / away)[..., None] * source)

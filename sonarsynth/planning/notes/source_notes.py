@@ -154,7 +154,7 @@ def steering_notes(looks: Sequence[SampledScene]) -> list[str]:
 
 def direction_notes(looks: Sequence[SampledScene]) -> list[str]:
     """Along which axes of its beams an array tells no directions: those across which it has no extent."""
-    from sonarsynth.ranging.picking.peak_picking import RESOLVED  # it loads what plans need not
+    from sonarsynth.ranging.picking.peak_axes import RESOLVED  # it loads what plans need not
 
     lines = []
     for look in looks:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -17,12 +16,12 @@ from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond, possible_grating_lobes
+from sonarsynth.ranging.picking.peak_axes import Axes, grid_steps, later_beside
 from sonarsynth.ranging.picking.peak_kernels import beside, farthest, local_maxima, over_lobes, power_centres
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
 from sonarsynth.ranging.range_profiles import (
     OVERSAMPLING,
     Profiles,
-    aperture_moments,
     loudest_beams,
     over_threshold,
     range_profiles,
@@ -43,19 +42,10 @@ NOISE_ADDED = 2.0
 """Amplitude of noise, in units of its root mean square, that may be in a peak."""
 LOBE_BINS, LOBE_STEPS, LOBE_ERROR = 48, 128, 4e-4
 """Frequencies that lobes are summed over; steps a period at the highest that they are tabulated at; error of that."""
-RESOLVED = 1.0
-"""An axis of the grid as long as this, in units of the roughness of noise along it, has peaks along it."""
 CENTRE_WINDOW = 1.4
 """Standard deviation, in widths of a peak, of the window about it in which the centre of power is looked for."""
 NOISE_CLEAR = 4.0
 """Power below that, in units of the mean power of noise, does not count for the centre."""
-CENTRE_ERROR = np.array([1.3, 1.3, 0.4])
-"""Standard error of a peak along elevation, azimuth and delay over how far the centre of power about it is from it
-(fitted to random scenes, as `test_points_err_by_what_is_predicted` has them)."""
-SURFACE_ERROR = np.array([0.05, 0.05, 0.17])
-"""Standard error along these, in widths, of echoes of surfaces, not points (fitted to these)."""
-UNKNOWN = 0.5
-"""Standard error of a direction along an axis that is not resolved, in half widths of the beam."""
 
 
 def peak_echoes(
@@ -88,11 +78,14 @@ def peak_echoes(
     width, clear = axes.step * axes.sharpness, NOISE_CLEAR * noise
     centre[late] = power_centres(power, index, *beams, b[late], t[late], top_offset[late], width, CENTRE_WINDOW, clear)
     snr, offset = height / noise[b], top_offset * axes.step
-    error, error_product = axes.errors(snr, centre)
+    elevation = image.elevation[profiles.row[b]] + offset[:, 0]
+    azimuth = image.azimuth[profiles.column[b]] + offset[:, 1]
+    delay = profiles.first + t * profiles.step + offset[:, 2]
+    error, error_product = axes.errors(snr, centre, later_beside(window, elevation, azimuth, delay))
     return PickedEchoes(
-        elevation=image.elevation[profiles.row[b]] + offset[:, 0],
-        azimuth=image.azimuth[profiles.column[b]] + offset[:, 1],
-        delay=profiles.first + t * profiles.step + offset[:, 2],
+        elevation=elevation,
+        azimuth=azimuth,
+        delay=delay,
         elevation_error=error[:, 0],
         azimuth_error=error[:, 1],
         delay_error=error[:, 2],
@@ -140,64 +133,6 @@ def _cut(power: npt.NDArray[np.float32], b: Ints, t: Ints, end: int) -> Bools:
     return np.asarray(early | (last - t < 2 * end) & (power[b, -end:].max(axis=1) > own))
 
 
-@dataclass(frozen=True, eq=False)
-class Axes:
-    """The axes of the volume, elevation (rad), azimuth (rad) and delay (s): how an echo and noise change along them."""
-
-    step: Floats  # (3,) 0 of an axis of one beam
-    cells: Ints  # (3,)
-    sharpness: Floats  # (3,) the amplitude of an echo falls as 1 - (sharpness x)^2/2; 1/sharpness: its width
-    roughness: Floats  # (3,) standard deviation of the derivative of noise over that of noise, where an echo is
-
-    @staticmethod
-    def of(window: ReceivedWindow, profiles: Profiles) -> Axes:
-        """Of the beams of an image."""
-        image, moments = window.image, profiles.moments
-        middle = float(np.mean(image.elevation[profiles.row])), float(np.mean(image.azimuth[profiles.column]))
-        across = _tangents(*middle)
-        aperture = np.sqrt(np.sum(across @ aperture_moments(window.elements) * across, axis=1))  # m, rms
-        k = 2 * np.pi / window.sonar.assumed_sound_speed
-        return Axes(
-            step=np.array([*_steps(image), profiles.step]),
-            cells=np.array([*image.energy.shape, profiles.power.shape[1]]),
-            sharpness=np.append(k * moments.echo_frequency * aperture, 2 * np.pi * moments.echo_band),
-            roughness=np.append(k * moments.noise_frequency * aperture, 2 * np.pi * moments.noise_band),
-        )
-
-    @property
-    def resolved(self) -> Bools:
-        """(3,) whether peaks are told along an axis: it is longer than noise is smooth, of three cells at least."""
-        return np.asarray((self.cells >= 3) & (self.step * self.cells * self.roughness > RESOLVED))
-
-    def sizes(self, profiles: Profiles) -> Floats:
-        """Lengths (3,) of the volume that is searched, as `peak_level` takes them."""
-        step = np.maximum(self.step[:2], 1e-12)
-        share = len(profiles.power) / self.cells[:2].prod()  # of all beams, whatever the outline of those looked at
-        angle = step * self.cells[:2] * np.sqrt(share) * self.roughness[:2] * self.resolved[:2]
-        lasting = max(profiles.power.shape[1] * profiles.step - 2 * pulse_times.PULSE_HALF, profiles.step)  # s
-        return np.append(angle, lasting * 2 * np.pi * profiles.moments.noise_own_band)
-
-    def errors(self, snr: Floats, centre: Floats) -> tuple[Floats, Floats]:
-        """Predicted standard errors (peak, 3) in rad, rad, s, and covariance (peak,) of angles; snr (peak,): of powers.
-
-        Noise moves the top of an amplitude that falls as 1 - (sharp x)^2/2 by its derivative over the bend, of standard
-        deviation rough/(sharp^2 (2 snr)^1/2). Where echoes overlap the `centre` of their power (peak, 3), in widths
-        from the peak, is beside it: the peak is taken to err by about as much (`CENTRE_ERROR`), and that way.
-        """
-        sharp = np.maximum(self.sharpness, [1e-3, 1e-3, 0.0])
-        noise = self.roughness / (sharp**2 * np.sqrt(2.0 * snr[:, None]))
-        resolved_error = np.sqrt(noise**2 + (SURFACE_ERROR**2 + (CENTRE_ERROR * centre) ** 2) / sharp**2)
-        unresolved_error = UNKNOWN * np.maximum(1.0 / sharp, 0.5 * self.step)
-        error = np.minimum(np.where(self.resolved, resolved_error, unresolved_error), [np.pi, np.pi, np.inf])
-        return error, self.resolved[:2].all() * np.prod((CENTRE_ERROR * centre / sharp)[:, :2], axis=1)
-
-
-def _tangents(elevation: float, azimuth: float) -> Floats:
-    """Vectors (2, xyz): how a direction moves as its elevation, and its azimuth, grow."""
-    se, ce, sa, ca = np.sin(elevation), np.cos(elevation), np.sin(azimuth), np.cos(azimuth)
-    return np.array([[-se * ca, -se * sa, ce], [-ce * sa, ce * ca, 0.0]])
-
-
 def noise_power(profiles: Profiles, image: EnergyImage) -> Floats:
     """Mean power (beam,) of noise: the median over delays over ln 2, its mean over the beams within `NOISE_WIDTHS`.
 
@@ -213,15 +148,9 @@ def noise_power(profiles: Profiles, image: EnergyImage) -> Floats:
     place = profiles.row - profiles.row.min(), profiles.column - profiles.column.min()
     level, filled = np.zeros((2, place[0].max() + 1, place[1].max() + 1))
     level[place], filled[place] = median / np.log(2.0), 1.0
-    cells = [2 * int(NOISE_WIDTHS * 2 * profiles.width / step) + 1 if step else 1 for step in _steps(image)]
+    cells = [2 * int(NOISE_WIDTHS * 2 * profiles.width / step) + 1 if step else 1 for step in grid_steps(image)]
     around, of = (uniform_filter(x, cells, mode="constant")[place] for x in (level, filled))
     return np.asarray(np.maximum(around / of, np.finfo(np.float32).tiny))
-
-
-def _steps(image: EnergyImage) -> tuple[float, float]:
-    """Steps (rad) of elevation and azimuth; 0 of an axis of one beam."""
-    up, across = (float(axis[1] - axis[0]) if len(axis) > 1 else 0.0 for axis in (image.elevation, image.azimuth))
-    return up, across
 
 
 def _tops(
