@@ -314,6 +314,25 @@ def test_refraction_is_undone_by_the_profile():
     assert np.allclose([traced.azimuth[0], traced.elevation[0]], np.ravel(azimuth_elevation(seen)), atol=1e-5)
 
 
+def test_no_error_of_the_assumed_speed_enters_where_rays_are_traced():
+    """Over 48 draws of noise, of the bottom's depth and of the assumed speed each coordinate errs by what is predicted:
+    along the axis of the array it was predicted to err by 2.4 times as much, for a speed that is off by 4 m/s."""
+    profile = Profile(np.array([0.0, 4.0, 8.0, 20.0]), np.array([1546.0, 1545.0, 1537.0, 1535.0]))
+    source, random = np.array([9.0, -5.0, -6.0]), np.random.default_rng(2)
+    array = elements(PlanarLattice(columns=6, rows=6, pitch=0.2, face=0.0))
+    signals, _ = refracted_signals(array, source, AHEAD, profile)
+    scaled = []
+    for _ in range(48):
+        noise = random.normal(0.0, 0.02 * np.abs(signals.pressure).max(), signals.pressure.shape)
+        heard = replace(signals, pressure=(signals.pressure + noise).astype(np.float32))
+        sonar = Sonar(array=SMALL_ARRAY, assumed_sound_speed=random.normal(C, 4.0), sound_speed_error=4.0)
+        depth_error, tracing = random.normal(0.0, sonar.bed_depth_error), SensorDelays(refraction=True)
+        found = locate(heard, array, source, AHEAD, sonar, depth_error, method=tracing, profile=profile)
+        error = found.position[0] - source
+        scaled.append(error / np.sqrt(np.diag(found.position_covariance[0])))
+    assert np.all(np.abs(np.sqrt(np.mean(np.square(scaled), axis=0)) - 1.0) < 0.3), scaled
+
+
 def bent(random, kind):
     """A profile of a random gradient of some kind, 20 m deep."""
     g = random.choice([-1, 1]) * 10 ** random.uniform(-1.5, 0.5)

@@ -163,7 +163,8 @@ def _placed(
         extra = bend.delays(row.position)
         if not np.all(np.isfinite(extra)):
             break
-        row = place(_refit(pulse, wave, elements, c, extra), pulse, knowledge, bent)
+        straight = _refit(pulse, wave, elements, c, extra)  # which a `c` that is off moves as much as `extra`
+        row = place(replace(straight, by_sound_speed=np.zeros(4)), pulse, knowledge, bent)
     return row
 
 

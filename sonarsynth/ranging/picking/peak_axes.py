@@ -90,7 +90,7 @@ def later_beside(window: ReceivedWindow, elevation: Floats, azimuth: Floats, del
     """How much later (peak, 2), in s per rad of elevation and azimuth, an echo beside a peak at its range is."""
     c, source, beam = window.sonar.assumed_sound_speed, window.estimates.position[0], direction(azimuth, elevation)
     by_beam = path_by_beam(beam, bistatic_range(c * delay, beam, source).range, source)
-    return np.nan_to_num(np.einsum("axp,px->pa", _tangents(elevation, azimuth), by_beam) / c)
+    return np.asarray(np.nan_to_num(np.einsum("axp,px->pa", _tangents(elevation, azimuth), by_beam) / c))
 
 
 def _tangents(elevation: npt.ArrayLike, azimuth: npt.ArrayLike) -> Floats:
