@@ -14,7 +14,8 @@ from sonarsynth import planning
 from sonarsynth.conventions import Floats, azimuth_elevation, direction
 from sonarsynth.products import ORIGINS
 from sonarsynth.ranging.clouds import range_error
-from sonarsynth.ranging.location.source_position import ACCEPTED, as_estimates, refused
+from sonarsynth.ranging.location.candidates import as_estimates
+from sonarsynth.ranging.location.source_position import ACCEPTED, refused
 from sonarsynth.ranging.location.triggered import Triggered
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes
 from sonarsynth.ranging.placing.solution import isovelocity_solution
