@@ -24,6 +24,7 @@ class Demand:
     off_bottom: bool = False  # some source is not on the bottom
     reflected: bool = False  # sound is reflected by surface and bottom
     bandwidth: float = float("inf")  # Hz: of the sonar
+    bending: float = 0.0  # m: what straight ranges err by where rays bend, at the sound speed of the water at the array
 
 
 @dataclass(frozen=True)

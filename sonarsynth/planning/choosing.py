@@ -81,13 +81,16 @@ def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     if not plan.products:  # nothing is traced
         return plan
     sampled = _measured_in(looks, 1 if _facets(scene) > LARGE_MESH_FACETS else MEASURED)
-    bent = max((ranging_error(look.scene, look.profile, look.frames) for look in sampled), default=0.0)
+    bent = [
+        max((ranging_error(look.scene, look.profile, look.frames, shape=shape) for look in sampled), default=0.0)
+        for shape in (False, True)
+    ]
     allowed, band = np.sqrt(SYNTHESIS) * accuracy.cheap, scene.sonar.band
     synthesis, synthesis_error = scene.physics.synthesis.resolve(
         Demand(allowed, accuracy.exact, lambda method: 0.0, plan.elements, bandwidth=band.high - band.low)
     )
     placing, placing_error = scene.processing.placing.resolve(
-        Demand(accuracy.range_m, accuracy.exact, lambda method: bent, plan.elements)
+        Demand(accuracy.range_m, accuracy.exact, lambda method: bent[0], plan.elements, bending=bent[1])
     )
     picking, _ = scene.processing.picking.resolve(Demand(np.inf, accuracy.exact, lambda method: 0.0, plan.elements))
     choices = Choices(

@@ -7,9 +7,29 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.arrays.spherical_wave import Wavefront
 
 WITHIN = 3.0
 """Standard errors within which a source may be next to a boundary."""
+
+
+def source_place(
+    direction: Floats, curvature: float, tangents: Floats, covariance: Floats, by_speed: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Place (xyz) of the source of a wave, its covariance, and its change (xyz) per m/s of the assumed sound speed.
+
+    tangents (2, xyz); covariance (3, 3) and by_speed (3,) of (along tangents, curvature). NaN of NaN curvature (1/m).
+    """
+    k = curvature
+    jacobian = np.stack([tangents[0] / k, tangents[1] / k, -direction / k**2], axis=1)
+    return direction / k, jacobian @ covariance @ jacobian.T, jacobian @ by_speed
+
+
+def bias_covariance(wave: Wavefront, left: Wavefront) -> Floats:
+    """Covariance (4, 4) of the parameters of a wave that is off by what is between it and the wave that is left."""
+    turned = wave.tangents @ (wave.direction - left.direction)
+    bias = np.array([*turned, wave.curvature - left.curvature, wave.time - left.time])
+    return np.outer(bias, bias)
 
 
 def bending_covariance(

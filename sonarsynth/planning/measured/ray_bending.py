@@ -94,12 +94,16 @@ def _alike(first: Paths, second: Paths) -> bool:
     return all(same) and not second.turning.any()
 
 
-def ranging_error(scene: Scene, profile: Profile, frames: Iterable[Frame]) -> float:
-    """Largest difference (m) of ranges by the closed form from those along rays, over the boxes round the bodies."""
+def ranging_error(scene: Scene, profile: Profile, frames: Iterable[Frame], *, shape: bool = False) -> float:
+    """Largest difference (m) of ranges by the closed form from those along rays, over the boxes round the bodies.
+
+    shape: what the shape of the profile does; the closed form then has the sound speed of the water at the array.
+    """
     speed, worst = scene.sonar.assumed_sound_speed, 0.0
-    if profile.uniform and profile.speed[0] == speed:
+    if profile.uniform and (shape or profile.speed[0] == speed):
         return 0.0
     for frame in frames:
+        speed = float(profile.at(depth(frame.sonar_pose.position))) if shape else speed
         points = frame.sonar_pose.to_body(around(frame, scene.world.environment.depth))
         if not len(points):
             continue

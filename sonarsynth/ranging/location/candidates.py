@@ -12,22 +12,24 @@ bottom. A pulse that satisfies all of this may be an echo, and is refused.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from sonarsynth.conventions import Bools, Floats
+from sonarsynth.conventions import Bools, Floats, azimuth_elevation
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Track
-from sonarsynth.products import Signals
+from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
     ECHO,
     OUTSIDE,
     RANGE,
+    SILENT,
     SonarKnowledge,
     SourceFix,
     refused,
@@ -198,3 +200,30 @@ def images(position: Floats, pose: Pose, bottom_depth: float, bounces: int) -> l
             bottom = (n + 1 + first) // 2
             paths.append((n + 1 - bottom, bottom, pose.to_body(image)))
     return paths
+
+
+def as_estimates(rows: list[SourceFix], snaps: int, reason: int = SILENT) -> SourceEstimates:
+    """Rows as `SourceEstimates` of `snaps` rows; NaN beyond those there are, for a reason."""
+    rows = [*rows[:snaps], *[refused(reason)] * (snaps - len(rows))]
+
+    def column(get: Callable[[SourceFix], object], *shape: int) -> Floats:
+        return np.array([get(row) for row in rows], float).reshape(snaps, *shape)
+
+    return SourceEstimates(
+        time=column(lambda r: r.time),
+        time_error=column(lambda r: r.time_error),
+        azimuth=column(lambda r: azimuth_elevation(r.direction)[0]),
+        azimuth_error=column(lambda r: r.angle_error[0]),
+        elevation=column(lambda r: azimuth_elevation(r.direction)[1]),
+        elevation_error=column(lambda r: r.angle_error[1]),
+        range_from_depth=column(lambda r: r.range_from_depth[0]),
+        range_from_depth_error=column(lambda r: r.range_from_depth[1]),
+        range_from_curvature=column(lambda r: r.range_from_curvature[0]),
+        range_from_curvature_error=column(lambda r: r.range_from_curvature[1]),
+        position=column(lambda r: r.position, 3),
+        position_covariance=column(lambda r: r.covariance, 3, 3),
+        residual=column(lambda r: r.residual),
+        position_by_speed=column(lambda r: r.by_speed, 3),
+        bottom_used=column(lambda r: r.bottom_used).astype(np.int64),
+        reason=column(lambda r: r.reason).astype(np.int64),
+    )

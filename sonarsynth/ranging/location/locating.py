@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,7 +11,15 @@ from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, robust_wave, spherical_wave, wavefront_delays
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.location.candidates import QUIET, Candidate, Candidates, loudness, quiet_bin, when_heard
+from sonarsynth.ranging.location.candidates import (
+    QUIET,
+    Candidate,
+    Candidates,
+    as_estimates,
+    loudness,
+    quiet_bin,
+    when_heard,
+)
 from sonarsynth.ranging.location.pulse_times import AlignedPulse, Pulse
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
@@ -21,9 +28,9 @@ from sonarsynth.ranging.location.source_position import (
     RANGE,
     UNFIT,
     UNRESOLVED,
+    Bend,
     SonarKnowledge,
     SourceFix,
-    as_estimates,
     place,
     refused,
 )
@@ -58,15 +65,6 @@ MAX_LAG = 0.15
 """A pulse whose lags exceed this share of a period (root mean square, band centre) is not one wavefront."""
 
 
-@dataclass(frozen=True, eq=False)
-class Bend:
-    """How rays bend: what they add to the delays of straight paths, or the gradient of which errors are predicted."""
-
-    delays: Callable[[Floats], Floats]  # of a source (xyz), sonar frame: beyond those of straight paths (sensor,), in s
-    sound_speed: float  # m/s of the water at the array
-    gradient: float  # 1/s: what is allowed for before a place is known
-
-
 @lru_cache(maxsize=16)
 def unlocatable(elements: Elements) -> str | None:
     """Why an array can locate nothing; None where it can."""
@@ -93,9 +91,9 @@ def locate(
 ) -> SourceEstimates:
     """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`. bottom: its depth (m).
 
-    Paths bend as `bend` says; without it they are taken for straight, and the errors hold what a `gradient` (1/s) of
-    the sound speed may do, and those of directions what its change over the array does, a `kink` (1/s). Pulses that are
-    refused follow those that are not, loudest first.
+    Paths bend as `bend` says. Where it is not undone, errors hold it; of sources whose range is not known, what a
+    `gradient` (1/s) of the sound speed may do, and those of directions what its change over the array does, a `kink`
+    (1/s). Pulses that are refused follow those that are not, loudest first.
     """
     elements, sonar = receiver.elements, receiver.sonar
     if unlocatable(elements) is not None:
@@ -153,17 +151,20 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
 def _placed(
     wave: Wavefront, pulse: Pulse, elements: Elements, knowledge: SonarKnowledge, bend: Bend | None
 ) -> SourceFix:
-    """A row of a pulse with its wavefront, as `bend` says."""
+    """A row of a pulse with its wavefront, as `bend` says: where it is undone, no error of the assumed speed is."""
     if bend is None:
         return place(wave, pulse, knowledge)
     c = knowledge.sonar.assumed_sound_speed
-    bent = _refit(pulse, wave, elements, bend.sound_speed, 0.0, c)
-    row = place(wave, pulse, replace(knowledge, gradient=bend.gradient), bent)
+    bent = _refit(pulse, wave, elements, bend.sound_speed, 0.0, c) if bend.undone else wave
+    row = place(wave, pulse, knowledge, bent)
     for _ in range(3):  # delays beyond straight ones change little with the place: this settles at once
-        extra = bend.delays(row.position)
+        extra = bend.delays(row.position, c if bend.undone else bend.sound_speed)
         if not np.all(np.isfinite(extra)):
             break
-        row = place(_refit(pulse, wave, elements, c, extra), pulse, knowledge, bent)
+        straight = _refit(pulse, wave, elements, c, extra)
+        if not bend.undone:
+            return place(wave, pulse, knowledge, left=straight)
+        row = place(replace(straight, by_sound_speed=np.zeros(4)), pulse, replace(knowledge, gradient=0.0), bent)
     return row
 
 

@@ -11,7 +11,7 @@ from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.arrays.bistatic_range import bistatic_range
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, unit
-from sonarsynth.ranging.location.locating import Bend
+from sonarsynth.ranging.location.source_position import Bend
 from sonarsynth.ranging.placing.solution import Solution
 from sonarsynth.state import Receiver
 
@@ -52,17 +52,17 @@ def first_rays(profile: Profile, start: Floats, end: Floats) -> FirstRays:
     return FirstRays(time, departure, arrival)
 
 
-def bending(profile: Profile, receiver: Receiver, gradient: float) -> Bend:
-    """What rays through the profile add to straight delays over the array, at the speed that the sonar assumes."""
+def bending(profile: Profile, receiver: Receiver, undone: bool) -> Bend:
+    """What rays through the profile add to straight delays over the array, which is `undone` or not."""
     sensors, pose = np.vstack([receiver.elements.position, np.zeros(3)]), receiver.pose
 
-    def delays(source: Floats) -> Floats:
+    def delays(source: Floats, sound_speed: float) -> Floats:
         rays = first_rays(profile, pose.to_world(source)[None], pose.to_world(sensors))
-        straight = np.linalg.norm(source - sensors, axis=1) / receiver.sonar.assumed_sound_speed
+        straight = np.linalg.norm(source - sensors, axis=1) / sound_speed
         extra = rays.travel_time - straight
         return np.asarray(extra[:-1] - extra[-1])
 
-    return Bend(delays, float(profile.at(-pose.position[2])), gradient)
+    return Bend(delays, float(profile.at(-pose.position[2])), undone)
 
 
 def refracted_solution(

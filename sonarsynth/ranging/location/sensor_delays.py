@@ -30,7 +30,8 @@ class SensorDelays(LocatingMethod):
     kind: Literal["sensor_delays"] = "sensor_delays"
     refraction: bool = False
     """Trace the bearing through the sound-speed profile of the water; otherwise paths are straight, at the sonar's
-    assumed sound speed, and predicted errors hold what a gradient g may do: r g/(2c) in angle, r^2 g/(2c) in place."""
+    assumed sound speed, and predicted errors hold what bending does to that: how a wave from the place that is found
+    differs from a straight one, or, where no range is found, what a gradient g may do, r g/(2c) in angle."""
 
     on_bottom: bool | None = None
     """Whether sources are known to be on the bottom. True: its depth is used where the wavefront agrees;
@@ -76,9 +77,9 @@ class SensorDelays(LocatingMethod):
 
         profile, aperture, own = survey.profile, receiver.elements.aperture, float(depth(receiver.pose.position))
         gradient = mean_gradient(profile, own, survey.bottom, aperture)
-        bend = bending(profile, receiver, gradient) if self.refraction else None
+        bend = bending(profile, receiver, self.refraction) if self.refraction or not profile.uniform else None
         return locate(
-            signals, receiver, survey.bottom, snaps, bend=bend, gradient=0.0 if bend else gradient,
+            signals, receiver, survey.bottom, snaps, bend=bend, gradient=gradient,
             kink=kink(profile, own, aperture) if aperture else 0.0, on_bottom=self.on_bottom is not False,
             reflected=self.reflected is True,
         )  # fmt: skip

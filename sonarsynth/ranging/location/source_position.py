@@ -8,11 +8,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, azimuth_elevation
+from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, envelope_peak, envelope_spread
-from sonarsynth.equations.arrays.wavefront_errors import bending_covariance, image_covariance
+from sonarsynth.equations.arrays.wavefront_errors import (
+    bending_covariance,
+    bias_covariance,
+    image_covariance,
+    source_place,
+)
 from sonarsynth.geometry import Pose
-from sonarsynth.products import REASONS, SourceEstimates
+from sonarsynth.products import REASONS
 from sonarsynth.ranging.location.pulse_times import Pulse, half_length, lag_variance
 from sonarsynth.receiver import Elements, Sonar
 
@@ -73,13 +78,22 @@ class SonarKnowledge:
     sonar: Sonar
     pose: Pose
     bottom_depth: float  # m
-    gradient: float  # 1/s: size of the gradient of sound speed that rays taken for straight may have met; 0 for none
+    gradient: float  # 1/s: size of the gradient of sound speed that rays of unknown bending may have met; 0 for none
     rounding: float  # (Pa s)^2: power in a bin of what the converter and single precision round off
     quiet: float  # (Pa s)^2: power in a bin of the noise at a sensor
     on_bottom: bool = True  # whether sources may be taken to be on the bottom, where the wavefront agrees
     kink: float = 0.0  # 1/s: change of the gradient of the sound speed over the array
     reflected: bool = False  # whether sources are heard with their reflections at surface and bottom
     velocity: Floats = field(default_factory=lambda: np.zeros((1, 3)))  # (sensor, xyz) m/s, sonar frame
+
+
+@dataclass(frozen=True, eq=False)
+class Bend:
+    """How rays bend: what they add to the delays of straight paths at some speed (m/s)."""
+
+    delays: Callable[[Floats, float], Floats]  # of a source (xyz), sonar frame, and that speed: (sensor,) s
+    sound_speed: float  # m/s of the water at the array
+    undone: bool  # or only in the predicted errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,32 +107,31 @@ class Fix:
     used: bool  # whether the bottom was
 
 
-def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefront | None = None) -> SourceFix:
+def place(
+    wave: Wavefront,
+    pulse: Pulse,
+    knowledge: SonarKnowledge,
+    bent: Wavefront | None = None,
+    left: Wavefront | None = None,
+) -> SourceFix:
     """Ranges and position from a wavefront, and the depth of the bottom where it agrees; errors through the Jacobians.
 
     bent: the wave as the array hears it, where `wave` is the straight one that is left without bending. The direction
-    is always that of the wave as heard.
+    is always that of the wave as heard. left: the straight one, where `wave` is as heard: it is off by what is between.
     """
     elements, sonar, pose = knowledge.elements, knowledge.sonar, knowledge.pose
     bent = bent or wave
-    timing = lag_variance(wave, pulse, elements, knowledge.rounding, half_length(sonar.band)) * wave.covariance
+    timing = lag_variance(left or wave, pulse, elements, knowledge.rounding, half_length(sonar.band)) * wave.covariance
     fall = -knowledge.bottom_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
     slope, by_angle = float(pose.rotation[2] @ wave.direction), wave.tangents @ pose.rotation[2]
     from_depth = fall / slope if slope * fall > 0 else np.nan
     full = _straight_covariance(wave, timing, by_angle / from_depth, pulse, knowledge)
     tilt = by_angle * (KINKED * knowledge.kink * elements.aperture / sonar.assumed_sound_speed)
-    straight, spread = full, full[:2, :2] + np.outer(tilt, tilt)
+    spread = full[:2, :2] + np.outer(tilt, tilt)
     from_pole = float(np.hypot(*bent.direction[:2]))  # its azimuth is anybody's guess where it may be beyond
     beyond = 0.5 * math.erfc(from_pole / max(np.sqrt(2.0 * spread[1, 1]), 1e-300))
     around = min(spread[0, 0] / max(from_pole**2, 1e-300) + np.pi**2 * beyond, np.pi**2)
-    fix = _fuse(wave, straight, fall, knowledge)
-    for _ in range(2 * (knowledge.gradient > 0)):  # bending depends on the distance, and that a little on bending
-        likely = [1 / fix.curvature if fix.curvature > 0 else np.nan, from_depth, elements.aperture]
-        distance = next(d for d in likely if np.isfinite(d))
-        full = straight + bending_covariance(
-            by_angle, slope, distance, knowledge.gradient, sonar.assumed_sound_speed, elements.aperture
-        )
-        fix = _fuse(wave, full, fall, knowledge)
+    full, fix = _bent(wave, full, from_depth, fall, knowledge, left)
     with np.errstate(divide="ignore", invalid="ignore"):
         depth_error = np.hypot(from_depth * np.sqrt(by_angle @ full[:2, :2] @ by_angle), sonar.bed_depth_error)
         from_curvature = 1 / wave.curvature if wave.curvature > 0 else np.nan
@@ -127,7 +140,8 @@ def place(wave: Wavefront, pulse: Pulse, knowledge: SonarKnowledge, bent: Wavefr
     reason = reason if _in_water(wave, full, slope, by_angle, fall, knowledge) else OUTSIDE
     time, time_error = _arrival(pulse, float(full[3, 3]), sonar, knowledge.rounding)
     reason = reason if np.isfinite(time) else BAND
-    position, covariance, by_speed = _position(wave, fix, reason == ACCEPTED)
+    known = fix.curvature if reason == ACCEPTED and fix.curvature > 0 else np.nan
+    position, covariance, by_speed = source_place(fix.direction, known, wave.tangents, fix.covariance, fix.by_speed)
     return SourceFix(
         time=time,
         time_error=time_error,
@@ -175,6 +189,23 @@ def _straight_covariance(
     return full
 
 
+def _bent(
+    wave: Wavefront, straight: Floats, from_depth: float, fall: float, knowledge: SonarKnowledge, left: Wavefront | None
+) -> tuple[Floats, Fix]:
+    """The covariance (4, 4) of a wavefront along straight rays with what bending adds to it, and the fix by that."""
+    if left is not None:
+        full = straight + bias_covariance(wave, left)
+        return full, _fuse(wave, full, fall, knowledge)
+    full, fix, up = straight, _fuse(wave, straight, fall, knowledge), knowledge.pose.rotation[2]
+    c, aperture = knowledge.sonar.assumed_sound_speed, knowledge.elements.aperture
+    for _ in range(2 * (knowledge.gradient > 0)):  # bending depends on the distance, and that a little on bending
+        likely = [1 / fix.curvature if fix.curvature > 0 else np.nan, from_depth, aperture]
+        distance, slope = next(d for d in likely if np.isfinite(d)), float(up @ wave.direction)
+        full = straight + bending_covariance(wave.tangents @ up, slope, distance, knowledge.gradient, c, aperture)
+        fix = _fuse(wave, full, fall, knowledge)
+    return full, fix
+
+
 def _fuse(wave: Wavefront, covariance: Floats, fall: float, knowledge: SonarKnowledge) -> Fix:
     """The wavefront, and where it agrees the depth: slope - k fall = 0 within |k| times the error of the depth.
 
@@ -212,15 +243,6 @@ def _fuse(wave: Wavefront, covariance: Floats, fall: float, knowledge: SonarKnow
 def _turned(wave: Wavefront, step: Floats) -> Floats:
     u = wave.direction + step[:2] @ wave.tangents
     return np.asarray(u / np.linalg.norm(u))
-
-
-def _position(wave: Wavefront, fix: Fix, known: bool) -> tuple[Floats, Floats, Floats]:
-    """Position (xyz) of a fix that is known, its covariance, its change (xyz) per m/s of the assumed sound speed."""
-    u, k = fix.direction, fix.curvature
-    if not (known and k > 0):
-        return np.full(3, np.nan), np.full((3, 3), np.nan), np.full(3, np.nan)
-    jacobian = np.stack([wave.tangents[0] / k, wave.tangents[1] / k, -u / k**2], axis=1)
-    return u / k, jacobian @ fix.covariance @ jacobian.T, jacobian @ fix.by_speed
 
 
 def _in_water(
@@ -271,30 +293,3 @@ def refused(reason: int) -> SourceFix:
         np.nan, np.nan, none, none[:2], pair, pair, none, np.full((3, 3), np.nan), none,
         np.nan, -1, reason, pair, none, np.nan,
     )  # fmt: skip
-
-
-def as_estimates(rows: list[SourceFix], snaps: int, reason: int = SILENT) -> SourceEstimates:
-    """Rows as `SourceEstimates` of `snaps` rows; NaN beyond those there are, for a reason."""
-    rows = [*rows[:snaps], *[refused(reason)] * (snaps - len(rows))]
-
-    def column(get: Callable[[SourceFix], object], *shape: int) -> Floats:
-        return np.array([get(row) for row in rows], float).reshape(snaps, *shape)
-
-    return SourceEstimates(
-        time=column(lambda r: r.time),
-        time_error=column(lambda r: r.time_error),
-        azimuth=column(lambda r: azimuth_elevation(r.direction)[0]),
-        azimuth_error=column(lambda r: r.angle_error[0]),
-        elevation=column(lambda r: azimuth_elevation(r.direction)[1]),
-        elevation_error=column(lambda r: r.angle_error[1]),
-        range_from_depth=column(lambda r: r.range_from_depth[0]),
-        range_from_depth_error=column(lambda r: r.range_from_depth[1]),
-        range_from_curvature=column(lambda r: r.range_from_curvature[0]),
-        range_from_curvature_error=column(lambda r: r.range_from_curvature[1]),
-        position=column(lambda r: r.position, 3),
-        position_covariance=column(lambda r: r.covariance, 3, 3),
-        residual=column(lambda r: r.residual),
-        position_by_speed=column(lambda r: r.by_speed, 3),
-        bottom_used=column(lambda r: r.bottom_used).astype(np.int64),
-        reason=column(lambda r: r.reason).astype(np.int64),
-    )

@@ -45,7 +45,8 @@ class Triggered(LocatingMethod):
 
     def locate(self, signals: Signals, receiver: Receiver, survey: Survey, snaps: int) -> SourceEstimates:
         """As `LocatingMethod.locate`: what it was told, as far as it is in the water."""
-        from sonarsynth.ranging.location.source_position import ACCEPTED, as_estimates, refused
+        from sonarsynth.ranging.location.candidates import as_estimates
+        from sonarsynth.ranging.location.source_position import ACCEPTED, refused
 
         rows, c, error = [], receiver.sonar.assumed_sound_speed, self.position_error
         sonar_depth = float(depth(receiver.pose.position))

@@ -23,10 +23,10 @@ class AutoPlacing(Method):
 
     def resolve(self, demand: Demand) -> tuple[IsovelocityPlacing | RefractedPlacing, float]:
         """The closed form where bent rays make its ranges wrong by no more than is allowed (m)."""
-        _, error = IsovelocityPlacing().resolve(demand)
+        straight, error = IsovelocityPlacing().resolve(demand)
         if error > (0.0 if demand.exact else demand.allowed):
             return self.exact(), 0.0
-        return IsovelocityPlacing(bending_error=float(f"{error:.1e}")), error
+        return straight, error
 
     def exact(self) -> RefractedPlacing:
         """Along rays."""

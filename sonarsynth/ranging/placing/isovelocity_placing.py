@@ -21,12 +21,14 @@ class IsovelocityPlacing(Method):
     (`equations.arrays.bistatic_range`)."""
 
     kind: Literal["isovelocity"] = "isovelocity"
-    bending_error: NonNegativeMetres = 0.0
-    """Standard error of its ranges in water that bends rays: enters the predicted errors only. `auto` measures it."""
+    bending_error: NonNegativeMetres | None = None
+    """Standard error of its ranges in water that bends rays: enters the predicted errors only. Left out: the most that
+    bending makes of it in frames of the recipe that are tried."""
 
     def resolve(self, demand: Demand) -> tuple[IsovelocityPlacing, float]:
-        """Itself, and by how much (m) bent rays make its ranges wrong."""
-        return self, demand.error(self)
+        """With what bent rays make its ranges err by, where this is left out, and by how much (m) these are wrong."""
+        bending = float(f"{demand.bending:.1e}") if self.bending_error is None else self.bending_error
+        return replace(self, bending_error=bending), demand.error(self)
 
     def exact(self) -> RefractedPlacing:
         """Along rays."""
@@ -37,4 +39,4 @@ class IsovelocityPlacing(Method):
     ) -> Solution:
         """See `PlacingMethod`."""
         solution = isovelocity_solution(delay, beam, source, sonar.assumed_sound_speed)
-        return replace(solution, model_error=self.bending_error)
+        return replace(solution, model_error=self.bending_error or 0.0)
