@@ -17,7 +17,7 @@ from sonarsynth.equations.arrays.noise_peaks import expected_peaks, peak_level
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.planning import plan
-from sonarsynth.ranging import Peaks, SensorDelays
+from sonarsynth.ranging import BeamAxis, FirstEcho, Peaks, SensorDelays
 from sonarsynth.ranging.location.triggered import Triggered
 from sonarsynth.ranging.picking.peak_kernels import lobe_power, local_maxima
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, Sonar, elements
@@ -63,27 +63,41 @@ def spherical(r, azimuth, elevation):
     return tuple(r * direction(np.array([azimuth]), np.array([elevation]))[0])
 
 
+COLUMN = tuple((0.3, 0.3, z) for z in np.arange(-0.1, 0.11, 0.0125))
+
+
+def planned_before(places, picking):
+    """A point 40 m ahead of hydrophones at these places, in beams 1 degree apart."""
+    told = Triggered(time_error=1e-9, position_error=1e-6)
+    grid = BeamGrid(azimuth_span=np.deg2rad(20), azimuths=21, elevation_span=np.deg2rad(20), elevations=21)
+    recipe = point_scene((40.0, 3.0, -47.0), (10.0, 3.0, -55.0), array=PositionTable(positions=places), beams=grid)
+    world, processing = recipe.scene.world, replace(recipe.scene.processing, locating=told, picking=picking)
+    world = replace(world, environment=replace(world.environment, noise=FlatNoise(level=20.0)))
+    return plan(replace(recipe, scene=replace(recipe.scene, world=world, processing=processing)))
+
+
 @pytest.mark.parametrize(
     ("places", "lacks"),
     [
         (((0.0, 0.3, 0.2),), "one hydrophone tells no azimuth and no elevation"),
-        (
-            tuple((0.3, 0.3, z) for z in np.arange(-0.1, 0.11, 0.0125)),
-            "17 hydrophones, of no extent there, tell no azi",
-        ),
+        (COLUMN, "17 hydrophones, of no extent there, tell no azi"),
     ],
 )
 def test_an_echo_without_a_direction_is_one_point_and_the_plan_says_so(places, lacks):
     """Wherever the hydrophones are: of those beside the middle of the array beams heard it sooner or later, as 78."""
-    told = Triggered(time_error=1e-9, position_error=1e-6)
-    grid = BeamGrid(azimuth_span=np.deg2rad(20), azimuths=21, elevation_span=np.deg2rad(20), elevations=21)
-    recipe = point_scene((40.0, 3.0, -47.0), (10.0, 3.0, -55.0), array=PositionTable(positions=places), beams=grid)
-    world, processing = recipe.scene.world, replace(recipe.scene.processing, locating=told)
-    world = replace(world, environment=replace(world.environment, noise=FlatNoise(level=20.0)))
-    planned = plan(replace(recipe, scene=replace(recipe.scene, world=world, processing=processing)))
+    planned = planned_before(places, Peaks())
     cloud = render(planned, 0)["cloud"]
     assert int(cloud["count"]) == 1 and float(cloud["azimuth_error"][0]) > 90.0
     assert any(line.startswith(lacks) for line in planned.warnings)
+
+
+@pytest.mark.parametrize("picking", [BeamAxis(), FirstEcho()])
+def test_points_on_axes_of_beams_err_by_any_angle_that_no_hydrophone_tells(picking):
+    """A column of hydrophones tells no azimuth, which was predicted as well as the elevation."""
+    cloud = render(planned_before(COLUMN, picking), 0)["cloud"].dataset
+    count = int(cloud["count"])
+    assert count > 1 and cloud["azimuth_error"].values[:count].min() > 90.0
+    assert cloud["elevation_error"].values[:count].max() < 10.0
 
 
 @pytest.mark.parametrize("step", [0.25, 0.5, 0.75])

@@ -169,6 +169,17 @@ class Axes:
         """(3,) whether peaks are told along an axis: it is longer than noise is smooth, of three cells at least."""
         return np.asarray((self.cells >= 3) & (self.step * self.cells * self.roughness > RESOLVED))
 
+    @property
+    def _sharp(self) -> Floats:
+        """(3,) the sharpness, no less than where an echo may come from anywhere."""
+        return np.maximum(self.sharpness, [1e-3, 1e-3, 0.0])
+
+    @property
+    def unresolved_error(self) -> Floats:
+        """Predicted standard errors (3,) in rad, rad, s along axes that are not resolved."""
+        error = UNKNOWN * np.maximum(1.0 / self._sharp, 0.5 * self.step)
+        return np.asarray(np.minimum(error, [np.pi, np.pi, np.inf]))
+
     def sizes(self, profiles: Profiles) -> Floats:
         """Lengths (3,) of the volume that is searched, as `peak_level` takes them."""
         step = np.maximum(self.step[:2], 1e-12)
@@ -184,11 +195,10 @@ class Axes:
         deviation rough/(sharp^2 (2 snr)^1/2). Where echoes overlap the `centre` of their power (peak, 3), in widths
         from the peak, is beside it: the peak is taken to err by about as much (`CENTRE_ERROR`), and that way.
         """
-        sharp = np.maximum(self.sharpness, [1e-3, 1e-3, 0.0])
+        sharp = self._sharp
         noise = self.roughness / (sharp**2 * np.sqrt(2.0 * snr[:, None]))
         resolved_error = np.sqrt(noise**2 + (SURFACE_ERROR**2 + (CENTRE_ERROR * centre) ** 2) / sharp**2)
-        unresolved_error = UNKNOWN * np.maximum(1.0 / sharp, 0.5 * self.step)
-        error = np.minimum(np.where(self.resolved, resolved_error, unresolved_error), [np.pi, np.pi, np.inf])
+        error = np.where(self.resolved, np.minimum(resolved_error, [np.pi, np.pi, np.inf]), self.unresolved_error)
         return error, self.resolved[:2].all() * np.prod((CENTRE_ERROR * centre / sharp)[:, :2], axis=1)
 
 
