@@ -55,7 +55,8 @@ def axis_echoes(
     own = np.isfinite(echoes.delay)
     row, column = profiles.row[own], profiles.column[own]
     axes = Axes.of(window, profiles)
-    angle = np.where(axes.resolved[:2], echoes.angle_error[own, None], axes.unresolved_error[:2])
+    angle = np.maximum(echoes.angle_error[own, None], axes.step[:2] / np.sqrt(12.0))  # anywhere in the cell of a beam
+    angle = np.where(axes.resolved[:2], angle, axes.unresolved_error[:2])
     return PickedEchoes(
         azimuth=window.image.azimuth[column],
         elevation=window.image.elevation[row],
