@@ -110,12 +110,21 @@ def read(path: str | Path) -> Detections:
     if file.stat().st_size > MOST_BYTES:
         raise DetectionsError(f"{file}: is larger than {MOST_BYTES / 2**30:g} GiB")
     try:
-        listed = json.loads(file.read_text(encoding="utf-8"))
+        listed = json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=_object)
     except (ValueError, RecursionError) as error:
         raise DetectionsError(f"{file}: is no JSON ({error})") from None
     if not isinstance(listed, list):
         raise DetectionsError(f"{file}: must be a list of detections, as the results of COCO are")
     return from_rows(_row(entry, f"{file}: detection {n}") for n, entry in enumerate(listed))
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object of JSON, which may hold each name once. Raises ValueError."""
+    entry = dict(pairs)
+    if len(entry) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise ValueError(f"an object has {next(name for name in names if names.count(name) > 1)[:40]!r} twice")
+    return entry
 
 
 def _row(entry: object, where: str) -> dict[str, Any]:
@@ -126,8 +135,11 @@ def _row(entry: object, where: str) -> dict[str, Any]:
     if "category_id" in entry:
         row["category"] = _whole_number(entry, "category_id", where) - 1
     row |= {name: _number(entry, name, where) for name in MEASURED if entry.get(name) is not None}
-    if row.get("range", 0.0) < 0.0:
-        raise DetectionsError(f"{where}: range must not be negative")
+    for name in ("range", *(name for name in MEASURED if name.endswith("_error"))):
+        if row.get(name, 0.0) < 0.0:
+            raise DetectionsError(f"{where}: {name} must not be negative")
+    if abs(row.get("elevation", 0.0)) > 90.0:
+        raise DetectionsError(f"{where}: elevation must be within 90 degrees")
     if entry.get("bbox") is not None:
         box = entry["bbox"]
         if not (isinstance(box, list) and len(box) == 4):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description import FieldError
 from sonarsynth.geometry import Pose, rotation_matrix, turned
-from sonarsynth.store import open_store
+from sonarsynth.store import built_frames, open_store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +31,7 @@ def points(
     Parameters
     ----------
     store: path, URL or opened tree.
-    frames: numbers of frames; left out: all.
+    frames: numbers of frames; left out: all that were built.
     relative_to: the axes of `position`: "sonar", those of the array when it heard the echo; "world"; or the name of a
         target, as it was when the sound met it, so that points on its hull fall together whatever it and the array do.
 
@@ -43,7 +44,7 @@ def points(
     Raises
     ------
     FieldError where the store has no cloud, no target of that name, or is of an earlier version; IndexError for a
-    frame that it has not.
+    frame that it has not; TypeError for a number of a frame that is not whole.
     """
     import xarray as xr
 
@@ -59,8 +60,10 @@ def points(
             ("relative_to",), f"must be sonar, world or a target ({', '.join(names)}), not {relative_to!r}"
         )
     cloud = tree["cloud"].dataset
-    chosen = range(cloud.sizes["frame"]) if frames is None else list(frames)
-    of_frames = [_frame(tree, int(index), relative_to, names) for index in chosen]
+    chosen = built_frames(tree).tolist() or [0] if frames is None else [operator.index(frame) for frame in frames]
+    if wrong := [frame for frame in chosen if not 0 <= frame < cloud.sizes["frame"]]:
+        raise IndexError(f"frame {wrong[0]} is outside 0..{cloud.sizes['frame'] - 1}")
+    of_frames = [_frame(tree, index, relative_to, names) for index in chosen]
     columns = {name: np.concatenate([c[name] for c in of_frames]) for name in of_frames[0]} if of_frames else {}
     variables = {
         name: (("point", "xyz") if values.ndim == 2 else ("point",), values, _attributes(cloud, name))

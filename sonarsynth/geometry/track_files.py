@@ -88,6 +88,9 @@ def _csv(path: Path, data: bytes) -> TrackTable:
     if not rows:
         raise TrackError(f"{path}: has no points after its column names")
     columns = {}
+    for line, cells in rows:  # a decimal comma makes two of a number, and moves all after it
+        if any(cell.strip() for cell in cells[len(names) :]):
+            raise TrackError(f"{path}, line {line}: has {len(cells)} values in {len(names)} columns")
     for quantity, (column, unit) in wanted.items():
         values = np.empty(len(rows))
         for k, (line, cells) in enumerate(rows):
@@ -110,8 +113,11 @@ def _wanted(path: Path, line: int, names: list[str]) -> dict[str, tuple[int, flo
     for index, name in enumerate(names):
         plain, unit = _split(name)
         for quantity, (usual, spellings) in NAMES.items():
-            if plain not in spellings or quantity in columns:
+            if plain not in spellings:
                 continue
+            if quantity in columns:
+                both = " and ".join(f"'{names[i].strip()[:30]}'" for i in (columns[quantity][0], index))
+                raise TrackError(f"{path}, line {line}: two columns of {quantity}, {both}: leave out one")
             symbol = {"deg": "rad"}.get(usual, usual)
             if unit is not None and unit not in UNITS[symbol]:
                 raise TrackError(

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic_core import ErrorDetails
 
+from sonarsynth.conventions import UNITS
 from sonarsynth.description import unknown
 from sonarsynth.recipe.variation.values import Where
 from sonarsynth.targets.target import NAME
@@ -59,7 +60,16 @@ def _text(details: ErrorDetails) -> str:
         case "too_short":
             return f"must have at least {context['min_length']} entries, not {context['actual_length']}"
     text = details["msg"].replace("Input should be", "must be").replace("String should", "must")
+    if details["type"].startswith(("less_than", "greater_than")) and (unit := _unit(details["input"])):
+        limit = next(iter(context.values())) / next(sizes[unit] for sizes in UNITS.values() if unit in sizes)
+        text = f"{text.rpartition(' ')[0]} {limit:.6g} {unit}"  # as it was written, not in SI
     return f"{text[0].lower()}{text[1:]}, not {value}"
+
+
+def _unit(value: Any) -> str:
+    """The unit that a text ends in; nothing of anything else."""
+    last = value.split()[-1:] if isinstance(value, str) else []
+    return next((unit for sizes in UNITS.values() for unit in sizes if [unit] == last), "")
 
 
 def _shown(value: Any) -> str:

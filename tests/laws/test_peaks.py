@@ -18,7 +18,7 @@ from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.planning import plan
-from sonarsynth.ranging import Peaks, SensorDelays
+from sonarsynth.ranging import BeamAxis, FirstEcho, Peaks, SensorDelays
 from sonarsynth.ranging.location.triggered import Triggered
 from sonarsynth.ranging.picking.peak_kernels import local_maxima, over_lobes
 from sonarsynth.ranging.picking.peak_picking import LOBE_STEPS, _lobes
@@ -65,27 +65,40 @@ def spherical(r, azimuth, elevation):
     return tuple(r * direction(np.array([azimuth]), np.array([elevation]))[0])
 
 
+COLUMN = tuple((0.3, 0.3, z) for z in np.arange(-0.1, 0.11, 0.0125))
+
+
+def planned_before(places, picking):
+    """A point 40 m ahead of hydrophones at these places, in beams 1 degree apart."""
+    told = Triggered(time_error=1e-9, position_error=1e-6)
+    grid = BeamGrid(azimuth_span=np.deg2rad(20), azimuths=21, elevation_span=np.deg2rad(20), elevations=21)
+    recipe = point_scene((40.0, 3.0, -47.0), (10.0, 3.0, -55.0), array=PositionTable(positions=places), beams=grid)
+    world, processing = recipe.scene.world, replace(recipe.scene.processing, locating=told, picking=picking)
+    world = replace(world, environment=replace(world.environment, noise=FlatNoise(level=20.0)))
+    return plan(replace(recipe, scene=replace(recipe.scene, world=world, processing=processing)))
+
+
 @pytest.mark.parametrize(
     ("places", "lacks"),
     [
         (((0.0, 0.3, 0.2),), "one hydrophone tells no azimuth and no elevation"),
-        (
-            tuple((0.3, 0.3, z) for z in np.arange(-0.1, 0.11, 0.0125)),
-            "17 hydrophones, of no extent there, tell no azi",
-        ),
+        (COLUMN, "17 hydrophones, of no extent there, tell no azi"),
     ],
 )
 def test_an_echo_without_a_direction_is_one_point_and_the_plan_says_so(places, lacks):
     """Wherever the hydrophones are: of those beside the middle of the array beams heard it sooner or later, as 78."""
-    told = Triggered(time_error=1e-9, position_error=1e-6)
-    grid = BeamGrid(azimuth_span=np.deg2rad(20), azimuths=21, elevation_span=np.deg2rad(20), elevations=21)
-    recipe = point_scene((40.0, 3.0, -47.0), (10.0, 3.0, -55.0), array=PositionTable(positions=places), beams=grid)
-    world, processing = recipe.scene.world, replace(recipe.scene.processing, locating=told)
-    world = replace(world, environment=replace(world.environment, noise=FlatNoise(level=20.0)))
-    planned = plan(replace(recipe, scene=replace(recipe.scene, world=world, processing=processing)))
+    planned = planned_before(places, Peaks())
     cloud = render(planned, 0)["cloud"]
     assert int(cloud["count"]) == 1 and float(cloud["azimuth_error"][0]) > 90.0
     assert any(line.startswith(lacks) for line in planned.warnings)
+
+
+@pytest.mark.parametrize("picking", [BeamAxis(), FirstEcho()])
+def test_points_on_axes_of_beams_err_by_any_angle_that_no_hydrophone_tells(picking):
+    """A column of hydrophones tells no azimuth, which was predicted as well as the elevation."""
+    cloud = render(planned_before(COLUMN, picking), 0)["cloud"].dataset
+    own = cloud.isel(point=slice(int(cloud["count"])))
+    assert own["azimuth_error"].min() > 90.0 and own["elevation_error"].max() < 10.0
 
 
 @pytest.mark.parametrize("step", [0.25, 0.5, 0.75])
@@ -97,6 +110,18 @@ def test_a_point_is_where_it_is_finer_than_the_grid(azimuth, elevation, r, step)
     assert abs(cloud.azimuth[0] - azimuth) < 2.5e-4
     assert abs(cloud.elevation[0] - elevation) < 2.5e-4
     assert abs(cloud.range[0] - r) < 2e-3
+
+
+@pytest.mark.parametrize("picking", [Peaks(), BeamAxis()])
+def test_beams_apart_by_more_than_their_width_predict_it(picking):
+    """3 degrees, where beams are 1.3 wide: nothing tells where between two of them an echo is."""
+    ratios = []
+    for azimuth, elevation in np.random.default_rng(2).uniform(-0.15, 0.15, (12, 2)):
+        cloud = points((spherical(20.0, azimuth, elevation),), instrument=sonar(3.0), picking=picking)
+        for top in np.argsort(cloud.energy)[-1:]:
+            ratios.append((cloud.azimuth[top] - azimuth) / cloud.azimuth_error[top])
+            ratios.append((cloud.elevation[top] - elevation) / cloud.elevation_error[top])
+    assert len(ratios) > 10 and 0.3 < np.std(ratios) < 1.5 and np.abs(ratios).max() < 3.5
 
 
 def test_a_slope_at_the_rim_of_the_beams_looked_at_is_no_peak():

@@ -106,7 +106,8 @@ WRONG = [
         "scene.processing.echo_window: a frame would take",
     ),
     ("position: [12, 8]", "position: [1e9, 1]", "11: scene.world.sources.0.position: is more than 1e+06 m"),
-    ("depth: 12 m", "depth: 120 km", "5: scene.world.environment.depth: must be less than or equal to 12000"),
+    ("depth: 12 m", "depth: 120 km", f"5: {WATER}.depth: must be less than or equal to 12 km, not '120 km'"),
+    ("azimuth_span: 30 deg", "azimuth_span: 180 deg", "azimuth_span: must be less than 180 deg, not '180 deg'"),
     (
         "kind: isovelocity, speed: 1540",
         "kind: temperature_salinity, depth: [0], temperature: [900], salinity: [35]",

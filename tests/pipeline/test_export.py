@@ -1,16 +1,18 @@
 """Clouds of many frames in one frame of reference, and files of them for other programs."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import sonarsynth as ss
 from sonarsynth import schedule
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.description import FieldError
-from sonarsynth.export import write_points
+from sonarsynth.export import fused_points, write_points
 from sonarsynth.geometry import Pose
 from sonarsynth.recipe.reading import load, loads
 from tests.scenes import SWIMMING
@@ -52,6 +54,26 @@ def test_points_of_a_moving_hull_fall_together_on_it(crossing: Path) -> None:
     assert np.abs(place[:, 0]).max() < 0.9 and np.abs(place[:, 1:]).max() < 0.2
     world = ss.points(crossing, relative_to="world")["position"].values[own]
     assert np.ptp(world[:, 1]) > 5.0 > 3.0 * np.ptp(place[:, 0]), "it crossed 9 m of water"
+
+
+def test_only_built_frames_are_read_for_points(crossing: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 20 000 frames with 8 built, points took over ten minutes."""
+    read, one = [], fused_points._frame
+
+    def watched(tree: xr.DataTree, index: int, *rest: Any) -> dict[str, np.ndarray]:
+        read.append(index)
+        return one(tree, index, *rest)
+
+    monkeypatch.setattr(fused_points, "_frame", watched)
+    assert ss.points(crossing).identical(ss.points(crossing, range(64)))
+    assert read == [0, 16, 32, 40, 63, *range(64)]
+
+
+@pytest.mark.parametrize(("number", "error"), [(-1, IndexError), (64, IndexError), (0.5, TypeError)])
+def test_points_of_a_frame_that_is_none_are_refused(crossing: Path, number: int, error: type[Exception]) -> None:
+    """-1 gave the points of the last frame as of frame -1, and 0.5 those of frame 0."""
+    with pytest.raises(error):
+        ss.points(crossing, [number])
 
 
 def test_points_are_on_hulls_that_move_and_turn_before_a_sonar_that_does(tmp_path: Path) -> None:

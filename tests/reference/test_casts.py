@@ -173,6 +173,10 @@ BAD = {
     "fahrenheit": ("depth,temperature,salinity\n1,68,35\n", "-5 and 50 degC (20 degC if it is in degrees Fahrenheit)"),
     "height": (HEAD + "-1,1500,9,35\n", "line 2, column 'depth': -1 m is not a depth between 0"),
     "unit": ("depth (fathoms),c\n1,1500\n", "line 1, column 'depth (fathoms)': unit 'fathoms' is not one of m, ft"),
+    "decimal commas": (
+        "depth,temperature,salinity\n0,5,20,1,35,0\n5,0,19,9,35,1\n",
+        "line 1: 3 column names, but rows of 6 numbers: are these decimal commas?",
+    ),
     "no depth": ("c,temperature\n1500,9\n", "line 1: no column of depth or pressure among 'c', 'temperature'"),
     "no speed": ("depth,salinity\n1,35\n", "line 1: no columns of sound speed, or of temperature and salinity"),
 }

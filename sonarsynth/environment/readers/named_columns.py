@@ -30,6 +30,8 @@ MVP_ROWS: Final = 4
 MARKS: Final = re.compile(r"^\s*(?:[%#*;/!]+|columns\s*=)\s*", re.IGNORECASE)
 UNIT_MARKS: Final = re.compile(r"^\s*(?:[%#*;/!]+|units\s*=)", re.IGNORECASE)
 
+WHOLE: Final = re.compile(r"\s*[-+]?\d+\s*$")
+
 Splitter = Callable[[str], list[str]]
 
 
@@ -104,7 +106,7 @@ def read_named_columns(path: Path, text: str) -> CastTable:
             rows.append([*cells, *[""] * (needed - len(cells))])
             numbers.append(number)
             widths.append(len(cells))
-    _check_widths(path, header, widths)
+    _check_widths(path, header, rows, widths)
     comma = header.separator in ";\t" and any("," in row[i] for row in rows for i, _ in columns.values())
     make = _make(lines[: header.first])
     rows, numbers = (rows[MVP_ROWS:], numbers[MVP_ROWS:]) if make == "MVP" else (rows, numbers)
@@ -125,12 +127,16 @@ def read_named_columns(path: Path, text: str) -> CastTable:
     )
 
 
-def _check_widths(path: Path, header: _Header, widths: list[int]) -> None:
-    """Refuses rows with fewer numbers than there are names, where a name of two words ('Sound Speed') may be two."""
-    few = [width for width in widths if width < len(header.names)]
+def _check_widths(path: Path, header: _Header, rows: list[list[str]], widths: list[int]) -> None:
+    """Refuses rows of numbers that are not those of the names: fewer, where a name of two words ('Sound Speed') may be
+    two, or twice as many whole ones between commas, where a comma in each is the decimal one."""
+    names, line = len(header.names), f"{path}, line {header.index + 1}"
+    few = [width for width in widths if width < names]
     if header.separator in ("words", "columns", "dashes") and 2 * len(few) > len(widths):
-        line = f"{path}, line {header.index + 1}"
-        raise CastError(f"{line}: {len(header.names)} column names, but rows of {few[0]} numbers")
+        raise CastError(f"{line}: {names} column names, but rows of {few[0]} numbers")
+    halves = sum(width == 2 * names and all(map(WHOLE.match, row)) for row, width in zip(rows, widths, strict=True))
+    if header.separator == "," and 2 * halves > len(widths):
+        raise CastError(f"{line}: {names} column names, but rows of {2 * names} numbers: are these decimal commas?")
 
 
 def _header(path: Path, lines: list[str]) -> _Header:

@@ -14,6 +14,7 @@ from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
+from sonarsynth.ranging.picking.peak_picking import Axes
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
 from sonarsynth.ranging.range_profiles import OVERSAMPLING, Profiles, loudest_beams, over_threshold, range_profiles
 from sonarsynth.ranging.received_window import ReceivedWindow
@@ -34,7 +35,7 @@ class AxisEchoes:
 
     delay: Floats  # (beam,) s after the direct arrival
     delay_error: Floats  # (beam,) s
-    angle_error: Floats  # (beam,) rad: how far from the beam the echo may come from
+    angle_error: Floats  # (beam,) rad: how far from the beam the echo may come from, along axes that tell directions
     snr: Floats  # (beam,) dB
 
 
@@ -53,12 +54,14 @@ def axis_echoes(
     echoes = change(profiles, pick(profiles, window.image, locality))
     own = np.isfinite(echoes.delay)
     row, column = profiles.row[own], profiles.column[own]
-    angle = echoes.angle_error[own]
+    axes = Axes.of(window, profiles)
+    angle = np.maximum(echoes.angle_error[own, None], axes.step[:2] / np.sqrt(12.0))  # anywhere in the cell of a beam
+    angle = np.where(axes.resolved[:2], angle, axes.unresolved_error[:2])
     return PickedEchoes(
         azimuth=window.image.azimuth[column],
         elevation=window.image.elevation[row],
-        azimuth_error=angle / np.maximum(np.cos(window.image.elevation[row]), 0.1),
-        elevation_error=angle,
+        azimuth_error=angle[:, 1] / np.maximum(np.cos(window.image.elevation[row]), 0.1),
+        elevation_error=angle[:, 0],
         delay=echoes.delay[own],
         delay_error=echoes.delay_error[own],
         energy=window.image.energy[row, column],
