@@ -76,7 +76,7 @@ def offsets(c: Floats, first: int, last: int, fastest: float, d: Floats) -> None
         d[i] = (fastest - c[i]) * (fastest + c[i])
 
 
-@compiled(fastmath={"reassoc", "nsz"}, forceinline=True, borrows=True)
+@compiled(borrows=True)
 def sweep(
     s_m: float, p: float, d: Floats, k: Floats, first: int, last: int, turn_up: float, turn_down: float
 ) -> tuple[float, float]:
@@ -161,7 +161,7 @@ def bounds(
     return full1 + turn1, full2 + turn2, full2 + turn1, full1 + turn2, slopes[0], slopes[1]
 
 
-@compiled(fastmath={"reassoc", "nsz"}, forceinline=True, borrows=True)
+@compiled(borrows=True)
 def time_and_length(
     s_m: float, p: float, c: Floats, d: Floats, dz: Floats, crossings: Floats, first: int, last: int,
     turn_up: float, turn_down: float,
