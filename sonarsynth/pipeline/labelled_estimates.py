@@ -24,7 +24,7 @@ def heard_directly(plan: Plan, arrivals: Arrivals, snaps: tuple[Emission, ...]) 
     return direct_paths(arrivals, lambda snap, *way: _envelope(plan, snaps[snap].waveform, *way))
 
 
-@lru_cache(maxsize=64)  # a snap that rests sounds alike in every frame
+@lru_cache(maxsize=16)  # a snap that rests sounds alike in every frame
 def _envelope(plan: Plan, waveform: Waveform, absorption: float, doppler: float) -> float:
     """As the `envelope` of `direct_paths`, of a pulse."""
     sonar = plan.scene.sonar

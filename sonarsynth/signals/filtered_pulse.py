@@ -283,7 +283,7 @@ def snap_gains(emissions: tuple[Emission, ...]) -> Floats:
     )
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def envelope_delay(
     waveform: Waveform, sonar: Sonar, loss: Callable[[Floats], Floats] | None = None, doppler: float = 0.0
 ) -> float:
