@@ -241,7 +241,7 @@ def _first_wave(
         wave = robust_wave(start + delay, q, c, loud, steps=FIRST_STEPS, rounds=ROBUST_ROUNDS, settled=settled)
         if wave is not None:
             late = np.sort(np.abs(wave.residual[live]))
-            off = 1.4826 * float(late[len(late) // 2]) * (4.0 / len(late)) ** 0.5
+            off = 0.7413 * float(late[(len(late) - 1) // 2] + late[len(late) // 2]) * (4.0 / len(late)) ** 0.5
             if len(q) == elements.count or off < 0.01 / sonar.band.centre:
                 break
     else:

@@ -176,7 +176,7 @@ class _FacetInterpolant:
         values = row_products(cubics, self.coefficients)
         known = {name: values[:, columns] for name, columns in self.columns.items()}
         if "departure" in known:
-            known["departure"] = known["departure"].reshape(len(point), -1, 3)
+            known["departure"] = known["departure"].reshape(len(point), known["departure"].shape[1] // 3, 3)
         return known | {"error": np.full(len(point), self.error)}
 
 
