@@ -12,6 +12,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
@@ -39,7 +40,9 @@ def _start() -> None:
         command = [sys.executable, "-P", "-m", __name__, str(part), str(others)]
         with suppress(OSError):
             quiet = subprocess.DEVNULL
-            atexit.register(subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet).kill)
+            other = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
+            atexit.register(other.kill)
+            threading.Thread(target=other.wait, daemon=True).start()  # ended, it would stay among the processes
 
 
 def spelled(kernel: tuple[str, str, tuple[Any, ...]]) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from sonarsynth import compiling, compiling_ahead
+from tests.waiting import wait_until
 from tools.listed_kernels import called
 
 KERNELS = """
@@ -71,12 +72,16 @@ def test_a_kernel_that_was_compiled_ahead_is_kept_for_who_calls_it(tmp_path: Pat
 
 def test_other_cores_are_used_where_there_are_some(monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[list[str]] = []
+    ended: list[object] = []
 
     class Started:
         def __init__(self, command: list[str], **_: object) -> None:
             started.append(command[-2:])
 
         def kill(self) -> None: ...
+
+        def wait(self) -> None:
+            ended.append(self)
 
     monkeypatch.setattr(compiling_ahead.subprocess, "Popen", Started)
     monkeypatch.setattr(compiling, "when_first_missed", [])
@@ -87,4 +92,6 @@ def test_other_cores_are_used_where_there_are_some(monkeypatch: pytest.MonkeyPat
         assert len(compiling.when_first_missed) == 1
         compiling.when_first_missed.pop()()
         assert started == parts
+        wait_until(lambda: len(ended) == len(started))  # else it would be left among the processes
         started.clear()
+        ended.clear()
