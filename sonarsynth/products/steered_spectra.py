@@ -81,11 +81,11 @@ class BeamSpectra:
     spectra: Callable[[Floats], npt.NDArray[np.complex64]]
     """Spectra (beam, bin) in Pa of beams in directions (beam, xyz), sonar frame, of which echoes are picked: a plane
     wave from there gives its own. The array is new each time, and its user's to change."""
-    others: Callable[[Snapshots], BeamSpectra] | None = None
+    of_snapshots: Callable[[Snapshots], BeamSpectra] | None = None
     """The same of other snapshots of the window, where beams of a bin are made of that bin alone."""
 
     def without_silence(self, margin: float) -> BeamSpectra:
         """Beams of the part of the window that has sound, as `Snapshots.without_silence`; all, where that is not known
         to have the same echoes."""
-        part = self.snapshots.without_silence(margin) if self.others else self.snapshots
-        return self.others(part) if self.others and part is not self.snapshots else self
+        part = self.snapshots.without_silence(margin) if self.of_snapshots else self.snapshots
+        return self.of_snapshots(part) if self.of_snapshots and part is not self.snapshots else self

@@ -23,7 +23,7 @@ from sonarsynth.propagation.images import family
 from sonarsynth.propagation.reflections import Reflections, reflections
 from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Medium, Receiver
-from sonarsynth.tracing.occlusion.ray_cones import layers_that_bend
+from sonarsynth.tracing.occlusion.ray_cones import layer_curvatures
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
@@ -241,7 +241,7 @@ def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Me
     over their distance, so somewhere they have that slope or less, and by Snell's law their cosine is nowhere less than
     there times the ratio of the extreme sound speeds.
     """
-    bend = 0.0 if bounces or medium.profile.uniform else float(layers_that_bend(medium.profile)[1].max())
+    bend = 0.0 if bounces or medium.profile.uniform else float(layer_curvatures(medium.profile)[1].max())
     farthest = np.sqrt(((facets.point - position) ** 2).sum(axis=1).max(initial=0.0)) if bend else 0.0
     if not bounces and bend * farthest < 0.6:
         every, bow = np.arange(len(facets.facet)), 0.5 * bend * farthest**2

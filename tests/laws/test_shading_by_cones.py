@@ -21,7 +21,7 @@ from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
 from sonarsynth.tracing.facet_paths import bending
-from sonarsynth.tracing.occlusion.ray_cones import SAGITTA_TOLERANCE, chords, hidden, layers_that_bend, spheres
+from sonarsynth.tracing.occlusion.ray_cones import SAGITTA_TOLERANCE, chords, hidden, layer_curvatures, spheres
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion, cells, rim
 from sonarsynth.tracing.receive_paths import ReceivePaths, facets_of, receive_paths
 
@@ -193,7 +193,7 @@ def test_rays_are_hidden_where_their_chords_meet_a_body(water: Profile) -> None:
 def cones_of(profile: Profile, legs: ReceivePaths, clear: Floats) -> tuple[Floats, Floats]:
     """Slopes and reach (leg,) of the cones of rays among some bodies."""
     ray = clear, np.broadcast_to(SONAR.position, clear.shape), legs.departure, legs.length, np.zeros(len(clear))
-    limits = layers_that_bend(profile), SAGITTA_TOLERANCE, BOTTOM_DEPTH
+    limits = layer_curvatures(profile), SAGITTA_TOLERANCE, BOTTOM_DEPTH
     slope, reach, _ = ray_cones(*ray, legs.bounces, legs.turning, *limits, *spheres(some_bodies(1)))
     return slope, reach
 

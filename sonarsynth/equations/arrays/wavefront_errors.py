@@ -18,17 +18,19 @@ def source_place(
 ) -> tuple[Floats, Floats, Floats]:
     """Place (xyz) of the source of a wave, its covariance, and its change (xyz) per m/s of the assumed sound speed.
 
-    tangents (2, xyz); covariance (3, 3) and by_speed (3,) of (along tangents, curvature). NaN of NaN curvature (1/m).
+    direction (xyz) and tangents (2, xyz) of length one; curvature, 1/m: one over its distance; covariance (3, 3) and
+    by_speed (3,) of (angles along tangents, rad, curvature, 1/m). NaN where the curvature is.
     """
     k = curvature
     jacobian = np.stack([tangents[0] / k, tangents[1] / k, -direction / k**2], axis=1)
     return direction / k, jacobian @ covariance @ jacobian.T, jacobian @ by_speed
 
 
-def bias_covariance(wave: Wavefront, left: Wavefront) -> Floats:
-    """Covariance (4, 4) of the parameters of a wave that is off by what is between it and the wave that is left."""
-    turned = wave.tangents @ (wave.direction - left.direction)
-    bias = np.array([*turned, wave.curvature - left.curvature, wave.time - left.time])
+def bias_covariance(wave: Wavefront, true: Wavefront) -> Floats:
+    """Covariance (4, 4) of a wave's two angles (rad), curvature (1/m) and time (s) where it is off by what is between
+    it and the true one."""
+    turned = wave.tangents @ (wave.direction - true.direction)
+    bias = np.array([*turned, wave.curvature - true.curvature, wave.time - true.time])
     return np.outer(bias, bias)
 
 

@@ -163,7 +163,7 @@ def _placed(
             break
         straight = _refit(pulse, wave, elements, c, extra)
         if not bend.undone:
-            return place(wave, pulse, knowledge, left=straight)
+            return place(wave, pulse, knowledge, unbent=straight)
         row = place(replace(straight, by_sound_speed=np.zeros(4)), pulse, replace(knowledge, gradient=0.0), bent)
     return row
 

@@ -112,16 +112,17 @@ def place(
     pulse: Pulse,
     knowledge: SonarKnowledge,
     bent: Wavefront | None = None,
-    left: Wavefront | None = None,
+    unbent: Wavefront | None = None,
 ) -> SourceFix:
     """Ranges and position from a wavefront, and the depth of the bottom where it agrees; errors through the Jacobians.
 
     bent: the wave as the array hears it, where `wave` is the straight one that is left without bending. The direction
-    is always that of the wave as heard. left: the straight one, where `wave` is as heard: it is off by what is between.
+    is always that of the wave as heard. unbent: the straight one, where `wave` is as heard, which is off by the rest.
     """
     elements, sonar, pose = knowledge.elements, knowledge.sonar, knowledge.pose
     bent = bent or wave
-    timing = lag_variance(left or wave, pulse, elements, knowledge.rounding, half_length(sonar.band)) * wave.covariance
+    variance = lag_variance(unbent or wave, pulse, elements, knowledge.rounding, half_length(sonar.band))
+    timing = variance * wave.covariance
     fall = -knowledge.bottom_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
     slope, by_angle = float(pose.rotation[2] @ wave.direction), wave.tangents @ pose.rotation[2]
     from_depth = fall / slope if slope * fall > 0 else np.nan
@@ -131,7 +132,7 @@ def place(
     from_pole = float(np.hypot(*bent.direction[:2]))  # its azimuth is anybody's guess where it may be beyond
     beyond = 0.5 * math.erfc(from_pole / max(np.sqrt(2.0 * spread[1, 1]), 1e-300))
     around = min(spread[0, 0] / max(from_pole**2, 1e-300) + np.pi**2 * beyond, np.pi**2)
-    full, fix = _bent(wave, full, from_depth, fall, knowledge, left)
+    full, fix = _bent(wave, full, from_depth, fall, knowledge, unbent)
     with np.errstate(divide="ignore", invalid="ignore"):
         depth_error = np.hypot(from_depth * np.sqrt(by_angle @ full[:2, :2] @ by_angle), sonar.bed_depth_error)
         from_curvature = 1 / wave.curvature if wave.curvature > 0 else np.nan
@@ -190,11 +191,12 @@ def _straight_covariance(
 
 
 def _bent(
-    wave: Wavefront, straight: Floats, from_depth: float, fall: float, knowledge: SonarKnowledge, left: Wavefront | None
-) -> tuple[Floats, Fix]:
+    wave: Wavefront, straight: Floats, from_depth: float, fall: float, knowledge: SonarKnowledge,
+    unbent: Wavefront | None,
+) -> tuple[Floats, Fix]:  # fmt: skip
     """The covariance (4, 4) of a wavefront along straight rays with what bending adds to it, and the fix by that."""
-    if left is not None:
-        full = straight + bias_covariance(wave, left)
+    if unbent is not None:
+        full = straight + bias_covariance(wave, unbent)
         return full, _fuse(wave, full, fall, knowledge)
     full, fix, up = straight, _fuse(wave, straight, fall, knowledge), knowledge.pose.rotation[2]
     c, aperture = knowledge.sonar.assumed_sound_speed, knowledge.elements.aperture

@@ -59,7 +59,7 @@ def classify_rays(
     Arguments as of `hidden`, for the rays to the middle; those beside them, unfolded, end within `spread` of them and
     leave as straight rays to there would.
     """
-    limits = layers_that_bend(medium.profile), SAGITTA_TOLERANCE, medium.depth
+    limits = layer_curvatures(medium.profile), SAGITTA_TOLERANCE, medium.depth
     cones = folded_rays.ray_cones(start, end, departure, length, spread, bounces, turning, *limits, *spheres(bodies))
     verdict, sure = np.full(len(start), NO_CONE), picked(np.isfinite(cones[0]))
     slope, reach, far = (column[sure] for column in cones)
@@ -91,7 +91,7 @@ def overlapping(bodies: tuple[PlacedTarget, ...]) -> list[tuple[int, tuple[Place
 
 
 @lru_cache(maxsize=64)
-def layers_that_bend(profile: Profile) -> tuple[Floats, Floats]:
+def layer_curvatures(profile: Profile) -> tuple[Floats, Floats]:
     """Depths of the nodes (node,) m of a profile, and the largest curvature of rays in each layer (node - 1,) 1/m."""
     with np.errstate(divide="ignore", invalid="ignore"):
         gradient = np.abs(np.diff(profile.speed)) / np.diff(profile.depth)
