@@ -128,8 +128,13 @@ def _wanted(path: Path, line: int, names: list[str]) -> dict[str, tuple[int, flo
     shown = ", ".join(f"'{name.strip()[:30]}'" for name in names[:12])
     if "time" not in columns:
         raise TrackError(f"{path}, line {line}: no column of time among {shown}")
-    if not ({"x", "y"} <= set(columns) or {"latitude", "longitude"} <= set(columns)):
+    placing = [pair for pair in (("x", "y"), ("latitude", "longitude")) if set(pair) <= set(columns)]
+    if not placing:
         raise TrackError(f"{path}, line {line}: no columns of x and y, or of latitude and longitude, among {shown}")
+    if len(placing) > 1:  # their origins are not in the file: which one is meant cannot be told
+        x, y, latitude, longitude = (f"'{names[columns[name][0]].strip()[:30]}'" for pair in placing for name in pair)
+        both = f"{x} and {y} and also {latitude} and {longitude}"
+        raise TrackError(f"{path}, line {line}: is placed by {both}: leave out one pair")
     return columns
 
 

@@ -47,7 +47,7 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     when = hearing(context, met, there, snap_level)
     heard = as_heard(bodies, when)
     appearances = [appearance(body, heard, sonar_pose, bent) for body in heard]
-    seen = [(a.corners, b.mesh.faces, a.boxes, a.full_box) for b, a in zip(heard, appearances, strict=True)]
+    seen = [(a.corners, a.faces, a.boxes, a.full_box) for a in appearances]
     nearest = beam_views(seen, beams)
     way, turn = mean_motion(sonar_track, when)
     lit = [
@@ -66,7 +66,7 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
         position_at_echo=_where(met, [b.pose.position for placed in there for b in placed], 3),
         orientation_at_echo=_where(met, [b.pose.orientation for placed in there for b in placed], 4),
         **_oriented(heard, sonar_pose),
-        **_boxes(heard, appearances, sonar_pose, beams),
+        **_boxes(appearances, beams),
         visible_fraction=np.array([a.fraction for a in appearances]),
         lit_fraction=np.array(lit, float).reshape(len(context.snaps), len(bodies)),
         snap_position=_rows([s.position for s in context.snaps], 3),
@@ -91,21 +91,18 @@ def _oriented(bodies: tuple[PlacedTarget, ...], sonar_pose: Pose) -> dict[str, A
     }
 
 
-def _boxes(
-    bodies: tuple[PlacedTarget, ...], appearances: list[Appearance], sonar_pose: Pose, beams: BeamGrid
-) -> dict[str, Any]:
+def _boxes(appearances: list[Appearance], beams: BeamGrid) -> dict[str, Any]:
     """Columns of `Truth` of boxes in azimuth and elevation, of what is in view of bodies as they are seen."""
     views, straight, truncated, in_view = [], [], [], []
-    for body, apparent in zip(bodies, appearances, strict=True):
-        faces, boxes = (rows_of(column, apparent.visible) for column in (body.mesh.faces, apparent.boxes))
+    for apparent in appearances:
+        faces, boxes = (rows_of(column, apparent.visible) for column in (apparent.faces, apparent.boxes))
         box = box_in_view(apparent.corners, faces, beams, boxes)
         views.append(box)
         truncated.append(truncation(apparent.corners, faces, box.view, beams))
-        true = sonar_pose.to_body(body.pose.to_world(body.mesh.vertices)) if apparent.bent else apparent.corners
-        straight.append(box_in_view(true, faces, beams).bounds if apparent.bent else box.bounds)
+        straight.append(box_in_view(apparent.places, faces, beams).bounds if apparent.bent else box.bounds)
         within = box.view <= View.PARTLY_IN_VIEW
         if not within:  # what no ray or another body hides may be in view all the same
-            within = box_in_view(apparent.corners, body.mesh.faces, beams, apparent.boxes).view <= View.PARTLY_IN_VIEW
+            within = box_in_view(apparent.corners, apparent.faces, beams, apparent.boxes).view <= View.PARTLY_IN_VIEW
         in_view.append(within)
     return {
         "image_box": _rows([box.bounds for box in views], 4),

@@ -42,7 +42,8 @@ def point_cloud(
     source, velocity, spin = window.estimates.position[0], np.zeros(3), np.zeros(3)
     if track is not None and not track.still:
         middle = 0.5 * float(np.mean(echoes.delay)) if len(echoes.delay) else 0.0
-        velocity, spin = track.later(float(window.estimates.time[0]) + middle).in_own_frame
+        clock = float(window.estimates.time[0])
+        sonar_pose, (velocity, spin) = track.later(clock).pose, track.later(clock + middle).in_own_frame
         echoes = _at_true_directions(echoes, velocity, window)
     beam = direction(echoes.azimuth, echoes.elevation)
     solution = placing.place(echoes.delay, beam, source, window.sonar, sonar_pose, profile)

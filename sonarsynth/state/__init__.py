@@ -99,6 +99,10 @@ class Receiver:
         """Hz: centre of the band."""
         return self.sonar.band.centre
 
+    def pose_at(self, time: float) -> Pose:
+        """Of the array, at a time (s) after the instant of the frame."""
+        return self.pose if self.track is None or self.track.still else self.track.later(time).pose
+
     def speed(self, medium: Medium) -> float:
         """Of sound at the middle of the array, m/s."""
         return float(medium.profile.at(depth(self.pose.position)))

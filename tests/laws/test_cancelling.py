@@ -11,6 +11,7 @@ from sonarsynth.conventions import direction
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.motion import Track
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.pipeline import beamform_frame, trace_frame
 from sonarsynth.planning import plan
@@ -247,6 +248,20 @@ def test_image_sources_are_as_far_as_the_rays_are_long():
     by_rays = sorted(zip(rays.surface[bounced], rays.bottom[bounced], rays.length[bounced], strict=True))
     by_images = sorted((s, b, np.linalg.norm(p)) for s, b, p in found)
     assert np.allclose(by_images, by_rays, rtol=1e-12)
+
+
+def test_reflections_are_looked_for_from_where_the_array_is_when_it_hears_the_snap():
+    """Of a sonar that dives, 0.5 s after the instant of the frame."""
+    late, window, snap = 0.5, (0.0112, 0.0225), np.array([14.0, -5.0, -2.0])
+    signals = with_arrival(direct(snap), image=snap + [0.0, 0.0, 14.0])  # by the surface
+    signals = replace(signals, start=signals.start + late)
+    began = Track(Pose(POSE.position + [0.0, 0.0, 2.0 * late], POSE.orientation), np.array([0.0, 0.0, -2.0]))
+    receiver = Receiver(began.pose, ARRAY, SONAR, began)
+    estimates = SensorDelays(on_bottom=False).locate(signals, receiver, Survey(BOTTOM_DEPTH, WATER), 1)
+    inside = window[0] + late, window[1] + late
+    outcomes = cancel(signals, estimates, receiver, BOTTOM_DEPTH, inside, LIMITS).outcomes
+    taken = {(one.expected.surface, one.expected.bottom): one for one in outcomes if one.reason == CANCELLED}[1, 0]
+    assert np.allclose(taken.expected.front.direction, taken.found.direction, atol=2e-3)
 
 
 def test_the_image_is_made_without_it_and_the_signals_are_stored_with_it():

@@ -1,5 +1,5 @@
-"""Snaps louder than the full scale of the converter: plans forecast them; what is cut off moves their time, and
-predicted errors hold it."""
+"""Snaps louder than the full scale of a converter, and echoes fainter than its counts: plans forecast them; what is cut
+off moves the time of snaps, and predicted errors hold it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from sonarsynth import plan, render
+from sonarsynth.conventions import REFERENCE_PRESSURE
+from sonarsynth.environment.noise.flat_noise import FlatNoise
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.motion import Line
+from sonarsynth.planning.measured.converter_levels import peak
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.receiver import Converter, PlanarLattice, Sonar, elements
@@ -77,3 +80,23 @@ def test_a_plan_forecasts_the_frames_that_clip() -> None:
         for line in lines:
             assert f"in {clipping} of 3 frames" in line
             assert float(line.split("up to ")[1].split(" dB")[0]) == pytest.approx(excess, abs=0.08)
+
+
+def test_a_plan_says_which_echoes_the_converter_rounds_to_nothing() -> None:
+    """Under half a count, where images are empty; of a few counts; and nothing where they have many, or noise."""
+    recipe, environment = remus(1), remus(1).scene.world.environment
+    loudest = peak(plan(recipe), recipe.frame(0)[1], echoes=True)
+
+    def at(counts: float, noise: FlatNoise | None = None) -> Recipe:
+        converter = Converter(bits=16, full_scale=loudest / counts * 2**15)
+        world = replace(recipe.scene.world, environment=replace(environment, noise=noise))
+        scene = replace(recipe.scene, world=world, sonar=replace(recipe.scene.sonar, converter=converter))
+        return replace(recipe, scene=scene)
+
+    for counts, empty in ((0.49, True), (0.52, False)):
+        assert (float(render(at(counts), 0)["image/energy"].max()) == 0.0) is empty
+        (line,) = (line for line in plan(at(counts)).warnings if line.startswith("echoes peak at"))
+        assert ("nothing of them is recorded" in line) is empty and f"{counts:.2g} counts" in line
+    heard = FlatNoise(level=float(20.0 * np.log10(loudest / 0.49 / REFERENCE_PRESSURE) - 10.0 * np.log10(80e3)))
+    for recorded in (at(20.0), at(0.49, heard)):
+        assert not any(line.startswith("echoes peak at") for line in plan(recorded).warnings)

@@ -16,7 +16,7 @@ from sonarsynth.planning.measured.lost_echoes import losses
 from sonarsynth.products import SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
-from sonarsynth.receiver import BeamGrid, PlanarLattice, Sonar, elements
+from sonarsynth.receiver import BeamGrid, Converter, PlanarLattice, Sonar, elements
 from sonarsynth.recipe.scene import Processing
 from sonarsynth.state import Receiver, Survey
 from tests.heard import add_noise, cloud_of, hear, pulse_spectrum, silence
@@ -208,3 +208,18 @@ def test_the_plan_takes_the_direct_pulse_out_where_it_hides_echoes_and_says_what
     assert any(note.startswith("point: ") and "lost to the echo window in frame 0" in note for note in kept.warnings)
     far = plan(overlapped(clear))
     assert not far.windows.direct_removed and not any("lost" in note for note in far.warnings)
+
+
+def test_the_plan_counts_what_the_converter_leaves_of_the_direct_pulse():
+    """What is left of it falls by 6 dB a bit, to what is left without a converter; what it clips stays."""
+    ahead = overlapped((3.5, 0.2, -50.0))
+
+    def at(bits, full_scale=600.0):
+        sonar = replace(ahead.scene.sonar, converter=Converter(bits=bits, full_scale=full_scale))
+        return losses(plan(replace(ahead, scene=replace(ahead.scene, sonar=sonar))), 0)
+
+    exact, fine, few, fewest = losses(plan(ahead), 0), at(24), at(12), at(8)
+    assert fine.fall == pytest.approx(exact.fall, abs=0.1) and fine.below == pytest.approx(exact.below, abs=0.1)
+    assert few.fall - fewest.fall == pytest.approx(4 * 6.02, abs=4.0) and few.fall < exact.fall - 30
+    assert few.below - fewest.below == pytest.approx(4 * 6.02, abs=4.0)
+    assert at(24, 300.0).fall < 30

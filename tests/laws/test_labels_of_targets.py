@@ -247,6 +247,22 @@ def test_visible_and_lit_shares_are_those_of_rays_to_points_all_over_the_bodies(
             assert found.lit_fraction[m, n] == pytest.approx(area[seen & lit].sum() / area[seen].sum(), abs=0.01)
 
 
+@pytest.mark.parametrize("below", [0.0, 0.2])
+def test_of_a_body_that_reaches_into_a_shadow_of_bent_water_the_rest_is_seen_and_lit(below: float) -> None:
+    """Facets as large as the shadow too: the box ends at the ray that touches the surface (Snell's law), shares are of
+    facets by their middles. Of these 12 facets each has a corner in the shadow."""
+    water = Medium(Environment(depth=100.0, sound_speed=Tabulated(depth=(0.0, 100.0), speed=(1540.0, 1460.0))), SLOPED)
+    sonar = Pose(np.array([0.0, 0.0, -1.0]), quaternion(np.pi / 2))
+    box = mesh_of(Box(size=(1.0, 2.0, 2.0)))
+    body = PlacedTarget("body", box, Pose(np.array([120.0, 0.3, -1.11 - below]), quaternion(0.3)), np.zeros(3))
+    light = Emission(np.array([112.0, 0.0, -3.0]), 0.0, LogarithmicBubble(), None)
+    receiver = Receiver(sonar, elements(Romanis()), Sonar(beams=BEAMS))
+    found = label(FrameContext(0.0, (body,), (light,), water, receiver), Refracted(), np.zeros(1))
+    assert found.visible_fraction[0] >= 0.5 and found.lit_fraction[0, 0] == 1.0 and found.view[0] == View.IN_VIEW
+    grazing = np.arccos((1540.0 - 0.8) / 1540.0)
+    assert found.image_box[0, 3] == pytest.approx(grazing, abs=HUNDREDTH)
+
+
 def test_what_is_lit_of_a_sphere_far_off_is_a_lune() -> None:
     """1 - t/pi of what is seen, for an angle t between snap and array as the sphere has them."""
     there = np.array([20.0, 0.0, 0.0])

@@ -30,7 +30,7 @@ from sonarsynth.receiver import Elements, PlanarLattice, PositionTable, Romanis,
 from sonarsynth.signals import add_noise
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.signals.noise import lattice_noise
-from sonarsynth.signals.noise.drawing import draw
+from sonarsynth.signals.noise.drawing import coherence_error, draw
 
 C = 1540.0
 LEVEL = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -151,6 +151,22 @@ def test_what_is_drawn_is_gaussian_at_a_hydrophone_and_in_a_beam() -> None:
         assert np.mean(np.abs(one) ** 4) / power**2 == pytest.approx(2.0, abs=4.0 * np.sqrt(20.0 / f.size))
         assert abs(np.mean(one**2)) < 4.0 * power / np.sqrt(f.size)
         assert np.abs(one).max() ** 2 / power == pytest.approx(np.log(f.size), abs=5.0)  # of as many, the largest
+
+
+@pytest.mark.parametrize("side", [8, 16])
+def test_beams_of_many_sensors_scatter_in_few_plane_waves_as_a_plan_says(side: int) -> None:
+    """Of arrays that are no lattice: a beam hears one wave in as many as there are sensors half a wavelength apart."""
+    square = elements(PlanarLattice(columns=side, rows=side, pitch=0.5 * C / 75e3, face=0.0)).position
+    array = elements(PositionTable(positions=tuple(map(tuple, square.tolist()))))
+    method = coherence_error(IsotropicDirections(), array, TILTED, Sonar(), C)[1]
+    f, steered = np.full(600, 75e3), np.linspace(-0.6, 0.6, 7)
+    x = draw(IsotropicDirections(), array, TILTED, Sonar(), f, C, stream(3, "beams"))
+    scatter = []
+    for y, z in itertools.product(steered, steered):
+        energy = np.abs(np.exp(-2j * np.pi * 75e3 / C * (square[:, 1:] @ [y, z])) @ x) ** 2
+        scatter.append(np.std(energy) / np.mean(energy))
+    said = float(method.split("scatter ")[1].split(" times")[0])
+    assert said > 1.05 and np.sqrt(np.mean(np.square(scatter))) == pytest.approx(said, abs=0.03)
 
 
 def test_noise_of_one_direction_gives_the_beam_pattern_of_the_array() -> None:

@@ -146,6 +146,7 @@ def test_csv_and_gpx_of_one_way_are_one_motion(tmp_path):
         ("t,lat,lon,z\n0,1,0,-1\n1,5,0,-1\n", "km from its origin"),
         ("t,x,y,z\n0,1,2,-3\n1,5,1,2,-3\n", "line 3: has 5 values in 4 columns"),
         ("t,x,east [mm],y,z\n0,1,1,2,-3\n", "line 1: two columns of x, 'x' and 'east [mm]': leave out one"),
+        ("t,x,y,lat,lon,z\n0,1,2,1.2,103.8,-3\n", "by 'x' and 'y' and also 'lat' and 'lon': leave out one pair"),
         ("t,x (furlong),y,z\n0,1,2,-3\n", "line 1, column 'x (furlong)': unit 'furlong' is not one of m, km"),
         ("t,x,y,z\n0,1,2,-3\nsoon,2,2,-3\n", "'soon' is not a number or a date"),
         ("t,x,y,z\n0,1,2,-3\n1,1e300,2,-3\n", "is not finite, or too large"),

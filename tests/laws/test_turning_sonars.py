@@ -21,10 +21,12 @@ from sonarsynth.products import PointCloud
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.reading import loads
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals.filtered_pulse import snap_levels
 from sonarsynth.sources.shrimp import SnappingShrimp
 from tests.scenes import SWIMMING, point_scene
 
 SNAP, TARGET, C = (10.0, 3.0, -55.0), (16.0, 1.0, -51.0), 1500.0
+PLACE = "cloud/x", "cloud/y", "cloud/z"
 TURNS = Circle(centre=(0.0, -2.0, -50.0), radius=2.0, speed=-2.0, bearing=0.0)
 SWINGS = Hover(position=(0.0, 0.0, -50.0), heading=np.deg2rad(75), surge=1.0, yaw=np.deg2rad(20), period=4.0)
 SEEN = "box", "box_orientation", "yaw", "image_box", "true_image_box", "full_box", "beam_range", "lit_fraction"
@@ -116,6 +118,32 @@ def test_points_of_a_ball_that_moves_are_those_of_one_at_rest_where_sound_meets_
             off.append([found.range[n] - wanted.range[m], float(beside)])
     assert len(off) > 6
     assert (np.median(np.abs(off), axis=0) < 2e-3).all() and np.abs(np.median(off, axis=0)).max() < 1.5e-3
+
+
+def test_bent_rays_are_undone_from_where_a_sonar_is_when_it_hears_them() -> None:
+    """What a sonar that heaves has of a snap 0.3 s after the instant of a frame is what the next has of one at its
+    instant: snaps were 1.4 cm apart, points 1.7 cm in the median. What is left is of the signals."""
+    text = SWIMMING.replace("isovelocity, speed: 1530 m/s", "thermocline, mixed_depth: 6.5 m")
+    text = text.replace("surge: 1 m", "surge: 1 m, heave: 1 m")
+    text += "  processing: {placing: {kind: refracted}, locating: {kind: sensor_delays, refraction: true}}\n"
+    later = text.replace("-6], source", "-6], snap_times: [0.3 s], source")
+    wanted, found = ss.render(loads(text), 1), ss.render(loads(later), 0)
+    source, *place = (found[name].values - wanted[name].values for name in ("source_estimates/position", *PLACE))
+    assert np.abs(source).max() < 5e-4 and np.nanmedian(np.linalg.norm(place, axis=0)) < 6e-3
+
+
+def test_labels_are_as_the_snap_is_heard_that_is_loudest_at_the_array() -> None:
+    """And not of one that is louder, far off, and earlier: boxes of bodies that move were 0.3 s old."""
+    near = "{kind: snapping_shrimp, position: [12, -6], source_level: 188 dB}"
+    late = near.replace("source_level", "snap_times: [0.3 s], source_level")
+    far = "{kind: snapping_shrimp, position: [300, -6], source_level: 195 dB}"
+    alone, both = (loads(SWIMMING.replace(near, sources)) for sources in (late, f"{far}, {late}"))
+    wanted, found = (
+        label(context_of(made, made.frame(0)), made.propagation, np.array(snap_levels(made.frame(0).moment.snaps)))
+        for made in (plan(alone, ["truth"]), plan(both, ["truth"]))
+    )
+    for name in ("box", "image_box", "beam_range"):
+        np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), rtol=0, atol=1e-6, err_msg=name)
 
 
 @pytest.mark.parametrize("water", ["isovelocity, speed: 1530 m/s", "linear, surface_speed: 1530 m/s, gradient: -1"])

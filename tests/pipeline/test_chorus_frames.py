@@ -185,3 +185,19 @@ def test_a_sonar_that_moves_hears_all_snaps_up_to_the_end_of_a_long_record(monke
     every = frame_chorus(made, frame)
     assert found is not None and every is not None and len(found.delay) > 1000
     assert sorted(found.delay.tolist()) == sorted(every.delay.tolist())
+
+
+def test_plan_says_how_far_off_a_moving_sonar_hears_the_chorus() -> None:
+    """By the times at which two hydrophones that go on hear a snap 45 degrees off the axis."""
+    moves = "scene.trajectory.sonar={kind: line, start: [0, 0, -5], stop: [0, 30, -5], duration: 6 s, heading: 90 deg}"
+    recipe = reading.load(str(REMUS), [*SMALL, moves, "scene.world.chorus={density: 1e-4, reach: 100 m}"])
+    (row,) = (row for row in plan(recipe, ["signals"]).left_out if row.what == "Doppler in the chorus")
+    places, snap, speed = np.array([[0.0, 0.1], [0.0, -0.1]]), 1e3 * np.sqrt([0.5, 0.5]), np.array([0.0, 5.0])
+    heard = np.zeros(2)
+    for _ in range(9):
+        heard = np.linalg.norm(snap - places - heard[:, None] * speed, axis=1) / 1540.0
+    first = np.linalg.norm(snap - heard.mean() * speed)
+    true = np.arcsin((snap[1] - heard.mean() * speed[1]) / first)
+    off = np.rad2deg(np.arcsin(1540.0 * (heard[1] - heard[0]) / 0.2) - true)
+    said = float(row.bound.split("up to ")[1].split(" degrees")[0])
+    assert 0.5 * said < abs(off) < said

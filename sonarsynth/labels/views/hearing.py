@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -21,7 +22,8 @@ TINY = 1e-300
 
 
 class Hearing(NamedTuple):
-    """Of the loudest snap that lights targets, by direct paths; in the mean of the others where one has none."""
+    """Of the snap that lights targets and is loudest at the array, by direct paths; in the mean of the others where one
+    has none."""
 
     bodies: tuple[PlacedTarget, ...]  # where its sound meets them
     heard: Floats  # (target,) s: when the middle of the array hears that
@@ -40,7 +42,8 @@ def hearing(
     lights = [n for n in lights if np.isfinite(met[n]).any()]
     if track is None or not lights:
         return None
-    loudest = max(lights, key=lambda n: float(snap_level[n]))
+    away = [float(np.linalg.norm(snap.position - track.pose.position)) for snap in context.snaps]
+    loudest = max(lights, key=lambda n: float(snap_level[n]) - 20.0 * math.log10(max(away[n], TINY)))
     known = np.isfinite(met[loudest])
     times = np.where(known, met[loudest], np.nanmean(met[loudest]))
     bodies = there[loudest] if known.all() else met_at(context.bodies, times)

@@ -149,7 +149,9 @@ TARGETS = group_of(
         TARGET,
         "1",
         "share of the area facing the array that the array sees",
-        attributes=comment("whether it is in the view of the beams or not"),
+        attributes=comment(
+            "whether it is in the view of the beams or not; of whole facets, by rays from their middles"
+        ),
     ),
     row(
         "lit_fraction",
@@ -157,8 +159,8 @@ TARGETS = group_of(
         "1",
         "share of the area that the array sees that the direct sound of the emission meets",
         attributes=comment(
-            "facing the snap, and past all bodies, where its sound meets them; 0 of what is heard but lights nothing; "
-            "NaN where the target is hidden from the array"
+            "facing the snap, and past all bodies, where its sound meets them; whole facets, by rays to their middles; "
+            "0 of what is heard but lights nothing; NaN where the target is hidden from the array"
         ),
     ),
     row(

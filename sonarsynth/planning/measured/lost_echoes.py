@@ -20,6 +20,7 @@ from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.cancelling.direct_pulse import remove
 from sonarsynth.signals.auto_synthesis import DEFAULT_ERROR, deposit_for
+from sonarsynth.signals.electronics import convert
 from sonarsynth.signals.filtered_pulse import snap_levels
 
 NOTED = 1e-3
@@ -36,8 +37,8 @@ class EchoLosses:
 
     frame: int
     lost: dict[str, float]  # share of the energy of each target's echo that the image is without; NaN: no echo
-    fall: float  # dB by which the energy of the direct pulse falls
-    below: float  # dB: of the echoes over what is left of the direct pulse, in the echo window
+    fall: float  # dB by which the energy of the direct pulse falls, as the converter has it
+    below: float  # dB: of the echoes over what is left of the direct pulse and of its rounding, in the echo window
 
 
 def lost_echoes(plan: Plan) -> list[str]:
@@ -92,7 +93,9 @@ def losses(plan: Plan, index: int) -> EchoLosses | None:
     if not sent.sum() > 0:
         return None
     total = replace(direct, pressure=direct.pressure + sum(echo.pressure for echo in echoes))
-    estimates = locator(plan.scene).locate(total, receiver_of(plan, frame), survey_of(plan, frame), 1)
+    estimates = locator(plan.scene).locate(
+        convert(total, sonar.converter), receiver_of(plan, frame), survey_of(plan, frame), 1
+    )
     clock = float(estimates.time[0]) if np.isfinite(estimates.time[0]) else float(arrivals.delay[first])
     ends = ((clock + edge - start) * sonar.sampling_frequency for edge in (windows.echo_start, windows.echo_stop))
     window = slice(*(max(int(np.ceil(end)), 0) for end in ends))
@@ -103,8 +106,9 @@ def losses(plan: Plan, index: int) -> EchoLosses | None:
         imaged[target] = _energy((both - alone)[:, window])
     lost = np.where(sent > FAINTEST * sent.sum(), 1 - imaged / np.maximum(sent, 1e-300), np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
-        fall = 10 * float(np.log10(_energy(direct.pressure) / _energy(alone)))
-        below = 10 * float(np.log10(imaged.sum() / _energy(alone[:, window])))
+        left = _without(plan, convert(direct, sonar.converter), estimates)
+        fall = 10 * float(np.log10(_energy(direct.pressure) / _energy(left)))
+        below = 10 * float(np.log10(imaged.sum() / _energy(left[:, window])))
     names = [body.name for body in frame.moment.bodies]
     return EchoLosses(index, dict(zip(names, np.clip(lost, 0.0, 1.0).tolist(), strict=True)), fall, below)
 

@@ -120,6 +120,11 @@ def _background(plan: Plan, frame: Frame) -> list[Omission]:
         why = "level velocity and spin, of the time of the frame"
         what = "climb and acceleration of the sonar in reverberation and chorus"
         rows.append(Omission(what, why, f"places up to {off:.1g} m off in the first frame"))
+    mach = float(np.linalg.norm(sonar.velocity)) / float(plan.profile.speed.min())
+    if mach > 1e-9 and world.chorus is not None:
+        angle = f"directions within 45 degrees of the axis up to {np.rad2deg(mach):.2g} degrees off"
+        bound = f"{angle}, pulses {1e2 * mach:.2g} % too long or short"
+        rows.append(Omission("Doppler in the chorus", "the array is at rest while it hears a snap", bound))
     turned = float(np.rad2deg(np.linalg.norm(then.rotation - sonar.pose.rotation)) / np.sqrt(2.0))
     fields = [(noise.played, of) for noise in world.environment.noises if (of := noise.directions) is not None]
     waves = any(played or of.toward is not None for played, of in fields)

@@ -10,6 +10,7 @@ from sonarsynth.conventions import depth
 from sonarsynth.environment.sea import Profile
 from sonarsynth.environment.sound_speed import kink
 from sonarsynth.planning.choices import OF_BEAMS, OWN_VIEW
+from sonarsynth.planning.measured.converter_levels import converter_notes
 from sonarsynth.planning.measured.lost_echoes import lost_echoes
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.formula_validity import validity
@@ -17,8 +18,6 @@ from sonarsynth.planning.notes.motion_rows import stretch_notes
 from sonarsynth.planning.notes.population_notes import once, population_notes
 from sonarsynth.planning.notes.source_notes import (
     assumed_speed_notes,
-    clipping_notes,
-    coarse_counts,
     direction_notes,
     lobe_notes,
     off_the_bottom,
@@ -79,8 +78,8 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     if plan.products & OF_BEAMS:
         lines += view_notes(noted(looks)) + steering_notes(noted(looks))
         lines += stretch_notes(noted(looks), recipe.accuracy.range_m)
-    lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene) + clipping_notes(plan, looks)
-    lines += coarse_counts(scene) + out_of_band(scene)
+    lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene) + converter_notes(plan, looks)
+    lines += out_of_band(scene)
     if plan.sizes["emission"] and plan.products & OF_BEAMS:
         some = noted(looks)
         lines += unlocated(scene) or lobe_notes(some) + direction_notes(some) + assumed_speed_notes(some)

@@ -3,38 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.fft import irfft
 
-from sonarsynth.conventions import REFERENCE_PRESSURE, Floats, depth, evenly
+from sonarsynth.conventions import Floats
 from sonarsynth.description.method import Demand
-from sonarsynth.environment.noise import NoiseField
 from sonarsynth.equations.arrays.grating_lobes import loudest_lobe
-from sonarsynth.planning.measured.sampled_arrivals import behind_baffle, context_of, reception_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import extreme_waveforms
 from sonarsynth.ranging import LocatingMethod
 from sonarsynth.ranging.range_profiles import aperture_moments
 from sonarsynth.receiver import elements
-from sonarsynth.receiver.sensor_errors import drawn_errors
-from sonarsynth.recipe.scene import Frame, Scene
-from sonarsynth.signals import channel_errors
-from sonarsynth.signals.auto_synthesis import DEFAULT_ERROR, deposit_for
-from sonarsynth.signals.electronics import ElectronicNoise
+from sonarsynth.recipe.scene import Scene
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.isolated_paths import whole_spectrum
 from sonarsynth.sources import snap_pulses
-from sonarsynth.tracing.arrivals import trace
 
 OUT_OF_BAND = -20.0
 """Peak (dB) of a pulse in the band over that of all of it, under which a source is out of it; snaps have -7."""
-HEARD = 8
-"""Frames that are heard, at most, to see whether snaps clip."""
-DITHER = 0.5
-"""Root mean square of noise, in counts, from which on a converter adds noise and nothing else."""
 OFF = 3.0
 """A source this many standard errors of the bottom's depth above the bottom stands off it."""
 OFF_MIRROR = 1e-4
@@ -209,52 +197,3 @@ def steering_error(off_axis: Floats, approach: Floats) -> Floats:
     sound. Both of any shape, that of the result.
     """
     return np.asarray(np.arcsin(np.clip(np.sin(off_axis) / (1.0 + approach), -1.0, 1.0)) - off_axis)
-
-
-def clipping_notes(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
-    """In how many frames the snaps of the recipe exceed the full scale of the converter, and by how much at most."""
-    if plan.scene.sonar.converter is None or not plan.sizes["emission"]:
-        return []
-    frames = [frame for look in looks if look.real for frame in look.frames if frame.moment.snaps]
-    heard = [frames[n] for n in evenly(len(frames), HEARD)]
-    over = np.array([excess(plan.at(frame.index), frame) for frame in heard])
-    if not np.any(over > 0.0):
-        return []
-    return [
-        f"snaps clip in {np.count_nonzero(over > 0.0)} of {len(heard)} frames that were heard, by up to "
-        f"{over.max():.1f} dB: signals and levels are then too low (scene.sonar.converter.full_scale)"
-    ]
-
-
-def coarse_counts(scene: Scene) -> list[str]:
-    """Whether the converter's counts are too coarse for the noise: with less than half a count, rounding is no noise of
-    its own and takes most of it (Widrow & Kollar 2008, Quantization Noise)."""
-    sonar, noises = scene.sonar, list[NoiseField](scene.world.environment.noises)
-    noises += [ElectronicNoise(sonar.electronics)] if sonar.electronics is not None else []
-    if sonar.converter is None or not noises or scene.world.chorus is not None:
-        return []
-    f = np.linspace(sonar.band.low, sonar.band.high, 256)
-    rms = float(np.sqrt(np.trapezoid(sum(noise.density(f) for noise in noises), f)))
-    if rms >= DITHER * sonar.converter.quantum:
-        return []
-    levels = (20.0 * np.log10(p / REFERENCE_PRESSURE) for p in (rms, sonar.converter.quantum))
-    return [
-        "noise of {:.0f} dB re 1 uPa in the band is under half a count of the converter, {:.0f} dB: it is mostly "
-        "rounded to nothing, and faint echoes with it (scene.sonar.converter)".format(*levels)
-    ]
-
-
-def excess(plan: Plan, frame: Frame) -> float:
-    """Level (dB) of the largest pressure of the direct pulses of a frame over the full scale of the converter; without
-    echoes, noise and chorus. `plan` is that of the frame's sequence, whose sonar has a converter."""
-    sonar = plan.scene.sonar
-    assert sonar.converter is not None
-    arrivals = trace(replace(context_of(plan, frame), bodies=(), laws=()), plan.propagation)
-    heard = behind_baffle(arrivals, sonar)
-    signals = deposit_for(DEFAULT_ERROR).signals(heard, frame.moment.snaps, reception_of(plan, frame))
-    if sonar.sensor_errors is not None:
-        drawn = drawn_errors(sonar.sensor_errors, plan.elements.count, frame.seed, frame.key)
-        speed = float(plan.profile.at(depth(frame.sonar_pose.position)))
-        signals = channel_errors.respond(signals, drawn, speed)
-    peak = float(np.abs(signals.pressure).max(initial=0.0))
-    return float(20.0 * np.log10(max(peak, 1e-300) / sonar.converter.full_scale))

@@ -127,7 +127,7 @@ def expect(
         aligned = pulse_times.cut(signals, elements.gain != 0, late, pulse_times.PULSE_HALF, sonar.band)
         wave = pulse_times.waveform(aligned, elements, c, direct.direction, direct.curvature, direct.time)
         density = 2 * aligned.spacing * np.abs(wave.template) ** 2
-        for surface, bottom, image in images(position, receiver.pose, bottom_depth, bounces):
+        for surface, bottom, image in images(position, receiver.pose_at(float(time)), bottom_depth, bounces):
             r = float(np.linalg.norm(image))
             front = PlaneWaveFit(image / r, 1 / r, float(time) + (r - distance) / c)
             across, up = front.direction[1:, None] * (elements.face / c)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, robust_wave, spherical_wave, wavefront_delays
+from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.candidates import (
@@ -83,7 +85,7 @@ def locate(
     bottom: float,
     snaps: int,
     *,
-    bend: Bend | None = None,
+    bend: Callable[[Pose], Bend] | None = None,
     gradient: float = 0.0,
     kink: float = 0.0,
     on_bottom: bool = True,
@@ -91,9 +93,9 @@ def locate(
 ) -> SourceEstimates:
     """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`. bottom: its depth (m).
 
-    Paths bend as `bend` says. Where it is not undone, errors hold it; of sources whose range is not known, what a
-    `gradient` (1/s) of the sound speed may do, and those of directions what its change over the array does, a `kink`
-    (1/s). Pulses that are refused follow those that are not, loudest first.
+    Paths to an array that has a pose bend as `bend` says. Where it is not undone, errors hold it; of those whose range
+    is not known, what a `gradient` (1/s) of the sound speed may do, and those of directions what its change over the
+    array does, a `kink` (1/s). Pulses that are refused follow those that are not, loudest first.
     """
     elements, sonar = receiver.elements, receiver.sonar
     if unlocatable(elements) is not None:
@@ -117,7 +119,8 @@ def locate(
         if top is None or not track[top] > QUIET * loud.quiet:
             break
         centre = signals.start + top / signals.sampling_frequency
-        row = candidate(signals, when_heard(knowledge, receiver.track, centre), centre, half, bend)
+        own = when_heard(knowledge, receiver.track, centre)
+        row = candidate(signals, own, centre, half, None if bend is None else bend(own.pose))
         candidates.found.append(Candidate(centre, float(track[top]), row))
         track[max(top - width, 0) : top + width + 1] = 0.0
     return as_estimates(candidates.rows, snaps)

@@ -13,7 +13,7 @@ from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, unit
 from sonarsynth.ranging.location.source_position import Bend
 from sonarsynth.ranging.placing.solution import Solution
-from sonarsynth.state import Receiver
+from sonarsynth.receiver import Elements
 
 STEPS = 20
 """Newton steps at most; five or six are usual."""
@@ -52,9 +52,9 @@ def first_rays(profile: Profile, start: Floats, end: Floats) -> FirstRays:
     return FirstRays(time, departure, arrival)
 
 
-def bending(profile: Profile, receiver: Receiver, undone: bool) -> Bend:
-    """What rays through the profile add to straight delays over the array, which is `undone` or not."""
-    sensors, pose = np.vstack([receiver.elements.position, np.zeros(3)]), receiver.pose
+def bending(profile: Profile, elements: Elements, undone: bool, pose: Pose) -> Bend:
+    """What rays through the profile add to straight delays over an array that has a pose, which is `undone` or not."""
+    sensors = np.vstack([elements.position, np.zeros(3)])
 
     def delays(source: Floats, sound_speed: float) -> Floats:
         rays = first_rays(profile, pose.to_world(source)[None], pose.to_world(sensors))

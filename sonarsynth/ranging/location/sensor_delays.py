@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 from sonarsynth.conventions import depth
@@ -77,7 +78,8 @@ class SensorDelays(LocatingMethod):
 
         profile, aperture, own = survey.profile, receiver.elements.aperture, float(depth(receiver.pose.position))
         gradient = mean_gradient(profile, own, survey.bottom, aperture)
-        bend = bending(profile, receiver, self.refraction) if self.refraction or not profile.uniform else None
+        bends = self.refraction or not profile.uniform
+        bend = partial(bending, profile, receiver.elements, self.refraction) if bends else None
         return locate(
             signals, receiver, survey.bottom, snaps, bend=bend, gradient=gradient,
             kink=kink(profile, own, aperture) if aperture else 0.0, on_bottom=self.on_bottom is not False,

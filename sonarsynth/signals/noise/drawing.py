@@ -62,7 +62,8 @@ def coherence_error(
     field = field_on_lattice(directions, elements, pose, sonar, sound_speed)
     if field is None:
         count = random_waves.waves(elements.count)
-        return float(1.0 / np.sqrt(count)), f"{count} plane waves in each bin"
+        scatter = f"beams scatter {random_waves.beam_scatter(elements.count):.2f} times as in Gaussian noise"
+        return float(1.0 / np.sqrt(count)), f"{count} plane waves in each bin, {scatter}"
     return field.error, f"periodic field of {field.powers.shape[1]} x {field.powers.shape[2]} waves"
 
 
