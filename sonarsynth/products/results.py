@@ -69,9 +69,9 @@ class SourceEstimates:
     )
     reason: Ints  # (estimate,) index into REASONS
     pressure: Floats  # (estimate,) Pa: peak of the envelope at the array centre; also of what may be an echo
-    suspect_time: Floats  # (estimate,) s: of what may be an echo, were it a snap; NaN of others
-    suspect_position: Floats  # (estimate, xyz) m: the same
-    suspect_covariance: Floats  # (estimate, xyz, xyz) m2: the same
+    light_time: Floats  # (estimate,) s: `time`; of what may be an echo, as if it were a snap
+    light_position: Floats  # (estimate, xyz) m: the same of `position`
+    light_covariance: Floats  # (estimate, xyz, xyz) m2: the same of `position_covariance`
 
 
 @dataclass(frozen=True, eq=False)

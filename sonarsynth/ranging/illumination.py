@@ -13,27 +13,27 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.products import PointCloud, SourceEstimates
+from sonarsynth.products import REASONS, PointCloud, SourceEstimates
 
 FAINT = 20.0
 """dB: light so much fainter at the place of an echo than that of another at its own made none."""
-AGREES = 0.15
-"""An echo is confirmed where another's place by another snap is so near, over how far other snaps would put it or have
-it agree with anything: of 120 random scenes of two snaps, all that were confirmed were right."""
+AGREES, LIKELY = 0.15, 0.5
+"""An echo is confirmed, or placed at least, where another's place by another snap is so near, over how far other snaps
+would put it or have it agree with anything: of 120 random scenes of two snaps, all that were confirmed were right."""
 
 
 def with_suspects(estimates: SourceEstimates) -> SourceEstimates:
     """The estimates, those that may be echoes as if they were snaps: their echoes, if any, come back as well."""
-    suspect = np.isfinite(estimates.suspect_time)
+    suspect = estimates.reason == REASONS.index("may_be_an_echo")
     if not suspect.any():
         return estimates
     pick, none = suspect[:, None], np.zeros((len(suspect), 3))
     return replace(
         estimates,
-        time=np.where(suspect, estimates.suspect_time, estimates.time),
+        time=np.where(suspect, estimates.light_time, estimates.time),
         time_error=np.where(suspect, 0.0, estimates.time_error),
-        position=np.where(pick, estimates.suspect_position, estimates.position),
-        position_covariance=np.where(pick[..., None], estimates.suspect_covariance, estimates.position_covariance),
+        position=np.where(pick, estimates.light_position, estimates.position),
+        position_covariance=np.where(pick[..., None], estimates.light_covariance, estimates.position_covariance),
         position_by_speed=np.where(pick, none, estimates.position_by_speed),
     )
 
@@ -75,11 +75,10 @@ def lit_by(places: Floats) -> tuple[Ints, Floats]:
     agreeing = _agreeing(places, there)
     best, rest = agreeing.argmin(axis=0), np.partition(agreeing, 1, axis=0)[1]
     every = np.arange(places.shape[1])
-    near, other = agreeing[best, every], nearest[best, every]
-    confirmed = (near < AGREES * np.minimum(rest, other)) | (there.sum(axis=0) < 2)
-    light = np.where(confirmed & np.isfinite(near) | (near < 0.5 * other), best, there.argmax(axis=0))
+    near, other = agreeing[best, every], np.minimum(rest, nearest[best, every])
+    light = np.where(near < LIKELY * other, best, there.argmax(axis=0))
     farthest = np.nan_to_num(apart[light, :, every]).max(axis=1, initial=0.0)
-    return light, np.where(confirmed, 0.0, 0.5 * farthest)
+    return light, np.where(near < AGREES * other, 0.0, 0.5 * farthest)
 
 
 def _agreeing(places: Floats, there: Bools) -> Floats:

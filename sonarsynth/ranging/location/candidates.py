@@ -227,7 +227,7 @@ def as_estimates(rows: list[SourceFix], snaps: int, reason: int = SILENT) -> Sou
         bottom_used=column(lambda r: r.bottom_used).astype(np.int64),
         reason=column(lambda r: r.reason).astype(np.int64),
         pressure=column(lambda r: r.amplitude),
-        suspect_time=column(lambda r: r.suspect.time if r.suspect else np.nan),
-        suspect_position=column(lambda r: r.suspect.position if r.suspect else np.full(3, np.nan), 3),
-        suspect_covariance=column(lambda r: r.suspect.covariance if r.suspect else np.full((3, 3), np.nan), 3, 3),
+        light_time=column(lambda r: (r.suspect or r).time),
+        light_position=column(lambda r: (r.suspect or r).position, 3),
+        light_covariance=column(lambda r: (r.suspect or r).covariance, 3, 3),
     )
