@@ -1,8 +1,8 @@
 """Which snap lit each echo, where several are located: a body is lit by all of them, and so the places of its echoes by
 one and by another agree; places by the wrong one are scattered.
 
-Transmitters that sound alike are told apart so in multistatic radar as well: Daun, Nickel and Koch (2012), Signal
-Processing 92, 1365.
+Passive radar by broadcasts, whose transmitters send alike, has the same question: Shi, Park and Song (2017), EURASIP
+Journal on Advances in Signal Processing 2017:11.
 """
 
 from __future__ import annotations
