@@ -12,8 +12,10 @@ import sonarsynth as ss
 from sonarsynth import planning
 from sonarsynth.conventions import Floats, direction
 from sonarsynth.equations.arrays.bistatic_range import bistatic_range, excess_path
-from sonarsynth.products import ORIGINS, REASONS
-from sonarsynth.ranging.illumination import lit_by
+from sonarsynth.products import ORIGINS, REASONS, PointCloud
+from sonarsynth.ranging.illumination import by_light, lit_by, with_suspects
+from sonarsynth.ranging.location.candidates import as_estimates
+from sonarsynth.ranging.location.source_position import ACCEPTED, ECHO, refused
 from tests.laws.test_predicted_errors import C, Family, scene
 
 NOTICED = (REASONS.index("accepted"), REASONS.index("may_be_an_echo"))
@@ -108,3 +110,29 @@ def test_a_lone_echo_is_placed_by_the_clock_and_in_doubt() -> None:
     light, doubt = lit_by(places)
     assert light.tolist() == [0, 0]
     assert doubt == pytest.approx([0.5 * np.linalg.norm(places[0, 0] - places[1, 0]), 0.0])
+
+
+@pytest.mark.parametrize(
+    ("pressure", "window", "doubted"),
+    [(1.0, (1e-3, 40e-3), True), (0.01, (1e-3, 40e-3), False), (1.0, (20e-3, 40e-3), False)],
+)
+def test_light_too_faint_or_at_another_time_is_not_asked(
+    pressure: float, window: tuple[float, float], doubted: bool
+) -> None:
+    """An echo by the clock 24 ms after it, and 15 ms after a snap that may be an echo: of as much light, of 40 dB less,
+    and where echoes come 20 ms after any snap, or later."""
+    late, delay = 9e-3, np.full(1, 24e-3)
+    fixes = [
+        replace(refused(ACCEPTED), time=t, position=place, covariance=np.eye(3), by_speed=np.zeros(3), amplitude=loud)
+        for t, place, loud in zip((0.0, late), SNAPS, (1.0, pressure), strict=True)
+    ]
+    fixes[1] = replace(refused(ECHO), amplitude=pressure, suspect=fixes[1])
+    lights = with_suspects(as_estimates(fixes, 2))
+    beam, clouds, one = np.array([[1.0, 0.0, 0.0]]), [], np.full(1, 0.1, np.float32)
+    for t, place in zip((0.0, late), SNAPS, strict=True):
+        r = bistatic_range(C * (delay - t), beam, place).range
+        clouds.append(PointCloud(r[:, None] * beam, r, one, one, one, one, one, delay.astype(np.float32), one, one))
+    found = by_light(clouds, np.arange(2), lights, window)
+    apart = float(np.abs(clouds[0].range - clouds[1].range)[0])
+    assert found.range[0] == clouds[0].range[0] and np.asarray(found.estimate).tolist() == [0] and apart > 3.0
+    assert found.range_error[0] == pytest.approx(np.hypot(0.1, 0.5 * apart) if doubted else 0.1)
