@@ -37,11 +37,11 @@ class Points:
     family: np.ndarray  # (point,)
     lit_by: np.ndarray  # (point,)
     origin: np.ndarray  # (point,)
-    clock: np.ndarray  # (point,) the emission that delays are counted from; UNKNOWN; STRANGER: a snap of the chorus
+    clock: np.ndarray  # (point,) the emission that it is placed by; UNKNOWN; STRANGER: a snap of the chorus
 
     @property
     def strange(self) -> np.ndarray:
-        """(point,) lit by another snap than that of the clock."""
+        """(point,) lit by another snap than that it is placed by."""
         return np.asarray((self.clock != UNKNOWN) & (self.emission >= 0) & (self.emission != self.clock))
 
     @property
@@ -71,7 +71,8 @@ def room_for_points(tree: Stored) -> int:
 def points(tree: Stored, frames: Sequence[int] | np.ndarray) -> Points:
     """The points of some frames of a store whose points have labels."""
     numbers = np.asarray(frames)
-    names = ("range", "range_error", "true_range", "target", "emission", "family", "lit_by", "origin")
+    names = ["range", "range_error", "true_range", "target", "emission", "family", "lit_by", "origin"]
+    names += ["estimate"] * has(tree, "cloud/estimate")
     count = max(MOST_ROWS // max(room_for_points(tree), 1), 1)
     chunks: dict[str, list[np.ndarray]] = {name: [] for name in ("frame", "row", *names)}
     for start in range(0, len(numbers), count):
@@ -83,17 +84,21 @@ def points(tree: Stored, frames: Sequence[int] | np.ndarray) -> Points:
         for name in names:
             chunks[name].append(lists[name][frame, row])
     columns = {name: np.concatenate(arrays) if arrays else np.zeros(0) for name, arrays in chunks.items()}
-    return Points(**columns, clock=_clocks(tree, columns["frame"].astype(int)))
+    frame = columns["frame"].astype(int)
+    placed_by = columns.pop("estimate", np.zeros(len(frame))).astype(
+        int
+    )  # a store from before there was that: the first
+    return Points(**columns, clock=_clocks(tree, frame, placed_by))
 
 
-def _clocks(tree: Stored, frames: np.ndarray) -> np.ndarray:
-    """The emission (row,) of the first source estimate in frames (row,)."""
+def _clocks(tree: Stored, frames: np.ndarray, estimate: np.ndarray) -> np.ndarray:
+    """The emissions (point,) of source estimates (point,) in frames (point,)."""
     if not (has(tree, "source_estimates/emission") and len(frames)):
         return np.full(len(frames), UNKNOWN)
     distinct, row = np.unique(frames, return_inverse=True)
-    emission = of_frames(tree, "source_estimates/emission", distinct)[:, 0]
+    emission = of_frames(tree, "source_estimates/emission", distinct)[row, estimate]
     no_emission = STRANGER if STRANGERS & set(other_sounds(tree)) else UNKNOWN
-    return np.where(emission < 0, no_emission, emission.astype(int))[row]
+    return np.where(emission < 0, no_emission, emission.astype(int))
 
 
 def range_errors(tree: Stored, frames: np.ndarray) -> list[Check]:

@@ -102,9 +102,13 @@ def signal_values(signals: Signals, counts: bool) -> Values:
     return table("/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside)
 
 
+NOT_STORED = ("position_by_speed", "pressure", "light_time", "light_position", "light_covariance")
+"""What ranging knows of source estimates beside what the store has."""
+
+
 def source_estimate_values(estimates: SourceEstimates) -> Values:
     """Source estimates, in degrees."""
-    columns = {name: values for name, values in vars(estimates).items() if name != "position_by_speed"}
+    columns = {name: values for name, values in vars(estimates).items() if name not in NOT_STORED}
     for name in ("azimuth", "azimuth_error", "elevation", "elevation_error"):
         columns[name] = np.rad2deg(columns[name])
     return table("/source_estimates", **columns)
@@ -142,6 +146,7 @@ def cloud_values(cloud: PointCloud, labels: PointLabels, size: int, targets: int
     so many targets has."""
     x, y, z = cloud.position.T
     columns = {name: value for name, value in vars(cloud).items() if name not in ("position", "overflow")}
+    columns["estimate"] = np.broadcast_to(cloud.estimate, len(cloud)).astype(np.int8)
     angles = ("azimuth", "azimuth_error", "elevation", "elevation_error")
     columns |= {name: np.rad2deg(columns[name]).astype(np.float32) for name in angles}
     columns |= {"x": x, "y": y, "z": z, **vars(labels)}

@@ -68,6 +68,10 @@ class SourceEstimates:
         Ints  # (estimate,) 1 where the depth of the bottom entered the position, 0 where it did not, -1 without one
     )
     reason: Ints  # (estimate,) index into REASONS
+    pressure: Floats  # (estimate,) Pa: peak of the envelope at the array centre; also of what may be an echo
+    light_time: Floats  # (estimate,) s: `time`; of what may be an echo, as if it were a snap
+    light_position: Floats  # (estimate, xyz) m: the same of `position`
+    light_covariance: Floats  # (estimate, xyz, xyz) m2: the same of `position_covariance`
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +90,8 @@ class EnergyImage:
 class PointCloud(Columns):
     """Where the echoes of a frame come from: a list of points, in the order of their beams. Sonar frame.
 
-    Predicted errors are one standard error, of where each echo was made (`clouds.range_error`).
+    Predicted errors are one standard error, of where each echo was made (`clouds.range_error`); where several snaps may
+    have lit it, those of ranges hold that (`illumination`).
     """
 
     position: npt.NDArray[np.float32]  # (point, xyz) m
@@ -100,6 +105,7 @@ class PointCloud(Columns):
     energy: npt.NDArray[np.float32]  # (point,) Pa2 s: of the echo, or of its beam, as it was picked
     snr: npt.NDArray[np.float32]  # (point,) dB: power of the echo's peak over the mean power of noise in its beam
     overflow: int = 0  # points that were left out: the faintest
+    estimate: Ints | int = 0  # (point,) the row of `SourceEstimates` whose light it is placed by
 
     def __len__(self) -> int:
         """Number of points."""

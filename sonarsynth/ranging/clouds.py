@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from sonarsynth.equations.arrays.apertures import defocus_spread
 from sonarsynth.geometry import Pose, unit
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import PointCloud, SourceEstimates, no_points
+from sonarsynth.ranging.illumination import by_light, with_suspects
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes
 from sonarsynth.ranging.placing.solution import Solution
 from sonarsynth.ranging.range_profiles import aperture_moments
@@ -33,29 +34,59 @@ def point_cloud(
     window: ReceivedWindow, picking: PickingMethod, placing: PlacingMethod, sonar_pose: Pose, profile: Profile,
     track: Track | None = None,
 ) -> PointCloud:  # fmt: skip
-    """Points lit by the first located snap: the echoes of `picking` where `placing` puts them; none of an echo that
-    has no place, and none at all where no snap was located. profile: the sound speed of the water; track: of a sonar
-    that moves, which places are relative to where it hears the echo."""
+    """The echoes of `picking` where `placing` puts them, each by the located snap that lit it (`illumination`); none of
+    an echo that has no place, and none at all where no snap was located. profile: the sound speed of the water; track:
+    of a sonar that moves, which places are relative to where it hears the echo."""
     if not window.located:
         return no_points()
     echoes = returned_rows(picking, "picks", picking.picks(window), PickedEchoes, "delay", ("azimuth", "delay"), {})
-    source, velocity, spin = window.estimates.position[0], np.zeros(3), np.zeros(3)
+    velocity, spin, lights = np.zeros(3), np.zeros(3), window.estimates
     if track is not None and not track.still:
         middle = 0.5 * float(np.mean(echoes.delay)) if len(echoes.delay) else 0.0
-        clock = float(window.estimates.time[0])
+        clock = float(lights.time[0])
         sonar_pose, (velocity, spin) = track.later(clock).pose, track.later(clock + middle).in_own_frame
         echoes = _at_true_directions(echoes, velocity, window)
-    beam = direction(echoes.azimuth, echoes.elevation)
-    solution = placing.place(echoes.delay, beam, source, window.sonar, sonar_pose, profile)
+    placer = _Placer(placing, sonar_pose, profile, velocity, spin)
+    lights = with_suspects(lights)
+    rows = np.flatnonzero(np.isfinite(lights.position).all(axis=1))
+    clouds = [_placed(echoes, window, lights, int(row), placer) for row in rows]
+    if len(rows) == 1:
+        (cloud,) = clouds
+    else:
+        start, stop = (t - float(lights.time[0]) for t in (window.image.start, window.image.stop))
+        cloud = by_light(clouds, rows, lights, (start, stop))
+    return cloud.select(np.flatnonzero(np.isfinite(cloud.range) & (cloud.range > 0) & np.isfinite(cloud.range_error)))
+
+
+class _Placer(NamedTuple):
+    """What places are computed with."""
+
+    placing: PlacingMethod
+    pose: Pose
+    profile: Profile
+    velocity: Floats  # (xyz) m/s: of the sonar, in its own frame
+    spin: Floats  # (xyz) rad/s
+
+
+def _placed(
+    echoes: PickedEchoes, window: ReceivedWindow, lights: SourceEstimates, row: int, placer: _Placer
+) -> PointCloud:
+    """A point of every echo, as lit by a row of `lights`; NaN where there is no place."""
+    source, beam = lights.position[row], direction(echoes.azimuth, echoes.elevation)
+    delay = echoes.delay - float(lights.time[row] - lights.time[0])
     wide = {"position": (3,), "by_source": (3,)}
-    solution = returned_rows(placing, "place", solution, Solution, "range", (), wide, len(beam))
-    if velocity.any() or spin.any():
-        solution = solution.as_array_moves(source, -echoes.delay[:, None] * (velocity + np.cross(spin, source)))
-    echoes = replace(echoes, delay_error=np.hypot(echoes.delay_error, window.late))
+    solution = placer.placing.place(delay, beam, source, window.sonar, placer.pose, placer.profile)
+    solution = returned_rows(placer.placing, "place", solution, Solution, "range", (), wide, len(beam))
+    if placer.velocity.any() or placer.spin.any():
+        shift = -delay[:, None] * (placer.velocity + np.cross(placer.spin, source))
+        solution = solution.as_array_moves(source, shift)
+    late = window.late if row == 0 else np.hypot(window.late, np.hypot(lights.time_error[0], lights.time_error[row]))
+    echoes = replace(echoes, delay_error=np.hypot(echoes.delay_error, late))
     echoes = _with_defocus(echoes, solution.range, window)
-    error = range_error(solution, echoes, window.estimates, window.sonar)
-    echoes = echoes if profile.uniform else _with_bending(echoes, beam, solution.range, sonar_pose, profile)
-    cloud = PointCloud(
+    error = range_error(solution, echoes, lights, window.sonar, row)
+    if not placer.profile.uniform:
+        echoes = _with_bending(echoes, beam, solution.range, placer.pose, placer.profile)
+    return PointCloud(
         position=solution.position.astype(np.float32),
         range=solution.range.astype(np.float32),
         range_error=error.astype(np.float32),
@@ -68,7 +99,6 @@ def point_cloud(
         snr=echoes.snr.astype(np.float32),
         overflow=echoes.overflow,
     )
-    return cloud.select(np.flatnonzero(np.isfinite(solution.range) & (solution.range > 0) & np.isfinite(error)))
 
 
 def _with_defocus(echoes: PickedEchoes, distance: Floats, window: ReceivedWindow) -> PickedEchoes:
@@ -141,19 +171,21 @@ def true_directions(beam: Floats, mach: Floats, normal: Floats | None) -> Floats
     return unit(u)
 
 
-def range_error(solution: Solution, echoes: PickedEchoes, estimates: SourceEstimates, sonar: Sonar) -> Floats:
-    """Predicted standard error (echo,) in m of the range of where an echo was made: direction, clock, snap position,
-    sound speed, and what placing itself leaves out.
+def range_error(
+    solution: Solution, echoes: PickedEchoes, estimates: SourceEstimates, sonar: Sonar, row: int = 0
+) -> Floats:
+    """Predicted standard error (echo,) in m of the range of where an echo was made, lit by a row of `estimates`:
+    direction, clock, snap position, sound speed, and what placing itself leaves out.
 
     The same delay means another range in another direction (dr/dpsi, psi the angle between beam and source). Another
     sound speed moves the snap as well, which makes up for some of what it does to the range.
     """
     c = sonar.assumed_sound_speed
-    beside = solution.by_angle * _angle_error(echoes, estimates.position[0])
+    beside = solution.by_angle * _angle_error(echoes, estimates.position[row])
     clock = solution.by_path * c * echoes.delay_error
     g = solution.by_source
-    snap = np.einsum("bi,ij,bj->b", g, estimates.position_covariance[0], g)
-    moved = g @ estimates.position_by_speed[0] * sonar.sound_speed_error  # which `snap` holds
+    snap = np.einsum("bi,ij,bj->b", g, estimates.position_covariance[row], g)
+    moved = g @ estimates.position_by_speed[row] * sonar.sound_speed_error  # which `snap` holds
     speed = solution.by_speed * sonar.sound_speed_error
     both = np.maximum(snap + speed * (speed + 2.0 * moved), 0.0)
     return np.asarray(np.sqrt(beside**2 + clock**2 + both + solution.model_error**2))

@@ -130,7 +130,14 @@ _PATHS = group_of(
 )
 WHOSE = comment(
     "of the paths that bring most energy in the beam of the point at its delay. A range is wrong where the emission is "
-    "not that of the first source estimate. Targets are where the sound met them"
+    "not that of the source estimate that the point is placed by. Targets are where the sound met them"
+)
+SEVERAL = (
+    *NONE,
+    *comment(
+        "of those whose light may come back then, the one that other echoes confirm, or else the first, and then "
+        "range_error holds how far from there others place it"
+    ),
 )
 _CLOUD = group_of(
     "/cloud",
@@ -149,7 +156,10 @@ _CLOUD = group_of(
     row("elevation_error", POINT, "degree", "predicted standard error of elevation", dtype="float32"),
     row("range", POINT, "m", "distance of the point from the array centre", dtype="float32"),
     row("range_error", POINT, "m", "predicted standard error of range", dtype="float32"),
-    row("delay", POINT, "s", "delay of the echo after the direct arrival of the snap", dtype="float32"),
+    row(
+        "delay", POINT, "s", "delay of the echo after the direct arrival of the first source estimate", dtype="float32"
+    ),
+    row("estimate", POINT, "1", "source estimate whose light the point is placed by", dtype="int8", attributes=SEVERAL),
     row("energy", POINT, "Pa2 s", "energy of the echo of the point, or of its beam, as it was picked", dtype="float32"),
     row("snr", POINT, "dB", "power of the peak of the echo over the mean power of noise in its beam", dtype="float32"),
     row("x", POINT, "m", "position of the point, forward, in the sonar frame", dtype="float32"),

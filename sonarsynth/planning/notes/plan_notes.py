@@ -61,7 +61,8 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     lines += population_notes(recipe) + _shared(recipe, looks) + unlit(plan)
     if plan.windows.disturbed:
         lines.append(
-            f"{plan.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest snap"
+            f"{plan.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest: "
+            "where other echoes do not tell which lit a point, its range_error is half of what that leaves open"
         )
     if scene.world.chorus is not None and plan.chorus is not None:
         reach, distant = plan.chorus, 0.0 if plan.distant_chorus is None else plan.distant_chorus.share

@@ -135,7 +135,7 @@ class Candidates:
         earlier = [cause for cause in self.found if cause.centre < candidate.centre]
         if not any(self._may_cause(cause, candidate) for cause in earlier):
             return row
-        return refused(ECHO)
+        return replace(refused(ECHO), amplitude=row.amplitude, suspect=row)
 
     def _mirrored(self, row: SourceFix) -> bool:
         """Whether a pulse of unknown range comes from beyond the horizon of the bottom that sources are known to be on:
@@ -226,4 +226,8 @@ def as_estimates(rows: list[SourceFix], snaps: int, reason: int = SILENT) -> Sou
         position_by_speed=column(lambda r: r.by_speed, 3),
         bottom_used=column(lambda r: r.bottom_used).astype(np.int64),
         reason=column(lambda r: r.reason).astype(np.int64),
+        pressure=column(lambda r: r.amplitude),
+        light_time=column(lambda r: (r.suspect or r).time),
+        light_position=column(lambda r: (r.suspect or r).position, 3),
+        light_covariance=column(lambda r: (r.suspect or r).covariance, 3, 3),
     )

@@ -68,6 +68,7 @@ class SourceFix:
     curvature: tuple[float, float]  # 1/m: value, error; of the straight wave over the array
     chord: Floats  # (xyz) unit vector towards the source, where the wavefront alone puts it
     amplitude: float  # Pa: of the pulse at the array centre, peak of the envelope, the face's response removed
+    suspect: SourceFix | None = None  # what a pulse that may be an echo is, were it a snap
 
 
 @dataclass(frozen=True, eq=False)
