@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -95,7 +97,7 @@ def _points(store: str, to: str, out: Path | None, frames: str | None, relative_
         written = write_points(cloud, file if file.suffix else file.with_suffix(f".{to}"))
     except Damage:
         raise
-    except (ValueError, ImportError) as error:
+    except ValueError as error:
         raise BadOption(str(error)) from None
     typer.echo(f"{written}: {cloud.sizes['point']} points")
 
@@ -109,20 +111,14 @@ def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
     tree = open_store(store)
     chosen = _built(tree, store, frames)
     into = out or named_after(store).with_name(f"{named_after(store).name}.{to}")
-    there, folder = into.exists(), _new(into)
     write, lost = (
         (coco_files.write_coco, coco_files.LOST) if to == COCO else (sonar_netcdf.write_sonar_netcdf, sonar_netcdf.LOST)
     )
     try:
-        with printing.progress("reading") as progress:
-            files = write(tree, folder, chosen, progress)
-    except BaseException as error:
-        shutil.rmtree(folder, ignore_errors=True)  # a part of an export would be taken for all of it
-        if there:
-            folder.mkdir(exist_ok=True)
-        if isinstance(error, ImportError):
-            raise BadOption(f"{error}: pip install 'sonarsynth[netcdf]'") from None
-        raise
+        with _filled(into) as folder, printing.progress("reading") as progress:
+            files = [into / file.relative_to(folder) for file in write(tree, folder, chosen, progress)]
+    except ImportError as error:
+        raise BadOption(f"{error}: pip install 'sonarsynth[netcdf]'") from None
     for file in files:
         typer.echo(str(file))
     for note in lost:
@@ -143,11 +139,28 @@ def _built(tree: xr.DataTree, store: str, frames: str | None) -> np.ndarray:
     return chosen
 
 
-def _new(folder: Path) -> Path:
-    """A folder for an export, which holds nothing yet: files of two exports would be taken for one dataset."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+@contextmanager
+def _filled(folder: Path) -> Iterator[Path]:
+    """A folder to write into, whose files are those of `folder` in the end: a part of an export would be taken for all
+    of it. Raises BadOption where there are files already: those of two exports would be taken for one dataset."""
+    there = folder.exists()
+    if there and (not folder.is_dir() or any(folder.iterdir())):
         raise BadOption(f"{folder} exists already and is not an empty folder: remove it, or name another by --out")
-    return folder
+    partial = folder / ".partial"
+    partial.mkdir(parents=True)
+    try:
+        yield partial
+        for file in sorted(partial.iterdir(), key=Path.is_file):  # lists of files last
+            file.rename(folder / file.name)
+        partial.rmdir()
+    except BaseException as error:
+        if isinstance(error, OSError) and error.filename is None:  # the disk is full
+            error.filename = str(folder)
+        shutil.rmtree(partial, ignore_errors=True)
+        if not there:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
 
 
 def _bellhop(recipe: Path, out: Path | None, frames: str | None, settings: list[str]) -> None:
@@ -155,15 +168,16 @@ def _bellhop(recipe: Path, out: Path | None, frames: str | None, settings: list[
     from sonarsynth.export import write_bellhop
     from sonarsynth.recipe import reading
 
-    notes = dict[str, None]()
-    with reading.opened(recipe, settings) as made_from:
-        folder = _new(out or Path(f"{recipe.stem}.bellhop"))
+    notes, written = dict[str, None](), list[Path]()
+    into = out or Path(f"{recipe.stem}.bellhop")
+    with reading.opened(recipe, settings) as made_from, _filled(into) as folder:
         numbers = frame_numbers(frames or "0:1", made_from.frames) or ()
         plan = planning.plan(made_from)
         for index in numbers:
             files, unsaid = write_bellhop(plan, index, folder, recipe.stem)
             notes |= dict.fromkeys(unsaid)
-            for file in files:
-                typer.echo(str(file))
+            written += [into / file.relative_to(folder) for file in files]
+    for file in written:
+        typer.echo(str(file))
     for note in notes:
         typer.echo(f"note: {note}")

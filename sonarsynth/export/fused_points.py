@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 KEPT = ("energy", "snr", "range", "range_error", "target", "emission", "family", "facet", "distance", "origin")
 """What is kept of each point beside its place."""
+AXES = ("sonar", "world")
+"""What positions may be relative to beside targets: a target of such a name is not meant."""
 NEEDED = (("truth", "sonar_velocity"), ("truth", "sonar_spin"), ("truth/targets", "orientation_at_echo"))
 """Variables that points are placed by, and that stores of earlier versions lack."""
 
@@ -55,7 +57,7 @@ def points(
         if variable not in tree[group].data_vars:
             raise FieldError(("store",), f"has no {group}/{variable}, which it takes to place points: build it again")
     names = [str(name) for name in tree["truth/targets"].coords["target"].values]
-    if relative_to not in ("sonar", "world", *names):
+    if relative_to not in (*AXES, *names):
         raise FieldError(
             ("relative_to",), f"must be sonar, world or a target ({', '.join(names)}), not {relative_to!r}"
         )
@@ -97,7 +99,7 @@ def _frame(tree: xr.DataTree, index: int, relative_to: str, names: list[str]) ->
     else:
         carried = sonar.position + np.outer(heard, truth["sonar_velocity"].values)
         position = carried + turned(sonar.turn_to_world(position), spin, heard)
-    if relative_to in names:
+    if relative_to in names and relative_to not in AXES:
         body = bodies.isel(target=names.index(relative_to))
         rotations = _rotations(body, columns["emission"])
         position = np.einsum("pij,pi->pj", rotations, position - _at_echo(body, "position", columns["emission"]))

@@ -6,6 +6,8 @@ its version 2.0 (github.com/ices-publications/SONAR-netCDF4).
 
 from __future__ import annotations
 
+import errno
+import shutil
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import PINGS, Floats, Progress
+from sonarsynth.conventions import PINGS, Floats, Progress, format_bytes
 from sonarsynth.description import FieldError
 from sonarsynth.detection import beam_width
 from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll, latitude_longitude
@@ -30,6 +32,10 @@ LOST: Final = (
     "the truth, points, source estimates, meshes and the link budget are left out",
 )
 """What an export lacks, a line each."""
+BEAM_BYTES: Final = 110
+"""That a file has of a beam of a ping beside its samples."""
+FILE_BYTES: Final = 300_000
+"""That a file has beside its beams."""
 _TIME: Final = {
     "axis": "T",
     "calendar": "gregorian",
@@ -55,6 +61,7 @@ class _Beams(NamedTuple):
     interval: float  # s
     units: str
     long_name: str
+    length: int  # samples
     samples: Callable[[int], tuple[np.ndarray, float]]  # of a frame: (beam, sample), and the time of the first (s)
 
 
@@ -76,6 +83,7 @@ def write_sonar_netcdf(
         raise FieldError(("signals",), "the store has neither signals nor beams nor images")
     folder.mkdir(parents=True, exist_ok=True)
     sequence = np.asarray(tree["trajectory"].values)[frames]
+    _must_have_room(folder, groups, len(frames), len(np.unique(sequence)))
     files = []
     for number in np.unique(sequence).tolist():
         files.append(folder / f"sequence_{number}.nc")
@@ -83,6 +91,15 @@ def write_sonar_netcdf(
         if progress is not None:
             progress(int((sequence <= number).sum()), len(frames), 0)
     return tuple(files)
+
+
+def _must_have_room(folder: Path, groups: list[_Beams], frames: int, files: int) -> None:
+    """Raise OSError where the disk is too small: HDF5 ends the process when it is full."""
+    a_frame = sum(len(beams.names) * (4 * beams.length + BEAM_BYTES) for beams in groups)
+    needed, free = frames * a_frame + files * FILE_BYTES, shutil.disk_usage(folder).free
+    if needed > free:
+        said = f"takes {format_bytes(needed)}, and {format_bytes(free)} are free"
+        raise OSError(errno.ENOSPC, said, str(folder))
 
 
 def _groups(tree: xr.DataTree) -> Iterator[_Beams]:
@@ -96,7 +113,7 @@ def _groups(tree: xr.DataTree) -> Iterator[_Beams]:
             ping = signals.isel(frame=frame)
             return np.asarray(ping["pressure"].values, np.float32), float(ping["start"])
 
-        yield _Beams(names, zeros, zeros, 360.0, interval, "Pa", "Sound pressure", pressure)
+        yield _Beams(names, zeros, zeros, 360.0, interval, "Pa", "Sound pressure", signals.sizes["sample"], pressure)
     if not {"beams", "image"} & set(tree.children):
         return
     steered = tree["beams" if "beams" in tree.children else "image"].dataset
@@ -121,6 +138,7 @@ def _groups(tree: xr.DataTree) -> Iterator[_Beams]:
         interval,
         units,
         meaning,
+        steered.sizes.get("delay", 1),
         values,
     )
 

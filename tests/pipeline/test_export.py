@@ -56,6 +56,15 @@ def test_points_of_a_moving_hull_fall_together_on_it(crossing: Path) -> None:
     assert np.ptp(world[:, 1]) > 5.0 > 3.0 * np.ptp(place[:, 0]), "it crossed 9 m of water"
 
 
+def test_a_target_that_has_the_name_of_axes_changes_no_point(crossing: Path) -> None:
+    """Points relative to the sonar were turned as well by how a target of the name sonar lay."""
+    expected = {to: ss.points(crossing, relative_to=to) for to in ("sonar", "world")}
+    for name, points in expected.items():
+        tree = ss.open(crossing)
+        tree["truth/targets"] = tree["truth/targets"].to_dataset().assign_coords(target=[name])
+        assert ss.points(tree, relative_to=name).identical(points)
+
+
 def test_only_built_frames_are_read_for_points(crossing: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 20 000 frames with 8 built, points took over ten minutes."""
     read, one = [], fused_points._frame

@@ -125,7 +125,7 @@ def write_atomically(root: Root, name: str, content: bytes) -> None:
         except BaseException as error:
             with suppress(OSError):
                 os.unlink(scratch, dir_fd=folder)
-            if isinstance(error, OSError) and error.filename == scratch:
+            if isinstance(error, OSError) and error.filename in (scratch, None):  # None: the disk is full
                 error.filename = f"{root}/{name}"
             raise
         os.fsync(folder)

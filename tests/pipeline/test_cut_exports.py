@@ -1,0 +1,131 @@
+"""Exports that end half way: what is there passes for an export only where all of it is there."""
+
+from __future__ import annotations
+
+import os
+import resource
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from sonarsynth import planning, schedule
+from sonarsynth.cli import app
+from sonarsynth.cli.running import run
+from sonarsynth.export import FORMATS, coco_files, sonar_netcdf, write_points
+from sonarsynth.recipe import reading
+
+BELOW = """\
+seed: 1
+scene:
+  world:
+    environment: {depth: 12 m, sound_speed: {kind: isovelocity, speed: 1540}}
+    targets: []
+    sources: [{kind: snapping_shrimp, position: [0 m, 0 m]}]
+  sonar: {array: {kind: planar_lattice, columns: 2, rows: 2, pitch: 5 cm}}
+  trajectory: {frames: 2, interval: 1 s, sonar: {kind: course, start: [-1 m, 0 m, -6 m], heading: 90 deg, speed: 1 m/s}}
+"""
+"""A sonar that is straight above its source in its second frame."""
+
+
+@pytest.fixture(scope="module")
+def store(small_text: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two frames of a box before 20 hydrophones."""
+    path = tmp_path_factory.mktemp("cut") / "s.zarr"
+    plan = planning.plan(reading.loads(small_text), {"signals", "image", "cloud"})
+    assert schedule.build(plan, path, frames=[2, 3], workers=0).ok
+    return path
+
+
+@contextmanager
+def files_of_at_most(size: int) -> Iterator[None]:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_a_file_of_points_is_all_there_or_as_it_was(ending: str, tmp_path: Path) -> None:
+    """On a full disk a PLY of a third of its points was said to be written."""
+    rows = np.random.default_rng(1).normal(size=(2000, 3))
+    names = {"energy", "snr", "range_error", "frame", "target", "family"}
+    columns = {name: ("point", np.abs(rows[:, 0])) for name in names}
+    cloud = xr.Dataset({"position": (("point", "xyz"), rows), "normal": (("point", "xyz"), rows), **columns})
+    file = tmp_path / f"a.{ending}"
+    file.write_text("an earlier export")
+    with files_of_at_most(20_000), pytest.raises(OSError) as raised:
+        write_points(cloud, file)
+    assert raised.value.filename == str(file)
+    assert file.read_text() == "an earlier export" and list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize(("to", "module"), [("coco", coco_files), ("sonar-netcdf", sonar_netcdf)])
+def test_an_export_that_is_killed_leaves_no_file_in_its_folder(
+    store: Path, tmp_path: Path, to: str, module: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sequences that were written before a kill were a folder like any other."""
+    name = "write_coco" if to == "coco" else "write_sonar_netcdf"
+    write, out = getattr(module, name), tmp_path / "out"
+
+    def killed_last(*given: Any) -> None:
+        write(*given)
+        os._exit(9)
+
+    if (child := os.fork()) == 0:
+        monkeypatch.setattr(module, name, killed_last)
+        run(app, ["export", str(store), "--to", to, "--out", str(out)])
+        os._exit(0)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
+    assert [file.name for file in out.iterdir()] == [".partial"]
+    shutil.rmtree(out)
+    assert run(app, ["export", str(store), "--to", to, "--out", str(out)]) == 0
+    assert ".partial" not in [file.name for file in out.iterdir()]
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_netcdf_is_not_begun_on_a_disk_that_is_too_small(
+    store: Path, tmp_path: Path, there: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """HDF5 ended the process by a segmentation fault."""
+    out = tmp_path / "out"
+    if there:
+        out.mkdir()
+    assert run(app, ["export", str(store), "--to", "sonar-netcdf", "--out", str(tmp_path / "all")]) == 0
+    size = sum(file.stat().st_size for file in (tmp_path / "all").iterdir())
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=size))
+    capsys.readouterr()
+    assert run(app, ["export", str(store), "--to", "sonar-netcdf", "--out", str(out)]) == 1
+    assert "are free" in capsys.readouterr().err
+    assert out.exists() == there and not list(tmp_path.glob("out/*"))
+
+
+def test_a_full_disk_is_said_with_the_name_of_the_folder(
+    store: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with files_of_at_most(40):
+        assert run(app, ["export", str(store), "--to", "coco", "--out", str(tmp_path / "out")]) == 1
+    assert f"{tmp_path}/out: File too large" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_environments_of_frames_before_one_that_has_none_are_not_left(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recipe = tmp_path / "below.yaml"
+    recipe.write_text(BELOW)
+    out = tmp_path / "out"
+    assert run(app, ["export", str(recipe), "--to", "bellhop", "--frames", "0:2", "--out", str(out)]) == 2
+    assert "snap 0 is straight above or below the array" in capsys.readouterr().err
+    assert not out.exists()
+    assert run(app, ["export", str(recipe), "--to", "bellhop", "--frames", "0", "--out", str(out)]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert [str(file) for file in out.iterdir()] == [line for line in said if not line.startswith("note")]
