@@ -97,7 +97,7 @@ def _points(store: str, to: str, out: Path | None, frames: str | None, relative_
         written = write_points(cloud, file if file.suffix else file.with_suffix(f".{to}"))
     except Damage:
         raise
-    except ValueError as error:
+    except (ValueError, ImportError) as error:
         raise BadOption(str(error)) from None
     typer.echo(f"{written}: {cloud.sizes['point']} points")
 
