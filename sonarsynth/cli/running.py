@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import logging
 import os
@@ -86,7 +87,8 @@ def _explain(error: Exception, shown: bool) -> int:
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""
         what = "is a file, and a folder is needed" if isinstance(error, FileExistsError) else error.strerror
-        return _say(f"{file}{what}", INPUT if isinstance(error, BAD_PLACE) else OURS)
+        given = isinstance(error, BAD_PLACE) or error.errno == errno.ELOOP  # a link in a store, or in a circle
+        return _say(f"{file}{what}", INPUT if given else OURS)
     line = f"{type(error).__name__}: {error}"
     return _say(line if shown else f"{line} (traceback in {_keep_traceback(error)})", OURS)
 
