@@ -248,3 +248,14 @@ def test_a_stranger_s_metadata_are_refused_in_one_line(copy: Path) -> None:
     with pytest.raises(store.Mismatch, match="not a store that xarray can open") as raised:
         store.open_store(copy)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.filterwarnings("ignore::sonarsynth.store.marks.Unmarked")
+def test_what_a_stranger_s_store_lacks_is_named(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.rmtree(copy / ".marks")
+    root, of = _metadata(copy)
+    del of["source_estimates/time"]
+    (copy / "zarr.json").write_text(json.dumps(root))
+    for command, name in (("show", "source_estimates/time"), ("export", "time")):
+        assert run(app, [command, str(copy)]) == 2
+        assert f"the store has no {name}: another version wrote it, or another program" in capsys.readouterr().err
