@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import logging
 import os
+import re
 import signal
 import sys
 import tempfile
@@ -30,6 +32,10 @@ STATUS = (
 BAD_PLACE = FileNotFoundError, PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError
 """What the system says of a place that a command was given and cannot use."""
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+LACKS = re.compile(r"(?:Could not find node at|No variable named) '?([\w/.-]+)")
+"""What xarray says of a variable or group that is not in a store, which is none of its marks: those are compared."""
 
 
 class BadOption(ValueError):
@@ -86,7 +92,10 @@ def _explain(error: Exception, shown: bool) -> int:
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""
         what = "is a file, and a folder is needed" if isinstance(error, FileExistsError) else error.strerror
-        return _say(f"{file}{what}", INPUT if isinstance(error, BAD_PLACE) else OURS)
+        given = isinstance(error, BAD_PLACE) or error.errno == errno.ELOOP  # a link in a store, or in a circle
+        return _say(f"{file}{what}", INPUT if given else OURS)
+    if isinstance(error, KeyError) and (lacks := LACKS.search(str(error))):
+        return _say(f"the store has no {lacks[1]}: another version wrote it, or another program", INPUT)
     line = f"{type(error).__name__}: {error}"
     return _say(line if shown else f"{line} (traceback in {_keep_traceback(error)})", OURS)
 

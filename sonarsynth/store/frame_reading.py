@@ -26,7 +26,7 @@ from sonarsynth.store.files.place import Folder, absolute, read
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.marks import Damage, WrittenFiles
-from sonarsynth.store.opening import check_format, must_be_folder
+from sonarsynth.store.opening import must_be_as_laid_out, must_be_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -202,15 +202,13 @@ class FrameReader:
         if isinstance(folder, Remote):
             raise Mismatch(f"{folder}: frames are read from a folder of this machine: copy the store to one")
         must_be_folder(folder)
+        must_be_as_laid_out(folder)
         self.root = folder
         try:
             document = json.loads(read(folder, "zarr.json"))
             self.attrs: Mapping[str, Any] = document["attributes"]
             self._members: Mapping[str, Any] = document["consolidated_metadata"]["metadata"]
-            check_format(folder, self.attrs)
         except (OSError, ValueError, KeyError, TypeError) as error:
-            if isinstance(error, Mismatch):
-                raise
             raise Mismatch(f"{folder}: is no store of sonarsynth ({type(error).__name__}: {error})") from None
         self._open()
 

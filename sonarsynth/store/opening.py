@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from sonarsynth.conventions import FORMAT_VERSION
 from sonarsynth.description import FieldError
 from sonarsynth.products import SPLITS
-from sonarsynth.store.files.place import Folder, Opened, absolute, read_json, there
+from sonarsynth.store.files.place import Folder, Opened, absolute, read_json, record, there
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.marks import Damage, load_layout, warn_unmarked
 
@@ -45,13 +46,26 @@ def must_be_folder(path: Folder) -> None:
         raise Mismatch(f"{path} is not a store: it is not a folder" if there(path) else f"{path}: no such store")
 
 
+def must_be_as_laid_out(path: Folder) -> None:
+    """Raise Mismatch for a store of another format, Damage where its metadata, by which all numbers are read, are not
+    those of its mark."""
+    check_format(path, root_attributes(path))
+    layout = load_layout(path)
+    laid = None if layout is None else layout.files.get("zarr.json")
+    with suppress(OSError):
+        if laid is None or record(path, "zarr.json", size=laid[0]) == laid:
+            return
+    raise Damage(f"{path}: zarr.json is missing or damaged: 'sonarsynth repair' restores it")
+
+
 def open_store(path: Folder | str) -> xr.DataTree:
     """A store as a DataTree, read lazily: what `xarray.open_datatree(path, engine="zarr")` gives, but no link in the
     store is followed, and counts of the converter decode to float32 (plain xarray: float64).
 
     path: a folder or a URL. Returns the tree. Raises Mismatch where there is no store of ours, or one of another
-    format. Reading a variable of the tree raises Damage where a file cannot be decoded, or is missing. Warns
-    (`Unmarked`) where marks are gone, so that what is missing is not known.
+    format; Damage where its metadata are not as they were laid out. Reading a variable of the tree raises Damage where
+    a file cannot be decoded, or is missing. Warns (`Unmarked`) where marks are gone, so that what is missing is not
+    known.
     """
     import xarray as xr
     import zarr
@@ -60,18 +74,16 @@ def open_store(path: Folder | str) -> xr.DataTree:
 
     folder = absolute(path)
     must_be_folder(folder)
+    must_be_as_laid_out(folder)
     try:
         with zarr.config.set(NAMING):
             stored = xr.open_datatree(opens_whole(folder), engine="zarr", decode_cf=False)
-        check_format(folder, stored.attrs)
         if "truth" not in stored.children or "frame" not in stored["truth"].sizes:
             raise Mismatch(f"{folder}: a store has a group /truth with frames; this has none")
         tree = stored.map_over_datasets(_decoded)
     except (Mismatch, Damage):
         raise
-    except (OSError, ValueError, KeyError) as error:
-        if not read_json(folder, "zarr.json") and load_layout(folder) is not None:
-            raise Damage(f"{folder}: zarr.json is missing or damaged: 'sonarsynth repair' restores it") from None
+    except Exception as error:  # metadata of a stranger: zarr and xarray raise whatever they stumble over
         if type(error).__name__ == "GroupNotFoundError":
             raise Mismatch(f"{folder} is not a store of sonarsynth") from None
         first = (str(error).splitlines() or [type(error).__name__])[0]

@@ -7,16 +7,21 @@ import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from sonarsynth import store
+from sonarsynth.cli import app
+from sonarsynth.cli.running import run
 from sonarsynth.evaluation import Check
 from sonarsynth.pipeline import Values
 from sonarsynth.planning import Plan
+from sonarsynth.schedule.repairing import repair
 from sonarsynth.store.checking.reading_back import described
+from sonarsynth.store.frame_reading import FrameReader
 
 
 @pytest.fixture(scope="module")
@@ -199,3 +204,58 @@ def test_coordinates_that_nothing_can_be_looked_up_by_are_found(labels: np.ndarr
 def test_a_variable_without_units_is_found() -> None:
     tree = xr.DataTree.from_dict({"/part": xr.Dataset({"x": 1.0})})
     assert [(p.where, p.what) for p in described(tree)] == [("/part/x", "has no units")]
+
+
+def _metadata(store: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    root = json.loads((store / "zarr.json").read_text())
+    return root, root["consolidated_metadata"]["metadata"]
+
+
+METADATA: dict[str, Callable[[dict[str, Any]], object]] = {
+    "a unit": lambda of: of["signals/pressure"]["attributes"].update(units="uPa"),
+    "an array that is gone": lambda of: of.pop("cloud/elevation"),
+    "a type": lambda of: of["link_budget/transmission_loss_out"].update(data_type="int64"),
+    "a shape larger than memory": lambda of: of["image/energy"]["shape"].__setitem__(0, 10**12),
+}
+
+
+@pytest.mark.parametrize("change", METADATA)
+def test_numbers_are_not_read_by_metadata_that_have_changed(copy: Path, change: str) -> None:
+    """Units and scales were taken from them, and what they lacked was a traceback."""
+    root, of = _metadata(copy)
+    METADATA[change](of)
+    (copy / "zarr.json").write_text(json.dumps(root, indent=2))
+    for read in (store.open_store, FrameReader):
+        with pytest.raises(store.Damage, match=r"zarr\.json is missing or damaged: 'sonarsynth repair' restores it$"):
+            read(copy)
+    assert repair(copy, workers=0).ok
+    assert store.open_store(copy).sizes["frame"] == 20
+
+
+def test_a_link_in_a_store_is_not_our_fault(copy: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (chunk,) = (copy / "image/energy").glob("c.0.*")
+    chunk.rename(tmp_path / "elsewhere")
+    chunk.symlink_to(tmp_path / "elsewhere")
+    assert run(app, ["export", str(copy), "--to", "sonar-netcdf", "--out", str(tmp_path / "out")]) == 2
+    assert f"{chunk}: is a link, which is not followed" in capsys.readouterr().err
+
+
+def test_a_stranger_s_metadata_are_refused_in_one_line(copy: Path) -> None:
+    shutil.rmtree(copy / ".marks")
+    root, of = _metadata(copy)
+    METADATA["a type"](of)
+    (copy / "zarr.json").write_text(json.dumps(root))
+    with pytest.raises(store.Mismatch, match="not a store that xarray can open") as raised:
+        store.open_store(copy)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.filterwarnings("ignore::sonarsynth.store.marks.Unmarked")
+def test_what_a_stranger_s_store_lacks_is_named(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.rmtree(copy / ".marks")
+    root, of = _metadata(copy)
+    del of["source_estimates/time"]
+    (copy / "zarr.json").write_text(json.dumps(root))
+    for command, name in (("show", "source_estimates/time"), ("export", "time")):
+        assert run(app, [command, str(copy)]) == 2
+        assert f"the store has no {name}: another version wrote it, or another program" in capsys.readouterr().err
