@@ -97,6 +97,11 @@ def test_a_plan_says_which_echoes_the_converter_rounds_to_nothing() -> None:
         assert (float(render(at(counts), 0)["image/energy"].max()) == 0.0) is empty
         (line,) = (line for line in plan(at(counts)).warnings if line.startswith("echoes peak at"))
         assert ("nothing of them is recorded" in line) is empty and f"{counts:.2g} counts" in line
+    silent = render(at(1e-6), 0)
+    assert not silent["signals/pressure"].values.any()
+    assert any(
+        line.startswith("snaps are under half a count of the converter in 1 of 1") for line in plan(at(1e-6)).warnings
+    )
     heard = FlatNoise(level=float(20.0 * np.log10(loudest / 0.49 / REFERENCE_PRESSURE) - 10.0 * np.log10(80e3)))
     for recorded in (at(20.0), at(0.49, heard)):
         assert not any(line.startswith("echoes peak at") for line in plan(recorded).warnings)
