@@ -26,6 +26,8 @@ ECHOES_HEARD: Final = 3
 """Frames whose echoes are heard, at most, to see how many counts they have."""
 DITHER: Final = 0.5
 """Root mean square of noise, in counts, from which on a converter adds noise and nothing else."""
+NOISE_PEAK: Final = 4.0
+"""Over its rms, what one sample of Gaussian noise in 16 000 exceeds: a frame has more samples than that."""
 FEW_COUNTS: Final = 8.0
 """Peaks of echoes without such noise, in counts, under which a plan says so: at 7 the image of frame 32 of remus.yaml
 is 0.12 dB rms off within 20 dB of its brightest beam, at 1.8 it is 0.8 dB off."""
@@ -36,7 +38,7 @@ def converter_notes(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
     if plan.scene.sonar.converter is None:
         return []
     frames = [frame for look in looks if look.real for frame in look.frames if frame.moment.snaps]
-    return _levels(plan, frames) + _coarse_noise(plan.scene) + _coarse_echoes(plan, frames)
+    return _levels(plan, frames) + _noise(plan.scene) + _coarse_echoes(plan, frames)
 
 
 def _levels(plan: Plan, frames: Sequence[Frame]) -> list[str]:
@@ -78,11 +80,20 @@ def _dithered(scene: Scene) -> bool:
     return bool(other) or noise_counts(scene) >= DITHER
 
 
-def _coarse_noise(scene: Scene) -> list[str]:
-    """Whether counts are too coarse for the noise: with less than half a count, rounding is no noise of its own and
-    takes most of it (Widrow & Kollar 2008, Quantization Noise)."""
+def _noise(scene: Scene) -> list[str]:
+    """Whether noise exceeds full scale, or counts are too coarse for it: with less than half a count, rounding is no
+    noise of its own and takes most of it (Widrow & Kollar 2008, Quantization Noise)."""
     converter, counts = scene.sonar.converter, noise_counts(scene)
-    if converter is None or not 0.0 < counts < DITHER or scene.world.chorus is not None:
+    assert converter is not None
+    if counts * converter.quantum > converter.full_scale / NOISE_PEAK:
+        rms, full = (
+            20.0 * np.log10(p / REFERENCE_PRESSURE) for p in (counts * converter.quantum, converter.full_scale)
+        )
+        return [
+            f"noise of {rms:.0f} dB re 1 uPa in the band exceeds the full scale of the converter, {full:.0f} dB, in "
+            f"its peaks ({NOISE_PEAK:g} times its rms): it clips in every frame (scene.sonar.converter.full_scale)"
+        ]
+    if not 0.0 < counts < DITHER or scene.world.chorus is not None:
         return []
     levels = (20.0 * np.log10(p * converter.quantum / REFERENCE_PRESSURE) for p in (counts, 1.0))
     return [
