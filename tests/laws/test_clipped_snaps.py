@@ -97,6 +97,24 @@ def test_a_plan_says_which_echoes_the_converter_rounds_to_nothing() -> None:
         assert (float(render(at(counts), 0)["image/energy"].max()) == 0.0) is empty
         (line,) = (line for line in plan(at(counts)).warnings if line.startswith("echoes peak at"))
         assert ("nothing of them is recorded" in line) is empty and f"{counts:.2g} counts" in line
+    silent = render(at(1e-6), 0)
+    assert not silent["signals/pressure"].values.any()
+    assert any(
+        line.startswith("snaps are under half a count of the converter in 1 of 1") for line in plan(at(1e-6)).warnings
+    )
     heard = FlatNoise(level=float(20.0 * np.log10(loudest / 0.49 / REFERENCE_PRESSURE) - 10.0 * np.log10(80e3)))
     for recorded in (at(20.0), at(0.49, heard)):
         assert not any(line.startswith("echoes peak at") for line in plan(recorded).warnings)
+
+
+@pytest.mark.parametrize(("crest", "clips"), [(3.9, True), (7.0, False)])
+def test_a_plan_says_that_noise_clips(crest: float, clips: bool) -> None:
+    """Where its peaks are over full scale: 4 times its rms is in every frame, 7 times in none of a thousand."""
+    recipe, level = remus(1), 140.0
+    rms = 1e-6 * 10.0 ** (level / 20.0) * np.sqrt(recipe.scene.sonar.band.high - recipe.scene.sonar.band.low)
+    environment = replace(recipe.scene.world.environment, noise=FlatNoise(level=level))
+    world = replace(recipe.scene.world, environment=environment, sources=())
+    sonar = replace(recipe.scene.sonar, converter=Converter(bits=16, full_scale=float(crest * rms)))
+    own = replace(recipe, scene=replace(recipe.scene, world=world, sonar=sonar))
+    assert any("clips in every frame" in line for line in plan(own, ["signals"]).warnings) is clips
+    assert (int(render(own, 0)["signals/clipped"]) > 0) is clips

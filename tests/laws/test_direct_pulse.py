@@ -223,3 +223,10 @@ def test_the_plan_counts_what_the_converter_leaves_of_the_direct_pulse():
     assert few.fall - fewest.fall == pytest.approx(4 * 6.02, abs=4.0) and few.fall < exact.fall - 30
     assert few.below - fewest.below == pytest.approx(4 * 6.02, abs=4.0)
     assert at(24, 300.0).fall < 30
+
+
+def test_the_plan_says_that_images_may_have_nothing_but_what_is_left_of_the_direct_pulse():
+    ahead = overlapped((3.5, 0.2, -50.0), direct_pulse="remove")
+    alone = replace(ahead, scene=replace(ahead.scene, world=replace(ahead.scene.world, targets=())))
+    for recipe, said in ((ahead, False), (alone, True)):
+        assert any("but no echo is heard in the frames measured" in note for note in plan(recipe).warnings) == said

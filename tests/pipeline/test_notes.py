@@ -79,3 +79,24 @@ def test_subarrays_that_a_kink_of_the_sound_speed_asks_for_are_put_down_to_it(sm
             f", for the sound speed has a kink at {deep:g} m, within the array: move one of the two"
         )
     assert "kink" not in said[8.0]
+
+
+def test_a_body_that_stands_before_the_snap_is_noted_in_the_frames_that_have_no_clock() -> None:
+    """It crosses the line from the snap to the array in the middle frame alone; there nothing is located."""
+    world = ss.World(
+        environment=ss.Environment(depth=10.0, sound_speed=ss.Isovelocity(speed=1540.0)),
+        targets=(
+            ss.Target(
+                name="ball",
+                shape=ss.Sphere(radius=0.8, edge=0.2),
+                motion=ss.Line(start=(7.0, -8.5, -7.5), stop=(7.0, 3.5, -7.5), duration=6.0),
+            ),
+        ),
+        sources=(ss.SnappingShrimp(position=(14.0, -5.0)),),
+    )
+    sonar = ss.Sonar(array=ss.PlanarLattice(columns=6, rows=6, pitch=0.1))
+    recipe = ss.Recipe(scene=ss.Scene(world=world, sonar=sonar, trajectory=ss.Trajectory(frames=3, interval=3.0)))
+    (line,) = (note for note in ss.plan(recipe).warnings if "hides all snaps" in note)
+    assert line.startswith("ball: ") and "in 1 of 3 frames examined (first: frame 1)" in line
+    located = [np.isfinite(ss.render(recipe, frame)["source_estimates/time"].values[0]) for frame in range(3)]
+    assert located == [True, False, True]

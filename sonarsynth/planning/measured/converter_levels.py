@@ -26,6 +26,8 @@ ECHOES_HEARD: Final = 3
 """Frames whose echoes are heard, at most, to see how many counts they have."""
 DITHER: Final = 0.5
 """Root mean square of noise, in counts, from which on a converter adds noise and nothing else."""
+NOISE_PEAK: Final = 4.0
+"""Over its rms, what one sample of Gaussian noise in 16 000 exceeds: a frame has more samples than that."""
 FEW_COUNTS: Final = 8.0
 """Peaks of echoes without such noise, in counts, under which a plan says so: at 7 the image of frame 32 of remus.yaml
 is 0.12 dB rms off within 20 dB of its brightest beam, at 1.8 it is 0.8 dB off."""
@@ -36,25 +38,28 @@ def converter_notes(plan: Plan, looks: Sequence[SampledScene]) -> list[str]:
     if plan.scene.sonar.converter is None:
         return []
     frames = [frame for look in looks if look.real for frame in look.frames if frame.moment.snaps]
-    return _clipping(plan, frames) + _coarse_noise(plan.scene) + _coarse_echoes(plan, frames)
+    return _levels(plan, frames) + _noise(plan.scene) + _coarse_echoes(plan, frames)
 
 
-def _clipping(plan: Plan, frames: Sequence[Frame]) -> list[str]:
-    """In how many frames the direct pulses of snaps exceed full scale, and by how much at most."""
+def _levels(plan: Plan, frames: Sequence[Frame]) -> list[str]:
+    """In how many frames the direct pulses of snaps exceed full scale, and by how much at most; or are under half a
+    count."""
+    converter = plan.scene.sonar.converter
+    assert converter is not None
     heard = [frames[n] for n in evenly(len(frames), HEARD)] if frames else []
-    over = np.array([20.0 * np.log10(max(peak(plan, frame, False), 1e-300) / _full_scale(plan)) for frame in heard])
+    peaks = np.array([peak(plan, frame, False) for frame in heard])
+    faint, over = peaks < 0.5 * converter.quantum, 20.0 * np.log10(np.maximum(peaks, 1e-300) / converter.full_scale)
+    if faint.any() and not _dithered(plan.scene):
+        return [
+            f"snaps are under half a count of the converter in {np.count_nonzero(faint)} of {len(heard)} frames that "
+            "were heard, without noise that carries them over it: nothing is recorded (scene.sonar.converter)"
+        ]
     if not np.any(over > 0.0):
         return []
     return [
         f"snaps clip in {np.count_nonzero(over > 0.0)} of {len(heard)} frames that were heard, by up to "
         f"{over.max():.1f} dB: signals and levels are then too low (scene.sonar.converter.full_scale)"
     ]
-
-
-def _full_scale(plan: Plan) -> float:
-    converter = plan.scene.sonar.converter
-    assert converter is not None
-    return float(converter.full_scale)
 
 
 def noise_counts(scene: Scene) -> float:
@@ -68,11 +73,27 @@ def noise_counts(scene: Scene) -> float:
     return float(np.sqrt(np.trapezoid(sum(noise.density(f) for noise in noises), f))) / sonar.converter.quantum
 
 
-def _coarse_noise(scene: Scene) -> list[str]:
-    """Whether counts are too coarse for the noise: with less than half a count, rounding is no noise of its own and
-    takes most of it (Widrow & Kollar 2008, Quantization Noise)."""
+def _dithered(scene: Scene) -> bool:
+    """Whether other sound carries snaps and echoes over the steps of the converter."""
+    world = scene.world
+    other = world.chorus is not None or world.noise_sources or world.reverberation is not None
+    return bool(other) or noise_counts(scene) >= DITHER
+
+
+def _noise(scene: Scene) -> list[str]:
+    """Whether noise exceeds full scale, or counts are too coarse for it: with less than half a count, rounding is no
+    noise of its own and takes most of it (Widrow & Kollar 2008, Quantization Noise)."""
     converter, counts = scene.sonar.converter, noise_counts(scene)
-    if converter is None or not 0.0 < counts < DITHER or scene.world.chorus is not None:
+    assert converter is not None
+    if counts * converter.quantum > converter.full_scale / NOISE_PEAK:
+        rms, full = (
+            20.0 * np.log10(p / REFERENCE_PRESSURE) for p in (counts * converter.quantum, converter.full_scale)
+        )
+        return [
+            f"noise of {rms:.0f} dB re 1 uPa in the band exceeds the full scale of the converter, {full:.0f} dB, in "
+            f"its peaks ({NOISE_PEAK:g} times its rms): it clips in every frame (scene.sonar.converter.full_scale)"
+        ]
+    if not 0.0 < counts < DITHER or scene.world.chorus is not None:
         return []
     levels = (20.0 * np.log10(p * converter.quantum / REFERENCE_PRESSURE) for p in (counts, 1.0))
     return [
@@ -83,9 +104,8 @@ def _coarse_noise(scene: Scene) -> list[str]:
 
 def _coarse_echoes(plan: Plan, frames: Sequence[Frame]) -> list[str]:
     """In how many frames echoes have few counts or none, where no other sound carries them over the steps."""
-    world, converter = plan.scene.world, plan.scene.sonar.converter
-    other = world.chorus is not None or world.noise_sources or world.reverberation is not None
-    if converter is None or other or noise_counts(plan.scene) >= DITHER:
+    converter = plan.scene.sonar.converter
+    if converter is None or _dithered(plan.scene):
         return []
     echoing = [frame for frame in frames if frame.moment.bodies]
     heard = [echoing[n] for n in evenly(len(echoing), ECHOES_HEARD)] if echoing else []

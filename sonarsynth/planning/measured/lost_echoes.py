@@ -48,10 +48,15 @@ def lost_echoes(plan: Plan) -> list[str]:
         return []
     rows = [row for index in windows.tight if (row := losses(plan.at(index), index)) is not None]
     lines = []
+    chosen = plan.scene.processing.direct_pulse == "auto"
+    why = "echoes arrive before it has passed" if chosen else "processing.direct_pulse"
+    if windows.direct_removed and not rows:
+        lines.append(
+            f"the direct pulse is removed ({why}), but no echo is heard in the frames measured: images may have "
+            "nothing but what is left of it, and are NaN where they do"
+        )
     if windows.direct_removed and rows:
         fall, below = (min([MOST, *(getattr(row, name) for row in rows)]) for name in ("fall", "below"))
-        chosen = plan.scene.processing.direct_pulse == "auto"
-        why = "echoes arrive before it has passed" if chosen else "processing.direct_pulse"
         frames = ", ".join(str(row.frame) for row in rows)
         lines.append(
             f"the direct pulse is removed ({why}): it is reduced by {fall:.0f} dB, to {below:.0f} dB below the echoes "

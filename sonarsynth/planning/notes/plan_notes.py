@@ -28,6 +28,7 @@ from sonarsynth.planning.notes.source_notes import (
 )
 from sonarsynth.planning.notes.target_notes import (
     focus_notes,
+    hiding_notes,
     law_notes,
     mirror_notes,
     overlap_notes,
@@ -85,7 +86,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         some = noted(looks)
         lines += unlocated(scene) or lobe_notes(some) + direction_notes(some) + assumed_speed_notes(some)
     for look in noted(looks):
-        lines += mirror_notes(look) + overlap_notes(look)
+        lines += hiding_notes(look) + mirror_notes(look) + overlap_notes(look)
         lines += focus_notes(look) if plan.products & OF_BEAMS else []
         lines += _extent(look.scene, look.profile)
         lines += _cut(look.scene, look.profile.uniform)

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from sonarsynth.casting.ray_casting import occluded
+from sonarsynth.columns import alike
 from sonarsynth.conventions import Floats, direction, evenly
 from sonarsynth.equations.arrays.apertures import defocus_spread, focus_delay, live_gain
 from sonarsynth.geometry.mesh import Mesh
@@ -153,6 +155,36 @@ def in_view(body: PlacedTarget, look: SampledScene, frame: Frame) -> bool:
     return box_in_view(corners, BOX_FACES, look.scene.sonar.beams).view <= View.PARTLY_IN_VIEW
 
 
+def hiding_notes(look: SampledScene) -> list[str]:
+    """In which frames bodies hide all snaps from the array, on straight lines to its outermost hydrophones: it then has
+    no clock."""
+    frames, hidden, names = chosen(look), list[int](), set[str]()
+    outermost = _outermost(elements(look.scene.sonar.array).position)
+    for frame in frames:
+        solid = [b for b, law in zip(frame.moment.bodies, look.scene.laws, strict=True) if not law.passes_sound]
+        array = frame.sonar_pose.to_world(outermost)
+        snaps = [snap.position for snap in frame.moment.snaps if snap.illuminates]
+        behind = [(b.name, occluded((b,), alike(place, len(array)), array)) for place in snaps for b in solid]
+        blocked = [occluded(tuple(solid), alike(place, len(array)), array).all() for place in snaps]
+        if blocked and all(blocked):
+            hidden.append(frame.index)
+            names |= {name for name, lines in behind if lines.any()}
+    if not hidden:
+        return []
+    reflected = look.scene.physics.tracing.bounces > 0
+    then = "a reflection may be taken for it" if reflected else "there is no clock, and there are no points"
+    return [
+        f"{', '.join(sorted(names))}: hides all snaps from the array {said(hidden, len(frames))}: no direct pulse is "
+        f"heard to locate one by, so {then} (sound that goes round bodies is left out)"
+    ]
+
+
+def _outermost(position: Floats) -> Floats:
+    """Those of hydrophones (sensor, xyz) that are farthest to each side, and to each corner."""
+    ways = np.array([(y, z) for y in (-1, 0, 1) for z in (-1, 0, 1)])
+    return np.asarray(position[np.unique((position[:, 1:] @ ways.T).argmax(axis=0))])
+
+
 def mirror_notes(look: SampledScene) -> list[str]:
     """Which snaps and targets an array that cannot tell front from back hears as if in front, in which frames."""
     sonar = look.scene.sonar
@@ -207,8 +239,8 @@ def focus_notes(look: SampledScene) -> list[str]:
         lines.append(
             f"{target.name}: out of focus {when}: {away[worst]:.2g} m off, where beams are focused "
             f"{f'at {focus:.3g} m' if focus else 'for plane waves'}, an echo is {loss:.0f} dB fainter and several "
-            f"points up to {np.rad2deg(spread[worst]):.2g} deg beside it, as their predicted errors say "
-            "(scene.processing.beamforming.focus)"
+            f"points up to {min(float(np.rad2deg(spread[worst])), 180.0):.2g} deg beside it, as their predicted errors "
+            "say (scene.processing.beamforming.focus)"
         )
     return lines
 
