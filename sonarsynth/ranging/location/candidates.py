@@ -20,10 +20,10 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from sonarsynth.conventions import Bools, Floats, azimuth_elevation
+from sonarsynth.equations.kernels.sensor_rows import power_and_peak
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Signals, SourceEstimates
-from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
     ECHO,
@@ -71,7 +71,7 @@ def loudness(signals: Signals, live: Bools, length: int) -> PowerTrack:
 
     The quiet power is the tenth part from below of short means: a snap and its echoes fill no more of the signals.
     """
-    power, peak = ranging_kernels.power_and_peak(signals.pressure, live)
+    power, peak = power_and_peak(signals.pressure, live, 0, signals.pressure.shape[1])
     track = uniform_filter1d(power, min(length, len(power)), mode="constant")
     tenth = len(power) // 10
     quiet = np.sort(uniform_filter1d(power, min(16, len(power))))[tenth]  # NumPy's `partition` takes ten times as long
