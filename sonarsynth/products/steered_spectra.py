@@ -26,12 +26,12 @@ class Snapshots:
     frequency: Floats  # (bin,) Hz, evenly spaced
     spacing: float  # Hz between two
     bins: range  # (bin,) their numbers
-    transform: Callable[[range, int], Spectra]  # spectra (sensor, bin) in Pa of bins, phases from `begin` on
+    transform: Callable[[range, float], Spectra]  # spectra (sensor, bin) in Pa of bins, phases from `begin` on
     start: float  # s: the sample that phases refer to
     samples: int  # of the window
     sampling_frequency: float  # Hz
     sample_power: npt.NDArray[np.floating]  # (sample,) Pa2 of all sensors together
-    begin: int = 0  # sample of the window that phases refer to
+    begin: float = 0.0  # sample of the window that phases refer to
 
     @cached_property
     def spectra(self) -> Spectra:
@@ -42,7 +42,7 @@ class Snapshots:
         """The same window with other spectra (sensor, bin)."""
         return replace(self, bins=range(len(self.frequency)), transform=partial(_some, spectra, self), begin=0)
 
-    def every(self, step: int, first: int, begin: int = 0) -> Snapshots:
+    def every(self, step: int, first: int, begin: float = 0.0) -> Snapshots:
         """Every step-th bin from the `first` on; phases refer to a sample `begin` later."""
         return replace(
             self,
@@ -77,21 +77,21 @@ class Snapshots:
         before and after it, to the beginning of which phases then refer. As it is where no k over 1 is possible.
 
         Silent is what single precision leaves of the loudest. `PARTS` is a multiple of k, and what is left begins at a
-        half of such a part: so its delays are among those of the whole.
+        quarter of such a part: so its delays are among those of the whole.
         """
         heard = np.flatnonzero(self.sample_power > np.finfo(np.float32).eps ** 2 * self.sample_power.max(initial=0.0))
         around, whole = margin * self.sampling_frequency, self.sampling_frequency / self.spacing
         first, stop = (heard[0] - around, heard[-1] + 1 + around) if len(heard) else (0.0, whole)
         most = min(PARTS, len(self.frequency) // FEWEST) if first >= 0.0 and stop <= self.samples else 1
         for k in (k for k in range(most, 1, -1) if PARTS % k == 0):
-            begin = int(2 * PARTS * min(first, self.samples - whole / k) / whole) * round(whole / (2 * PARTS))
-            if begin >= 0 and begin + whole / k >= stop:
+            begin = int(4 * PARTS * min(first, self.samples - whole / k) / whole) * whole / (4 * PARTS)
+            if begin >= 0.0 and begin + whole / k >= stop:
                 part = self.every(k, -round(self.frequency[0] / self.spacing) % k, begin)
                 return replace(part, sample_power=np.ones_like(self.sample_power))
         return self
 
 
-def _some(spectra: Spectra, of: Snapshots, bins: range, begin: int) -> Spectra:
+def _some(spectra: Spectra, of: Snapshots, bins: range, begin: float) -> Spectra:
     """As `Snapshots.transform`, of spectra (sensor, bin) that are given."""
     some = slice(bins.start, None, bins.step)
     turn = np.exp(2j * np.pi * of.frequency[some] * begin / of.sampling_frequency).astype(np.complex64)

@@ -17,7 +17,7 @@ GATE_TAPER: Final = 1e-4
 SENSORS_AT_ONCE: Final = 64
 """Sensors whose gates are transformed together: they stay in the cache."""
 
-DIVISOR: Final = 24
+DIVISOR: Final = 12
 """Divides the length of transforms: every second, third, fourth, sixth or twelfth bin, say, comes of as many fewer
 samples."""
 
@@ -123,8 +123,8 @@ class Gate:
         """Of the bins (bin,), Hz."""
         return np.array(self.bins, float) * frequency_spacing(self.count, self.sampling_frequency)
 
-    def __call__(self, bins: range, begin: int = 0) -> npt.NDArray[np.complex64]:
-        """rfft spectra (sensor, bin) in Pa at bins whose step divides the length; phases refer to sample `begin`.
+    def __call__(self, bins: range, begin: float = 0.0) -> npt.NDArray[np.complex64]:
+        """rfft spectra (sensor, bin) in Pa at bins whose step divides the length; phases refer to `begin` (samples).
 
         They are those of sound that is wound round a circle of a step-th of the length, and turned, unless bins are
         multiples of their step, by the rest.
@@ -133,16 +133,18 @@ class Gate:
 
         from sonarsynth.equations.kernels.sensor_rows import wind_rows
 
-        first, rest = divmod(bins.start, bins.step)
-        taper, heard = _turned_taper(self.count, self.sampling_frequency, rest, begin), np.flatnonzero(self.power)
+        length, sample, (first, rest) = fast_length(self.count), int(begin), divmod(bins.start, bins.step)
+        taper, heard = _turned_taper(self.count, self.sampling_frequency, rest, sample), np.flatnonzero(self.power)
         low, high = (heard[0], heard[-1] + 1) if len(heard) else (0, 0)
         spectra = np.empty((len(self.pressure), len(bins)), np.complex64)
-        wound = np.empty((SENSORS_AT_ONCE, fast_length(self.count) // bins.step), np.result_type(self.pressure, taper))
+        wound = np.empty((SENSORS_AT_ONCE, length // bins.step), np.result_type(self.pressure, taper))
         for n in range(0, len(spectra), SENSORS_AT_ONCE):
             some = self.pressure[n : n + SENSORS_AT_ONCE]
-            wind_rows(some, self.first_sample, low, high, taper, begin, wound)
+            wind_rows(some, self.first_sample, low, high, taper, sample, wound)
             transformed = (fft if rest else rfft)(wound[: len(some)], axis=1)
             spectra[n : n + len(some)] = transformed[:, first : first + len(bins)]
+        if begin > sample:
+            spectra *= np.exp(2j * np.pi * np.array(bins) * ((begin - sample) / length)).astype(np.complex64)
         return spectra
 
 
