@@ -42,15 +42,17 @@ class Snapshots:
         """The same window with other spectra (sensor, bin)."""
         return replace(self, bins=range(len(self.frequency)), transform=partial(_some, spectra, self), begin=0)
 
-    def every(self, step: int, first: int, begin: float = 0.0) -> Snapshots:
-        """Every step-th bin from the `first` on; phases refer to a sample `begin` later."""
+    def every(self, step: int, first: int, begin: float = 0.0, *, together: bool = False) -> Snapshots:
+        """Every step-th bin from the `first` on, whose transform is their own, unless that of all is made, or is to be,
+        `together`; phases refer to a sample `begin` later."""
+        of = self.having(self.spectra) if together or "spectra" in vars(self) else self
         return replace(
-            self,
+            of,
             frequency=self.frequency[first::step],
             spacing=step * self.spacing,
-            bins=self.bins[first::step],
+            bins=of.bins[first::step],
             start=self.start + begin / self.sampling_frequency,
-            begin=self.begin + begin,
+            begin=of.begin + begin,
         )
 
     @property

@@ -23,8 +23,8 @@ LONGEST = 0.8
 """Longest sound that the ends of the band are weighted for, over the inverse of the bins' distance."""
 FEWEST = 84
 """Bins that are left, at least: of 64 the ends of the band err by 0.01 to 0.03 dB, of 84 by 0.004 to 0.01."""
-TOGETHER = 3
-"""Every third bin or more are taken from the transform of all, which ranging needs too where sound lasts so long."""
+TOGETHER = 4
+"""Every fourth bin or more are taken from the transform of all: ranging needs as many, and it takes no longer."""
 WEIGHTED = 200
 """Most bins whose weights are solved for: of more, those in the middle weigh one. Over 600 to 1000 bins that changes
 weights by 1e-4, and the sum by 1e-5 of what the weights leave wrong."""
@@ -42,7 +42,7 @@ def fewer_bins(snapshots: Snapshots, travel_time: float) -> Snapshots:
     if step < 2:
         return snapshots
     chosen, weight = weighted_bins(bins, step)
-    few = (snapshots if step > TOGETHER else snapshots.having(snapshots.spectra)).every(step, int(chosen[0]))
+    few = snapshots.every(step, int(chosen[0]), together=step <= TOGETHER)
     return few.having(few.spectra * np.sqrt(weight).astype(np.float32))
 
 
