@@ -184,8 +184,7 @@ def fit_pulse(
     if first is None:
         return UNFIT
     (wave, off, rows), c, q, rest = first, sonar.assumed_sound_speed, elements.position, elements
-    aligned, longer = None, 1.0
-    expected = _times(wave, q, c)
+    aligned, longer, expected = None, 1.0, _times(wave, q, c)
     for _ in range(ROUNDS):
         if velocity.any():
             q = rest.position + (expected - wave.time)[:, None] * velocity
@@ -211,9 +210,10 @@ def fit_pulse(
     if pulse.one_tone(SHARED) and not off < PERIODS_OFF / sonar.band.centre:
         return UNRESOLVED
     if pulse_times.cuts_tails(sonar.band) or pulse_times.null_in_band(elements, sonar, wave.direction):
-        some, deaf = rows if quiet < UNHEARD * pulse.noise else slice(None), pulse.noise_to_signal
-        heard, own = replace(signals, pressure=signals.pressure[some]), elements.select(some)
-        pulse = replace(pulse, longer=_in_window(heard, own, sonar, wave, longer * pulse_times.LONGER, deaf)[1])
+        some, longer = rows if quiet < UNHEARD * pulse.noise else slice(None), longer * pulse_times.LONGER
+        cut, start = pulse_times.excerpt(signals, wave.time, half + longer * pulse_times.half_length(sonar.band))
+        heard, own = replace(signals, pressure=np.ascontiguousarray(cut[some]), start=start), elements.select(some)
+        pulse = replace(pulse, longer=_in_window(heard, own, sonar, wave, longer, pulse.noise_to_signal)[1])
     return wave, pulse, elements
 
 
