@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -77,7 +76,7 @@ class Clean(Steering):
             u = direction(sonar.beams.azimuth[beam[1]], sonar.beams.elevation[beam[0]])
             delay = focus_delay(elements.position, u, self.focus, sonar.assumed_sound_speed)
             wave = (amplitude * waves(snapshots.frequency, delay)).astype(np.complex64)
-            return plain.energies(replace(snapshots, spectra=wave), elements, sonar)
+            return plain.energies(snapshots.having(wave), elements, sonar)
 
         dirty = plain.energies(snapshots, elements, sonar)
         return cleaned(dirty, point, self.gain, self.depth, self.steps)

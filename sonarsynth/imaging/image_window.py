@@ -8,7 +8,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import hann_shading, live_gain
-from sonarsynth.equations.arrays.gates import frequency_spacing, gate_samples, gated_spectra
+from sonarsynth.equations.arrays.gates import frequency_spacing, gate_of, gate_samples
 from sonarsynth.products import EnergyImage, Signals, Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
@@ -26,9 +26,9 @@ def snapshots_of(signals: Signals, sonar: Sonar, start: float, stop: float) -> S
     """
     rate = signals.sampling_frequency
     first, count = gate_samples(start, stop, signals.start, rate, signals.pressure.shape[1])
-    frequency, spectra, power = gated_spectra(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
+    gate = gate_of(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
     spacing, begin = frequency_spacing(count, rate), signals.start + first / rate
-    return Snapshots(frequency, spacing, spectra, begin, count, rate, power)
+    return Snapshots(gate.frequency, spacing, gate.bins, gate, begin, count, rate, gate.power)
 
 
 def sounding(power: Floats) -> tuple[int, int]:

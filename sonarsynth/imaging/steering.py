@@ -77,12 +77,11 @@ class Steering(Method):
         self, snapshots: Snapshots, elements: Elements, sonar: Sonar
     ) -> Callable[[Floats], npt.NDArray[np.complex64]]:
         """A function from directions (beam, xyz), sonar frame, to the spectra (beam, bin) in Pa of beams there."""
-        spectra, frequency = snapshots.spectra, snapshots.frequency
-        focus, c = self.focus, sonar.assumed_sound_speed
+        frequency, focus, c = snapshots.frequency, self.focus, sonar.assumed_sound_speed
         gain = weights(elements, self.shading)
-        if not (elements.on_lattice and self.separable):
-            return partial(beam_spectra, spectra, frequency, elements.position, gain, sound_speed=c, focus=focus)
-        return LatticeBeams(spectra, frequency, elements, gain, c, focus)
+        if elements.on_lattice and self.separable:
+            return LatticeBeams(partial(getattr, snapshots, "spectra"), frequency, elements, gain, c, focus)
+        return partial(beam_spectra, snapshots.spectra, frequency, elements.position, gain, sound_speed=c, focus=focus)
 
     def steer(
         self, snapshots: Snapshots, elements: Elements, sonar: Sonar, direction: Floats

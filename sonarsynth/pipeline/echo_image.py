@@ -6,13 +6,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from sonarsynth.equations.kernels.sensor_rows import power_and_peak
 from sonarsynth.imaging.image_window import energy_image, snapshots_of
 from sonarsynth.pipeline.handed_on import BeamformedFrame
 from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.pipeline.synthesis import known_elements
 from sonarsynth.planning import Plan, receiver_of
 from sonarsynth.products import BeamSpectra, EnergyImage, PointCloud, Signals, SourceEstimates, no_points
-from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
 from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.range_image import range_image
@@ -72,7 +72,8 @@ def _received(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> Received
         return None
     elements, sonar, supports = known_elements(plan, frame), plan.scene.sonar, plan.windows.supports
     some = np.arange(elements.count) % max(elements.count // 64, 1) == 0
-    loudest = ranging_kernels.power_and_peak(signals.pressure, some & (elements.gain != 0))[1]
+    every = 0, signals.pressure.shape[1]
+    loudest = power_and_peak(signals.pressure, some & (elements.gain != 0), *every)[1]
     focus, direct = plan.choices.beamforming.focus, beamformed.signals
     return ReceivedWindow(
         elements, sonar, image, beams, loudest, direct, estimates, focus, supports.late, supports.direct

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
+
+Spectra = npt.NDArray[np.complex64]
 
 PARTS = 12
 """Parts of a window: it is cut to one of them, or to so many as divide them, where the rest is silent."""
@@ -22,11 +25,35 @@ class Snapshots:
 
     frequency: Floats  # (bin,) Hz, evenly spaced
     spacing: float  # Hz between two
-    spectra: npt.NDArray[np.complex64]  # (sensor, bin) Pa, as `rfft` gives them
+    bins: range  # (bin,) their numbers
+    transform: Callable[[range, float], Spectra]  # spectra (sensor, bin) in Pa of bins, phases from `begin` on
     start: float  # s: the sample that phases refer to
     samples: int  # of the window
     sampling_frequency: float  # Hz
     sample_power: npt.NDArray[np.floating]  # (sample,) Pa2 of all sensors together
+    begin: float = 0.0  # sample of the window that phases refer to
+
+    @cached_property
+    def spectra(self) -> Spectra:
+        """(sensor, bin) Pa, as `rfft` gives them; made when asked for."""
+        return self.transform(self.bins, self.begin)
+
+    def having(self, spectra: Spectra) -> Snapshots:
+        """The same window with other spectra (sensor, bin)."""
+        return replace(self, bins=range(len(self.frequency)), transform=partial(_some, spectra, self), begin=0)
+
+    def every(self, step: int, first: int, begin: float = 0.0, *, together: bool = False) -> Snapshots:
+        """Every step-th bin from the `first` on, whose transform is their own, unless that of all is made, or is to be,
+        `together`; phases refer to a sample `begin` later."""
+        of = self.having(self.spectra) if together or "spectra" in vars(self) else self
+        return replace(
+            of,
+            frequency=self.frequency[first::step],
+            spacing=step * self.spacing,
+            bins=of.bins[first::step],
+            start=self.start + begin / self.sampling_frequency,
+            begin=of.begin + begin,
+        )
 
     @property
     def duration(self) -> float:
@@ -45,7 +72,7 @@ class Snapshots:
     def select(self, bins: npt.NDArray[np.integer]) -> Snapshots:
         """Some bins, next to each other: of part of a band, sound may last as long as the window."""
         unknown = np.ones_like(self.sample_power)
-        return replace(self, frequency=self.frequency[bins], spectra=self.spectra[:, bins], sample_power=unknown)
+        return replace(self, frequency=self.frequency[bins], sample_power=unknown).having(self.spectra[:, bins])
 
     def without_silence(self, margin: float) -> Snapshots:
         """Every k-th bin, which are all that a k-th of the window has: of that which has the sound and `margin` (s)
@@ -59,16 +86,18 @@ class Snapshots:
         first, stop = (heard[0] - around, heard[-1] + 1 + around) if len(heard) else (0.0, whole)
         most = min(PARTS, len(self.frequency) // FEWEST) if first >= 0.0 and stop <= self.samples else 1
         for k in (k for k in range(most, 1, -1) if PARTS % k == 0):
-            begin = int(4 * PARTS * min(first, self.samples - whole / k) / whole) / (4 * PARTS * self.spacing)
-            if begin >= 0.0 and (begin + 1.0 / (k * self.spacing)) * self.sampling_frequency >= stop:
-                every = slice(-round(self.frequency[0] / self.spacing) % k, None, k)
-                frequency, unknown = self.frequency[every], np.ones_like(self.sample_power)
-                spectra = self.spectra[:, every] * np.exp(2j * np.pi * frequency * begin).astype(np.complex64)
-                return replace(
-                    self, frequency=frequency, spacing=k * self.spacing, spectra=spectra, start=self.start + begin,
-                    sample_power=unknown,
-                )  # fmt: skip
+            begin = int(4 * PARTS * min(first, self.samples - whole / k) / whole) * whole / (4 * PARTS)
+            if begin >= 0.0 and begin + whole / k >= stop:
+                part = self.every(k, -round(self.frequency[0] / self.spacing) % k, begin)
+                return replace(part, sample_power=np.ones_like(self.sample_power))
         return self
+
+
+def _some(spectra: Spectra, of: Snapshots, bins: range, begin: float) -> Spectra:
+    """As `Snapshots.transform`, of spectra (sensor, bin) that are given."""
+    some = slice(bins.start, None, bins.step)
+    turn = np.exp(2j * np.pi * of.frequency[some] * begin / of.sampling_frequency).astype(np.complex64)
+    return spectra[:, some] * turn if begin else spectra[:, some]
 
 
 @dataclass(frozen=True, eq=False)

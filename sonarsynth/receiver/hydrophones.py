@@ -103,7 +103,7 @@ class Elements:
     columns: int
     rows: int
 
-    def select(self, sensor: Ints) -> Elements:
+    def select(self, sensor: Ints | slice) -> Elements:
         """Some of them (element,), where they are."""
         columns = {name: getattr(self, name)[sensor] for name in ("position", "gain", "column", "row")}
         return replace(self, **columns)

@@ -14,10 +14,10 @@ from sonarsynth.equations.arrays.beams import beam_spectra
 from sonarsynth.equations.arrays.gates import (
     fast_length,
     frequency_spacing,
+    gate_of,
     gate_samples,
     gate_taper,
     gated_energy,
-    gated_spectra,
 )
 from sonarsynth.imaging.delay_and_sum.lattice_beams import LatticeBeams
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, elements
@@ -95,7 +95,7 @@ def test_loss_of_the_focus_of_the_axis_in_the_corner(radius, loss):
     array, corner, frequencies = elements(Romanis()), direction(*np.deg2rad([25.0, 25.0])), 25e3 + 1e3 * np.arange(61)
     arrival = focus_delay(array.position, corner, radius, SPEED)
     spectra = np.exp(-2j * np.pi * frequencies * arrival[:, None]).astype(np.complex64)
-    beam = LatticeBeams(spectra, frequencies, array, array.gain / 508, SPEED, radius)(corner[None])
+    beam = LatticeBeams(lambda: spectra, frequencies, array, array.gain / 508, SPEED, radius)(corner[None])
     assert -10 * np.log10(np.sum(np.abs(beam) ** 2) / 61) == pytest.approx(loss, abs=0.02)
 
 
@@ -138,13 +138,17 @@ def test_spectra_are_those_of_numpy_and_obey_parseval():
     random = np.random.default_rng(1)
     pressure = random.normal(size=(3, 900)).astype(np.float32)
     rate, first, count = 196e3, 57, 731
-    frequencies, spectra, _ = gated_spectra(pressure, rate, first, count, (1e-3, rate))
+    gate = gate_of(pressure, rate, first, count, (1e-3, rate))
+    frequencies, spectra = gate.frequency, gate(gate.bins)
     cut = pressure[:, first : first + count] * gate_taper(count, rate)
     length = fast_length(count)
     every = np.fft.rfft(cut.astype(float), length, axis=1)
     inside = slice(1, (length + 1) // 2)
     np.testing.assert_allclose(spectra, every[:, inside], atol=1e-6 * np.abs(every).max())
     np.testing.assert_allclose(frequencies, np.fft.rfftfreq(length, 1 / rate)[inside], rtol=1e-14)
+    for some, begin in ((gate.bins[1::2], 0), (gate.bins[2::3], 40), (gate.bins[6::12], 700.25)):
+        turned = every[:, some] * np.exp(2j * np.pi * np.array(some) * begin / length)
+        np.testing.assert_allclose(gate(some, begin), turned, atol=1e-6 * np.abs(every).max())
     # All of the energy but the mean's (and that at half the sampling frequency, where there is such a bin).
     lost = np.abs(every[:, 0]) ** 2 + (np.abs(every[:, -1]) ** 2 if length % 2 == 0 else 0.0)
     expected = (np.sum(cut.astype(float) ** 2, axis=1) - lost / length) / rate
@@ -159,16 +163,17 @@ def test_energy_of_short_sounds_is_that_of_their_spectra(count, begin, stop):
     pressure = np.zeros((3, 1000), np.float32)
     pressure[:, begin:stop] = np.random.default_rng(1).normal(size=(3, stop - begin))
     gate = pressure, 196e3, 57, count, (25e3, 85e3)
-    _, spectra, _ = gated_spectra(*gate)
+    made = gate_of(*gate)
+    spectra = made(made.bins)
     assert gated_energy(*gate) == pytest.approx(np.sum(np.abs(spectra.astype(complex)) ** 2), rel=1e-6)
 
 
 def test_band_edges_belong_to_the_band():
-    pressure = np.ones((1, 800), np.float32)
-    frequencies, spectra, _ = gated_spectra(pressure, 200e3, 0, 800, (25e3, 85e3))
-    assert frequencies[0] == pytest.approx(25e3)
-    assert frequencies[-1] == pytest.approx(85e3)
-    assert spectra.shape == (1, 241)
+    pressure = np.ones((1, 960), np.float32)
+    gate = gate_of(pressure, 200e3, 0, 960, (25e3, 85e3))
+    assert gate.frequency[0] == pytest.approx(25e3)
+    assert gate.frequency[-1] == pytest.approx(85e3)
+    assert gate(gate.bins).shape == (1, 289)
 
 
 @st.composite

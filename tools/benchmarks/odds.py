@@ -69,7 +69,7 @@ class Seen:
     def image(self, spectra: np.ndarray, like: Snapshots, method: Any = None) -> np.ndarray:
         """Energy (elevation, azimuth) of the beams of spectra (sensor, bin)."""
         method = self.made.choices.beamforming if method is None else method
-        of = replace(like, spectra=spectra.astype(np.complex64))
+        of = like.having(spectra.astype(np.complex64))
         return np.asarray(method.energies(of, self.made.elements, self.made.scene.sonar))
 
     def found(self, energy: np.ndarray) -> tuple[bool, bool]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,10 @@ GATE_TAPER: Final = 1e-4
 
 SENSORS_AT_ONCE: Final = 64
 """Sensors whose gates are transformed together: they stay in the cache."""
+
+DIVISOR: Final = 12
+"""Divides the length of transforms: every second, third, fourth, sixth or twelfth bin, say, comes of as many fewer
+samples."""
 
 SHORT: Final = 256
 """Samples up to which waves in a matrix are faster than a transform."""
@@ -46,10 +51,10 @@ def gate_taper(count: int, sampling_frequency: float) -> npt.NDArray[np.float32]
 
 
 def fast_length(count: int) -> int:
-    """Length of the FFT of a gate of `count` samples: the next that is fast."""
+    """Length of the FFT of a gate of `count` samples: the next that is fast and a multiple of `DIVISOR`."""
     from scipy.fft import next_fast_len
 
-    return int(next_fast_len(count, real=True))
+    return DIVISOR * int(next_fast_len(-(-count // DIVISOR), real=True))
 
 
 def frequency_spacing(count: int, sampling_frequency: float) -> float:
@@ -80,7 +85,7 @@ def gated_energy(
     count: int,
     band: tuple[float, float],
 ) -> float:
-    """Sum of |spectrum|^2 in Pa2 over all sensors and bins of `gated_spectra`, whose arguments it has.
+    """Sum of |spectrum|^2 in Pa2 over all sensors and bins of `gate_of`, whose arguments it has.
 
     Fast where few samples of the gate are not 0: powers at all frequencies are the transform of the autocorrelation,
     summed over sensors (Wiener and Khinchin). Raises ValueError as `band_bins`.
@@ -101,34 +106,71 @@ def gated_energy(
     return float(np.sum(rfft(circle).real[slice(*band_bins(count, sampling_frequency, band))]))
 
 
-def gated_spectra(
+@dataclass(frozen=True, eq=False)
+class Gate:
+    """A gate of the signals, tapered (`gate_taper`) and padded with zeros to a `fast_length`: its spectra are made when
+    they are asked for."""
+
+    pressure: npt.NDArray[np.floating]  # (sensor, sample) Pa
+    sampling_frequency: float  # Hz
+    first_sample: int
+    count: int
+    bins: range  # of the FFT in the band
+    power: Floats  # (sample,) Pa2 of all sensors, before it was tapered
+
+    @property
+    def frequency(self) -> Floats:
+        """Of the bins (bin,), Hz."""
+        return np.array(self.bins, float) * frequency_spacing(self.count, self.sampling_frequency)
+
+    def __call__(self, bins: range, begin: float = 0.0) -> npt.NDArray[np.complex64]:
+        """rfft spectra (sensor, bin) in Pa at bins whose step divides the length; phases refer to `begin` (samples).
+
+        They are those of sound that is wound round a circle of a step-th of the length, and turned, unless bins are
+        multiples of their step, by the rest.
+        """
+        from scipy.fft import fft, rfft
+
+        from sonarsynth.equations.kernels.sensor_rows import wind_rows
+
+        length, sample, (first, rest) = fast_length(self.count), int(begin), divmod(bins.start, bins.step)
+        taper, heard = _turned_taper(self.count, self.sampling_frequency, rest, sample), np.flatnonzero(self.power)
+        low, high = (heard[0], heard[-1] + 1) if len(heard) else (0, 0)
+        spectra = np.empty((len(self.pressure), len(bins)), np.complex64)
+        wound = np.empty((SENSORS_AT_ONCE, length // bins.step), np.result_type(self.pressure, taper))
+        for n in range(0, len(spectra), SENSORS_AT_ONCE):
+            some = self.pressure[n : n + SENSORS_AT_ONCE]
+            wind_rows(some, self.first_sample, low, high, taper, sample, wound)
+            transformed = (fft if rest else rfft)(wound[: len(some)], axis=1)
+            spectra[n : n + len(some)] = transformed[:, first : first + len(bins)]
+        if begin > sample:
+            spectra *= np.exp(2j * np.pi * np.array(bins) * ((begin - sample) / length)).astype(np.complex64)
+        return spectra
+
+
+@lru_cache(maxsize=16)
+def _turned_taper(count: int, sampling_frequency: float, bins: int, begin: int) -> npt.NDArray[Any]:
+    """The taper of a gate (sample,), turned by so many bins of its transform about a sample."""
+    taper, turns = gate_taper(count, sampling_frequency), bins * (np.arange(count) - begin) / fast_length(count)
+    return (taper * np.exp(-2j * np.pi * turns)).astype(np.complex64) if bins else taper
+
+
+def gate_of(
     pressure: npt.NDArray[np.floating],
     sampling_frequency: float,
     first_sample: int,
     count: int,
     band: tuple[float, float],
-) -> tuple[Floats, npt.NDArray[np.complex64], Floats]:
-    """Frequencies (bin,) in Hz and rfft spectra (sensor, bin) in Pa of a gate, bins of the band (low, high) only; and
-    the power (sample,) in Pa2 of all sensors before it was tapered.
+) -> Gate:
+    """The gate of `count` samples of pressure (sensor, sample) Pa, and its bins in a band (low, high) in Hz.
 
-    pressure (sensor, sample) Pa. Phases refer to `first_sample`. The gate is tapered (`gate_taper`) and padded with
-    zeros to a fast length (`frequency_spacing`). Raises ValueError when no frequency in band is below half the sampling
-    frequency.
+    Raises ValueError when no frequency in band is below half the sampling frequency.
     """
-    from scipy.fft import rfft
+    from sonarsynth.equations.kernels.sensor_rows import power_and_peak
 
-    from sonarsynth.equations.kernels.tapers import taper_rows
-
-    length, (first, stop) = fast_length(count), band_bins(count, sampling_frequency, band)
-    taper = gate_taper(count, sampling_frequency)
-    power = np.zeros(count, pressure.dtype)
-    spectra = np.empty((len(pressure), stop - first), np.complex64)
-    cut = np.zeros((SENSORS_AT_ONCE, length), np.result_type(pressure, taper))
-    for low in range(0, len(pressure), SENSORS_AT_ONCE):
-        some = pressure[low : low + SENSORS_AT_ONCE]
-        taper_rows(some, first_sample, taper, cut, power)
-        spectra[low : low + len(some)] = rfft(cut[: len(some)], axis=1)[:, first:stop]
-    return np.arange(first, stop, dtype=float) * (sampling_frequency / length), spectra, power
+    bins, every = range(*band_bins(count, sampling_frequency, band)), np.ones(len(pressure), bool)
+    power, _ = power_and_peak(pressure, every, first_sample, first_sample + count)
+    return Gate(pressure, sampling_frequency, first_sample, count, bins, power)
 
 
 def short_spectra(rows: Floats, first: int, stop: int) -> npt.NDArray[np.complex128]:

@@ -15,9 +15,6 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Complexes, Floats
 
-RANK_TOLERANCE = 1e-6
-"""Singular values of the sensor positions below this share of the largest count as zero."""
-
 
 @dataclass(frozen=True, eq=False)
 class Wavefront:
@@ -64,28 +61,12 @@ def plane_wave(
     such an array cannot tell front from back. NaN where the sensors (those of positive weight) lie on one line or in
     one point, or where the components in the plane exceed 1 (no plane wave is that slow).
     """
+    from sonarsynth.equations.arrays.spherical_wave_kernel import plane_fit
+
     t, q = np.asarray(delay, float), np.asarray(position, float)
     w = np.ones(len(t)) if weight is None else np.asarray(weight, float)
-    total = w.sum()
-    nothing = np.full(3, np.nan), np.nan
-    if not total > 0:
-        return nothing
-    q0, t0 = w @ q / total, w @ t / total
-    about = (w[:, None] * (q - q0)).T
-    squares, axes = np.linalg.eigh(about @ (q - q0))
-    spread = squares > RANK_TOLERANCE**2 * squares[2]
-    rank = int(np.sum(spread)) if squares[2] > 0 else 0
-    if rank < 2:
-        return nothing
-    component = -sound_speed * (axes[:, spread].T @ (about @ (t - t0))) / squares[spread]
-    u = axes[:, spread] @ component
-    if rank == 2:
-        normal, normal_square = axes[:, 0], 1 - u @ u
-        if normal_square < 0:
-            return nothing
-        u = u + np.sqrt(normal_square) * normal * (1.0 if normal[0] >= 0 else -1.0)
-    u = u / np.linalg.norm(u)
-    return u, float(t0 + q0 @ u / sound_speed)
+    direction, time = plane_fit(q, t, w, float(sound_speed))
+    return direction, float(time)
 
 
 def spherical_wave(
@@ -125,13 +106,9 @@ def robust_wave(
     of the residuals over six times their median, anew after each step, until no delay moves by `settled` (s) or for so
     many rounds.
     """
-    direction, time = plane_wave(delay, position, sound_speed, weight)
-    if not np.isfinite(time):
-        return None
     from sonarsynth.equations.arrays.spherical_wave_kernel import robust_fit
 
-    size, start = _size(position), (direction, 0.0)
-    curved, wave = robust_fit(position, delay, weight, start, sound_speed, size, steps, rounds, settled)
+    curved, wave = robust_fit(position, delay, weight, sound_speed, _size(position), steps, rounds, settled)
     return _wavefront(wave, curved)
 
 

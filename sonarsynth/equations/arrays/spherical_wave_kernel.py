@@ -11,6 +11,9 @@ from sonarsynth.compiling import compiled
 SETTLED = 1e-6
 """A step (rad) after which Gauss-Newton stops: what is left is its square."""
 
+RANK_TOLERANCE = 1e-6
+"""Singular values of the sensor positions below this share of the largest count as zero."""
+
 
 @compiled
 def delays_after_centre(position: Any, direction: Any, curvature: float, sound_speed: float) -> Any:
@@ -131,12 +134,43 @@ def curved_or_plane(position: Any, delay: Any, weight: Any, start: Any, speed: f
 
 
 @compiled
+def plane_fit(position: Any, delay: Any, weight: Any, speed: float) -> Any:
+    """Direction and time of the fit of `spherical_wave.plane_wave`; NaN where there is none."""
+    total, nothing = np.sum(weight), (np.full(3, np.nan), np.nan)
+    if not total > 0:
+        return nothing
+    square, slope, middle, time = np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.sum(weight * delay) / total
+    for i in range(3):
+        middle[i] = np.sum(weight * position[:, i]) / total
+    for q in range(len(delay)):
+        for i in range(3):
+            about = weight[q] * (position[q, i] - middle[i])
+            slope[i] += about * (delay[q] - time)
+            for k in range(3):
+                square[i, k] += about * (position[q, k] - middle[k])
+    squares, axes = np.linalg.eigh(square)
+    rank = np.sum(squares > RANK_TOLERANCE**2 * squares[2]) if squares[2] > 0 else 0
+    if rank < 2:
+        return nothing
+    u, normal = np.zeros(3), axes[:, 0]
+    for k in range(3 - rank, 3):
+        u -= speed * np.sum(axes[:, k] * slope) / squares[k] * axes[:, k]
+    if rank == 2:
+        rest = 1.0 - np.sum(u * u)
+        if rest < 0:
+            return nothing
+        u += np.sqrt(rest) * normal * (1.0 if normal[0] >= 0 else -1.0)
+    u /= np.sqrt(np.sum(u * u))
+    return u, time + np.sum(middle * u) / speed
+
+
+@compiled
 def robust_fit(
-    position: Any, delay: Any, loud: Any, start: Any, speed: float, size: float, steps: int, rounds: int, settled: float
+    position: Any, delay: Any, loud: Any, speed: float, size: float, steps: int, rounds: int, settled: float
 ) -> Any:
-    """As `curved_or_plane`, by so many steps; then weights loud (sensor,) are made anew, outliers counting for nothing,
-    at most so many times, until no delay moves by more than `settled` (s)."""
-    weight, before = loud, np.full(len(delay), np.inf)
+    """As `curved_or_plane`, from `plane_fit` on, by so many steps; then weights loud (sensor,) are made anew, outliers
+    counting for nothing, at most so many times, until no delay moves by more than `settled` (s)."""
+    weight, before, start = loud, np.full(len(delay), np.inf), (plane_fit(position, delay, loud, speed)[0], 0.0)
     for n in range(rounds + 1):
         curved, wave = curved_or_plane(position, delay, weight, start, speed, size, steps if n == 0 else 1)
         fitted = wave[3] + delays_after_centre(position, wave[1], wave[2], speed)

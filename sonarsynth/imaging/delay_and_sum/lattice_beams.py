@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -28,7 +29,7 @@ class LatticeBeams:
     elements), 2e-6 for 64 in a row, 1.1e-5 for 300, and twice that at most.
     """
 
-    spectra: npt.NDArray[np.complex64]  # (sensor, bin)
+    spectra: Callable[[], npt.NDArray[np.complex64]]  # (sensor, bin), when they are needed
     frequencies: Floats  # (bin,) Hz, evenly spaced
     elements: Elements
     weight: Floats  # (sensor,) of sum one
@@ -73,7 +74,7 @@ class LatticeBeams:
         from sonarsynth.imaging.delay_and_sum.lattice_kernel import focused_halves
 
         places, *_, later = _halves(self.elements, self.focus, self.sound_speed)
-        padded = padded_bins(self.spectra, self.elements.count + 1, LANES)
+        padded = padded_bins(self.spectra(), self.elements.count + 1, LANES)
         weight = np.append(self.weight, 0.0).astype(np.float32)
         pairs, bins = padded.view(np.float32).ravel(), padded.shape[1]
         return focused_halves(pairs, bins, places, weight, later, *first_and_spacing(self.frequencies)), bins

@@ -20,10 +20,11 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from sonarsynth.conventions import Bools, Floats, azimuth_elevation
+from sonarsynth.equations.kernels.sensor_rows import power_and_peak
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Signals, SourceEstimates
-from sonarsynth.ranging import ranging_kernels
+from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
     ECHO,
@@ -34,7 +35,7 @@ from sonarsynth.ranging.location.source_position import (
     SourceFix,
     refused,
 )
-from sonarsynth.receiver import Band
+from sonarsynth.receiver import Band, Elements, Sonar
 
 SIGMAS = 4.0
 """Standard errors within which a curvature, a direction and a time may be those of an echo."""
@@ -71,7 +72,7 @@ def loudness(signals: Signals, live: Bools, length: int) -> PowerTrack:
 
     The quiet power is the tenth part from below of short means: a snap and its echoes fill no more of the signals.
     """
-    power, peak = ranging_kernels.power_and_peak(signals.pressure, live)
+    power, peak = power_and_peak(signals.pressure, live, 0, signals.pressure.shape[1])
     track = uniform_filter1d(power, min(length, len(power)), mode="constant")
     tenth = len(power) // 10
     quiet = np.sort(uniform_filter1d(power, min(16, len(power))))[tenth]  # NumPy's `partition` takes ten times as long
@@ -81,6 +82,18 @@ def loudness(signals: Signals, live: Bools, length: int) -> PowerTrack:
 def quiet_bin(quiet: float, live: int, band: Band, half: float) -> float:
     """Mean power in a bin, (Pa s)^2, of noise at a sensor, at most: `quiet` (Pa2) of `live` sensors, in the band."""
     return quiet / max(live, 1) * half / (band.high - band.low)
+
+
+def clipping_error(signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float) -> float:
+    """Standard error (s) that clipping adds to the time of a pulse: its peak may be anywhere in the samples at full
+    scale within `half` of `centre` (s), so many as a live sensor has of them on average."""
+    if sonar.converter is None or not signals.clipped:
+        return 0.0
+    largest = sonar.converter.full_scale - 1.5 * sonar.converter.quantum  # half a count below the highest
+    cut, _ = pulse_times.excerpt(signals, centre, half)
+    live = elements.gain != 0
+    clipped = np.count_nonzero(np.abs(cut[live]) > largest) / max(int(live.sum()), 1)
+    return float(clipped / (np.sqrt(12.0) * signals.sampling_frequency))
 
 
 def when_heard(knowledge: SonarKnowledge, track: Track | None, time: float) -> SonarKnowledge:

@@ -18,6 +18,7 @@ from sonarsynth.ranging.location.candidates import (
     Candidate,
     Candidates,
     as_estimates,
+    clipping_error,
     loudness,
     quiet_bin,
     when_heard,
@@ -51,6 +52,8 @@ GOLDEN = 0.6180339887498949
 """Steps of this part of an array of any rows and columns pick sensors all over it, and not those of one row."""
 CLEAR = 3e4
 """Energy of a pulse at a sensor over that of the noise in a bin, above which so few sensors are tried."""
+UNHEARD = 1e-3
+"""Noise of the quiet over that of a pulse, below which so few sensors tell the time of a pulse as well as all."""
 ROBUST_ROUNDS = 3
 """Reweightings that turn outliers out of the first fit, at most."""
 FIRST_STEPS = 3
@@ -147,7 +150,7 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
     if pulse.share > SHARED and pulse.noise > AUDIBLE * knowledge.quiet:
         return refused(UNRESOLVED)
     row = _placed(wave, pulse, elements, knowledge, bend)
-    clipping = _clipping_error(signals, elements, sonar, centre, half)
+    clipping = clipping_error(signals, elements, sonar, centre, half)
     return replace(row, time_error=float(np.hypot(row.time_error, clipping)))
 
 
@@ -171,18 +174,6 @@ def _placed(
     return row
 
 
-def _clipping_error(signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float) -> float:
-    """Standard error (s) that clipping adds to the time of a pulse: its peak may be anywhere in the samples at full
-    scale within `half` of `centre` (s), so many as a live sensor has of them on average."""
-    if sonar.converter is None or not signals.clipped:
-        return 0.0
-    largest = sonar.converter.full_scale - 1.5 * sonar.converter.quantum  # half a count below the highest
-    cut, _ = pulse_times.excerpt(signals, centre, half)
-    live = elements.gain != 0
-    clipped = np.count_nonzero(np.abs(cut[live]) > largest) / max(int(live.sum()), 1)
-    return float(clipped / (np.sqrt(12.0) * signals.sampling_frequency))
-
-
 def fit_pulse(
     signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats, quiet: float
 ) -> tuple[Wavefront, Pulse, Elements] | int:
@@ -195,8 +186,8 @@ def fit_pulse(
     first = _first_wave(signals, elements, sonar, centre, half, velocity, quiet)
     if first is None:
         return UNFIT
-    c, q, rest, aligned, longer, (wave, off) = sonar.assumed_sound_speed, elements.position, elements, None, 1.0, first
-    expected = _times(wave, q, c)
+    (wave, off, rows), c, q, rest = first, sonar.assumed_sound_speed, elements.position, elements
+    aligned, longer, expected = None, 1.0, _times(wave, q, c)
     for _ in range(ROUNDS):
         if velocity.any():
             q = rest.position + (expected - wave.time)[:, None] * velocity
@@ -222,17 +213,18 @@ def fit_pulse(
     if pulse.one_tone(SHARED) and not off < PERIODS_OFF / sonar.band.centre:
         return UNRESOLVED
     if pulse_times.cuts_tails(sonar.band) or pulse_times.null_in_band(elements, sonar, wave.direction):
-        aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=longer * pulse_times.LONGER)
-        known = wave.direction, wave.curvature, wave.time, pulse.noise_to_signal
-        pulse = replace(pulse, longer=pulse_times.measure(aligned, elements, c, *known))
+        some, longer = rows if quiet < UNHEARD * pulse.noise else slice(None), longer * pulse_times.LONGER
+        cut, start = pulse_times.excerpt(signals, wave.time, half + longer * pulse_times.half_length(sonar.band))
+        heard, own = replace(signals, pressure=np.ascontiguousarray(cut[some]), start=start), elements.select(some)
+        pulse = replace(pulse, longer=_in_window(heard, own, sonar, wave, longer, pulse.noise_to_signal)[1])
     return wave, pulse, elements
 
 
 def _first_wave(
     signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats, quiet: float
-) -> tuple[Wavefront, float] | None:
-    """Wavefront through the envelope peaks of the sensors, as of `fit_pulse`, and the standard error (s) of its times,
-    root mean square over the sensors; None where none fits."""
+) -> tuple[Wavefront, float, Ints | slice] | None:
+    """Wavefront through the envelope peaks of the sensors, as of `fit_pulse`, the standard error (s) of its times, root
+    mean square over the sensors, and which sensors it is of; None where none fits."""
     c, (cut, start), settled = sonar.assumed_sound_speed, pulse_times.excerpt(signals, centre, half), pulse_times.FLOOR
     some = cut[_few(elements.count)]
     energy = float(np.einsum("ij,ij->", some, some)) / (len(some) * signals.sampling_frequency)
@@ -253,7 +245,7 @@ def _first_wave(
         passing = _times(wave, q, c)
         q = q + (passing - wave.time)[:, None] * velocity[rows]
         wave = spherical_wave(passing, q, c, loud, wave.direction, wave.curvature)
-    return None if wave is None else (wave, off)
+    return None if wave is None else (wave, off, rows)
 
 
 @lru_cache(maxsize=16)
@@ -267,17 +259,24 @@ def _whole(
 ) -> tuple[AlignedPulse, Pulse, float] | None:
     """A pulse that lasts longer than a snap, in a window so many times as long that holds it; None where none does, or
     what that holds is another pulse."""
-    c, longer = sonar.assumed_sound_speed, pulse_times.LONGER
+    longer = pulse_times.LONGER
     while longer * pulse_times.half_length(sonar.band) <= pulse_times.LONGER * pulse_times.LONGEST_HALF:
-        expected = _times(wave, elements.position, c)
-        aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=longer)
-        pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
+        aligned, pulse = _in_window(signals, elements, sonar, wave, longer)
         if pulse.aside > pulse_times.half_length(sonar.band):
             return None
         if not pulse.lasts:
             return aligned, pulse, longer
         longer *= pulse_times.LONGER
     return None
+
+
+def _in_window(
+    signals: Signals, elements: Elements, sonar: Sonar, wave: Wavefront, longer: float, deaf: float = pulse_times.DEAF
+) -> tuple[AlignedPulse, Pulse]:
+    """A pulse in a window so many times as long as a snap's; deaf: as for `pulse_times.waveform`."""
+    c = sonar.assumed_sound_speed
+    aligned = pulse_times.align(signals, elements, sonar.band, _times(wave, elements.position, c), longer=longer)
+    return aligned, pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time, deaf)
 
 
 def _times(wave: Wavefront, position: Floats, sound_speed: float) -> Floats:

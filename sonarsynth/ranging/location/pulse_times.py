@@ -72,8 +72,8 @@ class Pulse:
     @property
     def lasts(self) -> bool:
         """Whether the envelope of the waveform is over `CUT` of its peak where the window is not flat any more."""
-        envelope = self._envelope
-        return bool(envelope[np.abs(fftfreq(len(envelope))) >= 0.375].max() > CUT * envelope.max())
+        envelope, half = self._envelope, 4 * len(self.template)
+        return bool(envelope[3 * half // 4 : 5 * half // 4 + 1].max() > CUT * envelope.max())
 
     @property
     def aside(self) -> float:
