@@ -169,6 +169,12 @@ class Arrivals(Columns):
         return self.select(~apart) if apart.any() else self
 
     @property
+    def family(self) -> Ints:
+        """(path,) from 1, by the boundaries touched on both ways; by both of them, it comes from above or from below."""
+        above = (self.arrives_by == 3) & (self.direction[:, 2] > 0.0)
+        return np.asarray(1 + 4 * self.lit_by + self.arrives_by + 16 * above)
+
+    @property
     def direct(self) -> Bools:
         """(path,) true for paths that met no target."""
         return np.asarray(self.kind == Kind.DIRECT)

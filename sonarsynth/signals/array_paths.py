@@ -46,6 +46,7 @@ class Wavefronts(Columns):
     loss: Floats  # (path,) dB of absorption at the band centre, inside amplitude
     expansion: ArrayExpansion  # (path,)
     occluded: Bytes  # (path, byte) a bit for each hydrophone not reached, after one; (path, 0): all are reached
+    family: Ints  # (path,) from 1: those of one family are alike in direction, time and pulse
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
     sound_speed: float  # m/s
     aperture: float  # m: no hydrophone is farther out
@@ -112,10 +113,6 @@ def array_paths(
         if not np.isfinite(value).all():
             wrong = ~np.isfinite(value).all(axis=tuple(range(1, value.ndim)))
             raise ValueError(f"arrival {np.flatnonzero(wrong)[0]} has {name} that is not a finite number")
-    if count and not (arrivals.amplitude != 0.0).all():
-        raise ValueError(f"arrival {np.flatnonzero(arrivals.amplitude == 0.0)[0]} has no amplitude")
-    if count and not (arrivals.radius > 0.0).all():
-        raise ValueError(f"arrival {np.flatnonzero(~(arrivals.radius > 0.0))[0]} has a radius that is not positive")
     _check_shapes(arrivals)
     if arrivals.occluded.shape[1] not in (0, 1 + elements.count // 8):
         raise ValueError(f"arrivals are hidden from hydrophones of another array, not of one of {elements.count}")
@@ -126,14 +123,13 @@ def array_paths(
     touching = (np.linalg.norm(away, axis=2) <= 1e-9 * arrivals.radius[near, None]).any(axis=1)
     if touching.any():
         raise ValueError(f"arrival {near[touching][0]} comes from a hydrophone")
-    gain = snap_gains(snaps)
     sign, phase = folded(arrivals.phase)
     delay, corners = _centred(arrivals)
     return ArrayPaths(
         delay=delay,
         direction=arrivals.direction,
         curvature=1.0 / arrivals.radius,
-        amplitude=arrivals.amplitude * gain[arrivals.snap] * sign if count else arrivals.amplitude,
+        amplitude=arrivals.amplitude * snap_gains(snaps)[arrivals.snap] * sign if count else arrivals.amplitude,
         loss=arrivals.absorption,
         expansion=arrivals.expansion,
         sound_speed=arrivals.sound_speed,
@@ -146,6 +142,7 @@ def array_paths(
         coherent_fraction=arrivals.coherent_fraction,
         height_delay_std=np.minimum(arrivals.height_delay_std, LONGEST_BLUR),
         occluded=_without_centre(arrivals),
+        family=arrivals.family,
         modes=np.zeros((count, 0)),
         centre=arrivals.centre,
         attenuation=attenuation,
@@ -168,15 +165,14 @@ def _centred(arrivals: Arrivals) -> tuple[Floats, Floats]:
 
 
 def _check_shapes(arrivals: Arrivals) -> None:
-    """Raise ValueError for a path whose pulse has no shape."""
+    """Raise ValueError for a path that is silent, comes from nowhere, or whose pulse has no shape."""
     for wrong, fault in (
+        (arrivals.amplitude == 0.0, "no amplitude"),
+        (~(arrivals.radius > 0.0), "a radius that is not positive"),
         (arrivals.delay_std < 0.0, "a negative delay_std"),
         (np.abs(arrivals.doppler) >= MAX_DOPPLER, f"a Doppler factor that is not within +-{MAX_DOPPLER:g}"),
         (np.abs(arrivals.corner_delays.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
-        (
-            (arrivals.coherent_fraction < 0.0) | (arrivals.coherent_fraction > 1.0),
-            "a coherent_fraction that is not from 0 to 1",
-        ),
+        (np.abs(arrivals.coherent_fraction - 0.5) > 0.5, "a coherent_fraction that is not from 0 to 1"),
         (arrivals.height_delay_std < 0.0, "a negative height_delay_std"),
     ):
         if wrong.any():
@@ -293,6 +289,7 @@ def reference_of(front: Wavefronts, middle: Floats, phase: Floats, variance: Flo
             delay=delay, amplitude=none, phase=phase[None], delay_variance=variance[None], error=zero
         ),
         occluded=np.zeros((1, 0), np.uint8),
+        family=np.ones(1, int),
         modes=none,
         sound_speed=front.sound_speed,
         aperture=front.aperture,

@@ -304,17 +304,20 @@ def test_nodes_over_the_aperture_serve_the_whole_array() -> None:
     assert error(got, exact) < 1e-4
 
 
-def test_bodies_heard_one_after_the_other_are_each_where_they_belong() -> None:
-    """Pulses that overlap in a chain are one stretch of time, of which each direction has but a part."""
-    body = target_at(20.0, 300, 5, direct=False)
+@pytest.mark.parametrize("families", [False, True])
+def test_bodies_heard_one_after_the_other_are_each_where_they_belong(families: bool) -> None:
+    """Pulses that overlap in a chain are one stretch of time, of which each direction has but a part; large families of
+    paths have tiles of their own, whatever else comes from their direction."""
+    body = target_at(20.0, 600 if families else 300, 5, direct=False)
     sides = np.array([[1, 1, 1], [1, -1, 1], [1, 1, -1], [1, -1, -1], [1, 3, 1], [1, -3, 1]])
+    ways = np.repeat([0, 1, 2, 3, 0, 2] if families else [0] * 6, body.delay.size)
     of = arrivals(
         np.concatenate([body.delay + 1.5e-3 * n for n in range(len(sides))]),
         np.concatenate([body.direction * side for side in sides]),
         np.tile(body.radius, len(sides)),
         np.tile(body.amplitude, len(sides)),
         loss=np.tile(body.absorption, len(sides)),
-    )
+    ).but(arrives_by=ways, lit_by=np.roll(ways, body.delay.size))
     hears = hearing(of, SONAR, FACES, absorption)
     got = GriddedSynthesis().signals(of, SNAPS, hears).pressure[::127]
     exact, _ = DirectSum().pressure(of, SNAPS, hears._replace(elements=some_of(FACES, 127)))

@@ -23,6 +23,9 @@ MOST_TERMS = 24
 FEW = 4
 """So many paths are each steered to itself."""
 
+LARGE_FAMILY = 500
+"""Families of so many paths have tiles of their own: they are short, and have few modes."""
+
 ALONE = 0.1
 """Share of the tolerance that nodes along each axis get of a path by itself: errors of many average out, not its."""
 
@@ -230,9 +233,7 @@ def _halves(trial: _Trial, views: _Views, aim: TileSettings) -> tuple[Ints, Ints
     paths, (low, high) = trial.tile.paths, trial.ends
     axis = int(np.argmax((high - low)[: weight.size] * weight))
     right = views.columns[paths, axis] > 0.5 * (low[axis] + high[axis])
-    if not right.any():
-        return None
-    return paths[~right], paths[right]
+    return (paths[~right], paths[right]) if right.any() else None
 
 
 def tiles(front: Wavefronts, aim: TileSettings) -> list[Tile]:
@@ -240,7 +241,9 @@ def tiles(front: Wavefronts, aim: TileSettings) -> list[Tile]:
     second. Paths that miss some hydrophones are apart: each of these is a node of their tiles."""
     apart, missed = steep(front, aim.highest), front.occluded.any(axis=1)
     chosen = [_alone(np.flatnonzero(apart), front, aim)] if apart.any() else []
-    groups = [(np.flatnonzero(~apart & (missed == misses)), misses) for misses in (False, True)]
+    large = np.bincount(front.family) >= LARGE_FAMILY
+    kind = np.where(missed, -1, front.family * large[front.family])
+    groups = [(np.flatnonzero(~apart & (kind == of)), of < 0) for of in (0, *np.flatnonzero(large).tolist(), -1)]
     chosen += [_alone(paths, front, aim) for paths, _ in groups if 0 < paths.size <= FEW]
     if many := [group for group in groups if group[0].size > FEW]:
         views = _views(front, aim)
