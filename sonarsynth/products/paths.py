@@ -170,7 +170,7 @@ class Arrivals(Columns):
 
     @property
     def family(self) -> Ints:
-        """(path,) from 1, by the boundaries touched on both ways; by both of them, it comes from above or from below."""
+        """(path,) from 1: by the boundaries touched on both ways, and where by both, whether it comes from above."""
         above = (self.arrives_by == 3) & (self.direction[:, 2] > 0.0)
         return np.asarray(1 + 4 * self.lit_by + self.arrives_by + 16 * above)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.equations.kernels import probe_fits
+from sonarsynth.products.array_expansion import stacked
 from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
 
 if TYPE_CHECKING:
@@ -42,6 +43,10 @@ class FacetBlock(Protocol):
         """(echo,) whether it falls to 0 at the limb of the body."""
         ...
 
+    def select(self, loud: Bools) -> Self:
+        """The echoes picked by a mask."""
+        ...
+
     def over(self, few: int | None) -> tuple[Floats, Floats]:
         """Amplitude of the law (echo, probe) at all probes or the first few, and the gain of the leg there."""
         ...
@@ -50,25 +55,28 @@ class FacetBlock(Protocol):
 def variations(blocks: Sequence[FacetBlock]) -> tuple[list[Floats], float]:
     """Polynomials (echo, term) of the amplitude over the aperture for echoes of each block, and the error of all.
 
-    The second degree serves where it errs by no more than `Tolerances.quadratic`.
+    The second degree serves for echoes of which it errs by no more than `Tolerances.quadratic`.
     """
-    terms, error = _fitted(blocks, QUADRATIC_PROBES)
-    return (
-        (terms, error) if not blocks or error <= blocks[0].array.context.tolerances.quadratic else _fitted(blocks, None)
-    )
+    of_blocks = [_fitted(block, QUADRATIC_PROBES) for block in blocks]
+    loudest, worst, every = max([SILENT, *(most for *_, most in of_blocks)]), 0.0, list[Floats]()
+    for block, (second, missed, counted, _) in zip(blocks, of_blocks, strict=True):
+        rest = np.abs(block.strength) * missed > block.array.context.tolerances.quadratic * loudest
+        if rest.any():
+            more, missed[rest], counted[rest], _ = _fitted(block.select(rest), None)
+            every.append(stacked([second, more])[np.where(rest, len(rest) - 1 + np.cumsum(rest), np.arange(len(rest)))])
+        else:
+            every.append(second)
+        worst = max(worst, float((counted * missed).max(initial=0.0)))
+    return every, worst / loudest
 
 
-def _fitted(blocks: Sequence[FacetBlock], few: int | None) -> tuple[list[Floats], float]:
-    """The same at all probes, or the first few. Echoes that end at the limb of some probe are the same everywhere;
-    those that are tapered to nothing there are followed. All sensors share what the centre sees."""
-    terms, worst, loudest = [], 0.0, 0.0
-    for block in blocks:
-        law, probe_gain = block.over(few)
-        gain, strength, most = probe_fits.gains(law, block.amplitude, probe_gain, block.tapered, block.strength)
-        block_terms, wrong = _terms(block.array, gain, strength)
-        terms.append(block_terms)
-        worst, loudest = max(worst, wrong), max(loudest, most)
-    return terms, worst / max(loudest, SILENT)
+def _fitted(block: FacetBlock, few: int | None) -> tuple[Floats, Floats, Floats, float]:
+    """Polynomials from all probes, or the first few, the largest of what they miss there (echo,), strengths of echoes
+    (echo,) and the largest with the gain. Echoes that end at the limb of some probe are the same everywhere, those that
+    are tapered to nothing there are followed; both have no strength. All sensors share what the centre sees."""
+    law, probe_gain = block.over(few)
+    gain, counted, most = probe_fits.gains(law, block.amplitude, probe_gain, block.tapered, block.strength)
+    return *_terms(block.array, gain), counted, most
 
 
 def fitted(array: FacetPaths, gain: Floats, strength: Floats) -> tuple[Floats, float]:
@@ -76,14 +84,13 @@ def fitted(array: FacetPaths, gain: Floats, strength: Floats) -> tuple[Floats, f
 
     And their largest error at the probes, for paths of that strength (path,), relative to the strongest.
     """
-    terms, worst = _terms(array, gain, strength)
+    terms, missed = _terms(array, gain)
     loudest = float(np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0))
-    return terms, worst / max(loudest, SILENT)
+    return terms, float((np.abs(strength) * missed).max(initial=0.0)) / max(loudest, SILENT)
 
 
-def _terms(array: FacetPaths, gain: Floats, strength: Floats) -> tuple[Floats, float]:
-    """Polynomials as above, and the largest error at the probes."""
+def _terms(array: FacetPaths, gain: Floats) -> tuple[Floats, Floats]:
+    """Polynomials as above, and the largest error (path,) at the probes."""
     if (gain == 1.0).all():
-        return np.empty((len(gain), 0)), 0.0
-    terms, missed = probes(array.context.receiver.elements).expand(gain - 1.0)
-    return terms, float((np.abs(strength) * missed).max(initial=0.0))
+        return np.empty((len(gain), 0)), np.zeros(len(gain))
+    return probes(array.context.receiver.elements).expand(gain - 1.0)
