@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.columns import alike, picked, rows_of
 from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.equations.kernels import probe_fits
 from sonarsynth.equations.kernels.unit_vectors import to_moved_images
 from sonarsynth.geometry import unit
 from sonarsynth.geometry.mesh import in_blocks
@@ -80,29 +81,19 @@ class _EchoBlock:
         return _EchoBlock(self.array, groups, out, leg, factor, few, pulses, carried)
 
     @property
-    def amplitude(self) -> Floats:
-        """(echo,) of the law."""
-        return np.concatenate([g.amplitude for g in self.groups])
-
-    @property
     def strength(self) -> Floats:
         """(echo,) amplitude with the ways."""
         row, amplitude = _columns(self.groups, "row", "amplitude")
         return np.asarray(amplitude * self.factor[row])
 
-    @property
-    def tapered(self) -> Bools:
-        """(echo,) as its group says."""
-        return np.concatenate([g.tapered for g in self.groups])
-
-    def over(self, few: int | None) -> tuple[Floats, Floats]:
-        """Amplitude of the law (echo, probe) at all probes or the first few, and the gain of the legs there."""
-        (row,) = _columns(self.groups, "row")
-        gain = self.array.fronts.gain(self.leg[row], few)
-        if few is not None:
-            return self.few, gain
-        more = np.concatenate([g.over(self.towards_probes(g, MORE)) for g in self.groups])
-        return np.concatenate([self.few, more], axis=1), gain
+    def gains(self, few: int | None) -> tuple[Floats, Floats, float]:
+        """What `probe_fits.gains` makes of the law and of the legs at all probes or the first few."""
+        row, amplitude, tapered = _columns(self.groups, "row", "amplitude", "tapered")
+        law, gain = self.few, self.array.fronts.gain(self.leg[row], few)
+        if few is None:
+            more = [g.over(self.towards_probes(g, MORE)) for g in self.groups]
+            law = np.concatenate([law, np.concatenate(more)], axis=1)
+        return probe_fits.gains(law, amplitude, gain, tapered, self.strength)
 
     def towards_probes(self, group: EchoBatch, some: slice = slice(None)) -> Floats:
         """Where some probes are seen from the facets of a group (echo, probe, xyz), as `_towards_probes`."""

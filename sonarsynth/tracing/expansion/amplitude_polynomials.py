@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Protocol, Self
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
-from sonarsynth.equations.kernels import probe_fits
 from sonarsynth.products.array_expansion import stacked
 from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
 
@@ -29,26 +28,16 @@ class FacetBlock(Protocol):
         ...
 
     @property
-    def amplitude(self) -> Floats:
-        """(echo,) at the centre."""
-        ...
-
-    @property
     def strength(self) -> Floats:
         """(echo,) with the ways."""
-        ...
-
-    @property
-    def tapered(self) -> Bools:
-        """(echo,) whether it falls to 0 at the limb of the body."""
         ...
 
     def select(self, loud: Bools) -> Self:
         """The echoes picked by a mask."""
         ...
 
-    def over(self, few: int | None) -> tuple[Floats, Floats]:
-        """Amplitude of the law (echo, probe) at all probes or the first few, and the gain of the leg there."""
+    def gains(self, few: int | None) -> tuple[Floats, Floats, float]:
+        """What `probe_fits.gains` makes of the law and of the legs at all probes or the first few."""
         ...
 
 
@@ -74,8 +63,7 @@ def _fitted(block: FacetBlock, few: int | None) -> tuple[Floats, Floats, Floats,
     """Polynomials from all probes, or the first few, the largest of what they miss there (echo,), strengths of echoes
     (echo,) and the largest with the gain. Echoes that end at the limb of some probe are the same everywhere, those that
     are tapered to nothing there are followed; both have no strength. All sensors share what the centre sees."""
-    law, probe_gain = block.over(few)
-    gain, counted, most = probe_fits.gains(law, block.amplitude, probe_gain, block.tapered, block.strength)
+    gain, counted, most = block.gains(few)
     return *_terms(block.array, gain), counted, most
 
 
