@@ -50,8 +50,9 @@ def variations(blocks: Sequence[FacetBlock]) -> tuple[list[Floats], float]:
     loudest, worst, every = max([SILENT, *(most for *_, most in of_blocks)]), 0.0, list[Floats]()
     for block, (second, missed, counted, _) in zip(blocks, of_blocks, strict=True):
         rest = np.abs(block.strength) * missed > block.array.context.tolerances.quadratic * loudest
+        rest |= 2 * np.count_nonzero(rest) > len(rest)  # most: to take them all costs less
         if rest.any():
-            more, missed[rest], counted[rest], _ = _fitted(block.select(rest), None)
+            more, missed[rest], counted[rest], _ = _fitted(block if rest.all() else block.select(rest), None)
             every.append(stacked([second, more])[np.where(rest, len(rest) - 1 + np.cumsum(rest), np.arange(len(rest)))])
         else:
             every.append(second)
