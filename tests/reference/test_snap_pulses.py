@@ -46,8 +46,6 @@ def test_logarithmic_bubble_is_that_of_its_own_module() -> None:
     t = np.linspace(-3e-4, 5e-5, 60)
     exact = filtered_pulse(t, BUBBLE, FIR)
     assert np.abs(pulses.filtered(t, heard, FIR) - exact).max() < 1e-6 * np.abs(exact).max()
-    for a, b in zip(pulses.support(heard, FIR), filters.pulse_support(BUBBLE, FIR), strict=True):
-        assert a == pytest.approx(b, abs=5e-6)
     gain = pulses.gain_for_level(heard, 187.0)
     assert 20 * np.log10(gain * snap_pressure.peak(BUBBLE)[1] / 1e-6) == pytest.approx(187.0, abs=1e-9)
 
