@@ -25,8 +25,9 @@ class Kirchhoff(FacetLaw):
 
     |f|^2 = |sum of facets exp(-g^2/2)|^2 + sum of area times the lobe of the slopes, the second for rough surfaces.
     Good where the body is large against the wavelength; no second bounce. Only echoes: no waves that creep round the
-    body, and what cancels the direct wave in the shadow behind it is left out, unless `forward` says otherwise. Rigid
-    spheres of 0.25 m, 25 to 110 kHz, against the exact series: within 0.3 dB at backscatter, 0.7 dB at 90 and 105
+    body, and what cancels the direct wave in the shadow behind it is left out, unless `forward` says otherwise. Where
+    the lit and seen part ends, the echo of a curved surface is tapered to 0 and that of a flat one ends.
+    Rigid spheres of 0.25 m, 25 to 110 kHz, against the exact series: within 0.3 dB at backscatter, 0.7 dB at 90 and 105
     degrees off it, 2.5 dB at 120.
     """
 
