@@ -150,9 +150,8 @@ class CoherentKirchhoff(Component):
         return np.asarray(np.angle(reflection(self.law, incident, scattered)))
 
     def tapers(self, patch: FacetGeometry) -> Bools:
-        """As `Component.tapers`: by `edges`."""
-        smooth = {"auto": patch.curved, "smooth": np.ones_like(patch.curved), "sharp": np.zeros_like(patch.curved)}
-        return smooth[self.law.edges]
+        """As `Component.tapers`: where the surface is curved."""
+        return patch.curved
 
     @property
     def turns(self) -> bool:  # type: ignore[override]

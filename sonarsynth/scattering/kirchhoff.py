@@ -25,18 +25,15 @@ class Kirchhoff(FacetLaw):
 
     |f|^2 = |sum of facets exp(-g^2/2)|^2 + sum of area times the lobe of the slopes, the second for rough surfaces.
     Good where the body is large against the wavelength; no second bounce. Only echoes: no waves that creep round the
-    body, and what cancels the direct wave in the shadow behind it is left out, unless `forward` says otherwise. Rigid
-    spheres of 0.25 m, 25 to 110 kHz, against the exact series: within 0.3 dB at backscatter, 0.7 dB at 90 and 105
+    body, and what cancels the direct wave in the shadow behind it is left out, unless `forward` says otherwise. Where
+    the lit and seen part ends, the echo of a curved surface is tapered to 0 and that of a flat one ends.
+    Rigid spheres of 0.25 m, 25 to 110 kHz, against the exact series: within 0.3 dB at backscatter, 0.7 dB at 90 and 105
     degrees off it, 2.5 dB at 120.
     """
 
     kind: Literal["kirchhoff"] = "kirchhoff"
     surface: Literal["rigid", "soft"] | PartlyReflecting = "rigid"
     """Reflection coefficient 1, -1, or by density and sound speed."""
-    edges: Literal["auto", "smooth", "sharp"] = "auto"
-    """Where the lit and seen part ends. Smooth: the body goes on in a curve, and the echo is tapered to 0 (it differs
-    from sharp off backscatter only). Sharp: it ends in an edge, as a plate does. Auto: sharp for facets that lie in a
-    plane with their neighbours, smooth for others."""
     roughness: NonNegativeMetres = 0.0
     """Rms height of the surface about the facets."""
     slope: Annotated[Number, Gt(0), Le(0.5)] = 0.1
@@ -117,13 +114,11 @@ class Kirchhoff(FacetLaw):
     def lit(self, incident: Floats, scattered: Floats, normal: Floats, curved: Bools) -> Floats:
         """Factor (facet,) on the amplitude of facets with normals (facet, xyz), 0 where a facet is not lit or not seen.
 
-        curved (facet,): whether the surface there is, for `edges` auto.
+        curved (facet,): whether the surface goes on in a curve there, so that the echo is tapered to 0 where the lit
+        and seen part ends; facets in a plane with their neighbours end in an edge, as a plate does.
         """
         sharp = np.where(lit_and_seen(incident, scattered, normal), 1.0, 0.0)
-        if self.edges == "sharp":
-            return sharp
-        taper = shadow_taper(incident, scattered, normal)
-        return taper if self.edges == "smooth" else np.where(curved, taper, sharp)
+        return np.where(curved, shadow_taper(incident, scattered, normal), sharp)
 
     def cross_section(
         self, corners: Floats, normal: Floats, area: Floats, curved: Bools, incident: Floats, scattered: Floats,

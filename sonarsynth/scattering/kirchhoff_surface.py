@@ -35,11 +35,6 @@ class KirchhoffSurface(Protocol):
         ...
 
     @property
-    def edges(self) -> Literal["auto", "smooth", "sharp"]:
-        """Where the lit part ends."""
-        ...
-
-    @property
     def roughness(self) -> float:
         """Rms height (m)."""
         ...

@@ -15,7 +15,6 @@ from sonarsynth.description import FieldError
 from sonarsynth.equations.arrays.spherical_wave import envelope_peak
 from sonarsynth.equations.bubble import pulses
 from sonarsynth.equations.bubble.pulses import Pulse
-from sonarsynth.equations.bubble.snap_pressure import Bubble
 from sonarsynth.equations.noise import filters
 from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
@@ -92,11 +91,9 @@ def at_longest(waveform: Waveform) -> Waveform:
 
 @lru_cache(maxsize=64)
 def _plain_support(waveform: Waveform, chosen: Filter, tolerance: float) -> tuple[float, float]:
-    if waveform.model.bubble is not None:
-        a, k, m, q, density = waveform.model.bubble
-        longer = waveform.width
-        return filters.pulse_support(Bubble(a, k / longer, m * longer, q / longer, density), fir(chosen), tolerance)
-    return pulses.support(_pulse(waveform, pulses.reach(fir(chosen))), fir(chosen), tolerance)
+    width, passed = waveform.width, fir(chosen)
+    made = _made(waveform.model, waveform.stamp, 2.0 * passed.high * width)
+    return pulses.support(pulses.scaled(made, 1.0, width), passed, tolerance)
 
 
 def _tapered(waveform: Waveform, chosen: Filter, window: float) -> tuple[Floats, Complexes]:

@@ -6,7 +6,6 @@ from typing import Self
 
 from sonarsynth.description.method import Method, returned_rows
 from sonarsynth.equations.bubble.pulses import Pulse
-from sonarsynth.equations.bubble.snap_pressure import Bubble
 
 Stamp = tuple[int, int]
 """What changes when a file does."""
@@ -36,11 +35,6 @@ class PulseModel(Method):
     @property
     def file(self) -> Stamp | None:
         """The stamp of the file that it is read from; none without one. Raises ValueError for a file that is gone."""
-        return None
-
-    @property
-    def bubble(self) -> Bubble | None:
-        """The closed form of its pressure, where it is a logarithmic bubble."""
         return None
 
     def fault(self, longest: float, limit: float) -> str:

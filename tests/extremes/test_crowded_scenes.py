@@ -30,7 +30,7 @@ from tests.echoes import ARRAY, BOTTOM_DEPTH, EAST, PROFILE, ROMANIS, SCATTERED,
 from tests.echoes import heard as every_path
 
 SOURCE = ARRAY + [3.0, 5.0, 1.3]
-SHARP = Kirchhoff(edges="sharp")
+COHERENT = Kirchhoff()
 
 
 def placed(mesh: Mesh, *place: float, turned: float = 1.1, name: str = "body") -> PlacedTarget:
@@ -115,9 +115,9 @@ CROWDS = {
 def test_facets_that_echo_are_those_that_no_triangle_hides(crowd: str) -> None:
     turned, *parts = CROWDS[crowd]
     bodies = tuple(placed(mesh_of(shape), *place, turned=turned) for shape, place in parts)
-    laws = (SHARP, MirrorLobe(width=1.0), Isotropic(strength=1e-3))
+    laws = (COHERENT, MirrorLobe(width=1.0), Isotropic(strength=1e-3))
     shaded = 0
-    for chosen in ((SHARP,) * len(bodies), laws[1::-1][: len(bodies)]):
+    for chosen in ((COHERENT,) * len(bodies), laws[1::-1][: len(bodies)]):
         found = echoes(bodies, chosen)
         pairs = list(zip(found.target.tolist(), found.facet.tolist(), strict=True))
         assert len(pairs) == len(set(pairs))
@@ -160,9 +160,9 @@ def test_of_two_bodies_in_one_place_the_first_is_heard(law: object, other: objec
 
 def test_a_box_flush_in_the_face_of_another_adds_nothing_to_it() -> None:
     large, small = placed(cube((1.0, 1.0, 1.0), 0.06), 9, 0, -15), placed(cube((1.0, 0.5, 0.5), 0.04), 9, 0, -15)
-    alone = transfer(echoes((large,), (SHARP,)))
-    np.testing.assert_allclose(transfer(echoes((large, small), (SHARP,) * 2)), alone, rtol=1e-12)
-    swapped = transfer(echoes((small, large), (SHARP,) * 2))  # but for the facets that its edge cuts
+    alone = transfer(echoes((large,), (COHERENT,)))
+    np.testing.assert_allclose(transfer(echoes((large, small), (COHERENT,) * 2)), alone, rtol=1e-12)
+    swapped = transfer(echoes((small, large), (COHERENT,) * 2))  # but for the facets that its edge cuts
     assert np.abs(swapped - alone).max() < 0.1 * np.abs(alone).max()
 
 
@@ -244,7 +244,7 @@ def test_a_snap_inside_a_body_is_not_heard(law: object) -> None:
 def test_a_dozen_bodies_of_all_laws_in_one_heap_stay_finite() -> None:
     rng = np.random.default_rng(5)
     shapes = (ball(0.4, 0.15), cube((0.5, 0.7, 0.4), 0.2), mesh_of(Cylinder(radius=0.2, length=1.0, edge=0.2)))
-    laws = (Kirchhoff(), SCATTERED, Kirchhoff(roughness=0.005), MirrorLobe(), Isotropic(strength=1e-3), SHARP)
+    laws = (Kirchhoff(), SCATTERED, Kirchhoff(roughness=0.005), MirrorLobe(), Isotropic(strength=1e-3), Kirchhoff())
     bodies = tuple(
         placed(shapes[n % 3], *(np.array([9.0, 0.0, -15.0]) + rng.uniform(-0.7, 0.7, 3)), turned=n) for n in range(12)
     )

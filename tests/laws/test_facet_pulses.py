@@ -10,7 +10,7 @@ import pytest
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.scattering.facet_pulses import facet_mean, facet_response, mean_powers, rough_factor
-from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude
+from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import POINT, BandPass, LowPass, Sonar
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
@@ -80,7 +80,7 @@ def test_amplitude_and_response_are_the_kirchhoff_integral(size: float) -> None:
     of = echo_of(corners[None], incident, scattered, 0.0)
     f = np.linspace(0.0, 1e5, 257)
     response = facet_response(f, of.coherent, of.corner_delays, of.coherent_fraction, of.height_delay_std, of.centre)
-    exact = facet_amplitude(corners, incident, scattered, 2.0 * np.pi * f / C)
+    exact = mesh_amplitude(corners[None], incident, scattered, 2.0 * np.pi * f / C)
     np.testing.assert_allclose(of.amplitude[0] * response[0], exact, atol=1e-14 * of.amplitude[0])
 
 
@@ -96,7 +96,7 @@ def test_signals_are_the_kirchhoff_integral_frequency_by_frequency(
     f, spectrum = pulse_spectrum(waveform(MODEL), SHARP.antialias, SHARP.sampling_frequency, period)
     some = np.abs(spectrum) > 0.0
     omega, weight = 2.0 * np.pi * f[some], 2.0 * spectrum[some] * SHARP.sampling_frequency / period
-    heard_of_it = weight * facet_amplitude(corners, incident, scattered, omega / C)
+    heard_of_it = weight * mesh_amplitude(corners[None], incident, scattered, omega / C)
     start, samples = hearing(of, SHARP, POINT, margin=1e-3)[3:5]
     t = start + np.arange(samples) / SHARP.sampling_frequency - delay
     near = np.abs(t) < 8e-4  # the period of the tones is longer than the echo

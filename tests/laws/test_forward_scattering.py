@@ -111,7 +111,6 @@ def test_sound_is_blocked_or_scattered_forward_never_both() -> None:
         Kirchhoff(forward="scattered", surface="soft"),
         Kirchhoff(forward="scattered", roughness=0.01, slope=0.3, diffuse=0.5),
         Kirchhoff(forward="scattered", surface=PartlyReflecting(density_ratio=1.5, speed_ratio=1.2, loss_tangent=0.1)),
-        Kirchhoff(forward="scattered", edges="sharp"),
     ],
 )
 def test_the_shadow_does_not_tell_what_a_body_is_made_of(law: Kirchhoff) -> None:

@@ -109,7 +109,7 @@ def test_what_is_wrong_is_seen() -> None:
 
 
 def test_a_wrong_integral_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sonarsynth.equations.scattering.kirchhoff_integral import triangle_integral
+    from sonarsynth.validation.bodies.facet_integral import triangle_integral
 
     monkeypatch.setattr(
         "sonarsynth.validation.bodies.facet_integral.triangle_integral",

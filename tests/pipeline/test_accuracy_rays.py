@@ -17,7 +17,7 @@ from sonarsynth.equations.rays import ray_solutions
 from sonarsynth.validation import REFERENCES, Row, ray_accuracy
 from sonarsynth.validation.extremes.extreme_rays import circle
 from sonarsynth.validation.rays.ray_matching import Bounds, Rays, errors, miscounted, nearest, rays_of
-from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
+from sonarsynth.validation.references.rays.exact_rays import exact_rays
 from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
 from sonarsynth.validation.report import write
 
@@ -51,18 +51,21 @@ def test_the_search_is_within_every_bound(rows: list[Row]) -> None:
     ("slope", "bottom_depth", "farthest"),
     [(0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4), (0.0, 1e2, 1e4)],
 )
-def test_digits_have_the_closed_forms_of_circles_and_images(slope: float, bottom_depth: float, farthest: float) -> None:
+def test_exact_rays_have_the_closed_forms_of_circles_and_images(
+    slope: float, bottom_depth: float, farthest: float
+) -> None:
     """Every ray that is not reflected: time and amplitude of the circle (the line) through both ends."""
     start, end, distance = ends(bottom_depth, farthest)
     depth, speed = np.array([0.0, bottom_depth]), np.array([1500.0, 1500.0 + slope * bottom_depth])
-    found = ray_solutions.eigenrays(ray_solutions.water(depth, speed, bottom_depth), start, end, distance, 1, 0)
-    digits = exact_rays(Layers(depth, speed), rays_of(found), found.slowness, start, end, distance)
-    assert len(digits.pair) > 0
-    for i, pair in enumerate(digits.pair):
+    water = ray_solutions.water(depth, speed, bottom_depth)
+    found = ray_solutions.eigenrays(water, start, end, distance, 1, 0)
+    followed = exact_rays(water, rays_of(found), found.slowness, start, end, distance)
+    assert len(followed.pair) > 0
+    for i, pair in enumerate(followed.pair):
         c = np.interp([start[pair], end[pair]], depth, speed)
         exact = circle(slope, *c.tolist(), float(np.hypot(distance[pair], start[pair] - end[pair])))
-        assert digits.travel_time[i] == pytest.approx(exact[0], rel=1e-14)
-        assert digits.amplitude[i] == pytest.approx(exact[1], rel=1e-11)
+        assert followed.travel_time[i] == pytest.approx(exact[0], rel=1e-14)
+        assert followed.amplitude[i] == pytest.approx(exact[1], rel=1e-11)
 
 
 def test_shooting_in_a_smooth_profile_is_reciprocal() -> None:
@@ -139,8 +142,8 @@ def test_without_mpmath_one_line_says_how_to_get_it(
 ) -> None:
     app = typer.Typer()
     app.command()(accuracy)
-    monkeypatch.setattr("sonarsynth.validation.rays.eigenray_checks.find_spec", lambda name: None)
-    assert run(app, ["--out", str(tmp_path)]) == 2
+    monkeypatch.setattr("sonarsynth.validation.bubbles.find_spec", lambda name: None)
+    assert run(app, ["--reference", "bubble", "--out", str(tmp_path)]) == 2
     said = capfd.readouterr().err
     assert said.count("\n") == 1
     assert "pip install 'sonarsynth[accuracy]'" in said

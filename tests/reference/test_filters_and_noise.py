@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from sonarsynth.environment.noise import TabulatedNoise, ThermalNoise, WenzNoise, WindNoise
-from sonarsynth.equations.bubble import snap_pressure
+from sonarsynth.equations.bubble import pulses, snap_pressure
 from sonarsynth.equations.noise import ambient_noise, filters
 from sonarsynth.equations.noise.complex_normals import box_muller
 from sonarsynth.equations.noise.filters import Fir
@@ -66,7 +66,7 @@ def test_filtered_pulse_is_the_inverse_transform_of_the_product() -> None:
 def test_support_holds_the_pulse_and_no_more(fir: Fir) -> None:
     peak = np.abs(filtered_pulse(np.linspace(-2e-5, 2e-5, 201), BUBBLE, fir)).max()
     for tolerance in (1e-3, 1e-5, 1e-7):
-        before, after = filters.pulse_support(BUBBLE, fir, tolerance)
+        before, after = pulses.support(MODEL.pulse(0.0, 2.0 * fir.high), fir, tolerance)
         outside = np.concatenate([np.linspace(-before - 3e-4, -before, 100), np.linspace(after, after + 2e-4, 60)])
         assert np.abs(filtered_pulse(outside, BUBBLE, fir)).max() <= tolerance * peak
         inside = np.concatenate([-before + np.linspace(0, 2e-5, 40), after - np.linspace(0, 2e-5, 40)])

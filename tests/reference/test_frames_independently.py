@@ -28,9 +28,9 @@ from sonarsynth.validation.references.frames.frame_pressure import FramePressure
 from sonarsynth.validation.references.frames.line_of_sight import Surface
 from sonarsynth.validation.references.frames.path_sum import Contributions, transfer
 from sonarsynth.validation.references.frames.sound_paths import hidden
+from sonarsynth.validation.references.rays.exact_rays import exact_rays
 from sonarsynth.validation.references.rays.layered_rays import families, rays
 from sonarsynth.validation.references.rays.layers_crossed import Water
-from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
 
 ALLOWED = 1e-3  # of the largest pressure
 
@@ -220,8 +220,9 @@ def test_rays_by_images_are_those_of_many_digits_where_the_speed_is_linear(slope
     first, last, far = generator.uniform(0.0, bottom, (2, 24)).tolist() + [generator.uniform(15.0, 30.0, 24)]
     first, last = np.array(first), np.array(last)
     depth, speed = np.array([0.0, bottom]), np.array([1500.0, 1500.0 + slope * bottom])
-    near = ray_solutions.eigenrays(ray_solutions.water(depth, speed, bottom), first, last, far, 1, 1)
-    other = exact_rays(Layers(depth, speed), rays_of(near), near.slowness, first, last, far)
+    layers = ray_solutions.water(depth, speed, bottom)
+    near = ray_solutions.eigenrays(layers, first, last, far, 1, 1)
+    other = exact_rays(layers, rays_of(near), near.slowness, first, last, far)
     start, end = np.column_stack([0.0 * far, 0.0 * far, -first]), np.column_stack([far, 0.0 * far, -last])
     water = Water(depth, speed, bottom)
     seen = 0

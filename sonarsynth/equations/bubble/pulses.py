@@ -13,10 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.fft import irfft, rfft
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, Complexes, Floats
 from sonarsynth.equations.kernels.fourier_sums import fourier_sums, parts
 from sonarsynth.equations.noise.filters import SUPPORT_TOLERANCE, Fir, duration, impulse_response
+
+FINER = 512
+"""Steps of a period of the highest wave that passes a filter, in which strengths are laid on a grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,16 +73,18 @@ def reach(fir: Fir) -> float:
 
 
 def _waveform(pulse: Pulse, fir: Fir, steps: int) -> tuple[Floats, Floats]:
-    """Times (s) and pressures (Pa) of all of the filtered pulse, in so many steps a period of the highest wave."""
+    """Times (s) and pressures (Pa) of all of the filtered pulse, in so many steps a period of the highest wave.
+
+    Strengths are shared between the two nearest points of a grid of `FINER` steps a period: to 1e-5 of the peak.
+    """
     half, step = 0.5 * duration(fir), 1.0 / (steps * (fir.high + 0.5 * fir.transition))
-    time = np.arange(pulse.start - half, pulse.end + half + step, step)
-    lag = np.linspace(-half, half, int(np.ceil(2.0 * half / step)) * 512 // steps + 1)  # a table of h, linear: 2e-5
-    h = impulse_response(lag, fir)
-    p = np.zeros(time.size)
-    for block in parts(time, pulse.time.size):
-        near = slice(*np.searchsorted(pulse.time, [time[block][0] - half, time[block][-1] + half]))
-        p[block] = np.interp(time[block, None] - pulse.time[near], lag, h, left=0.0, right=0.0) @ pulse.strength[near]
-    return time, p
+    time, finer = np.arange(pulse.start - half, pulse.end + half + step, step), FINER // steps
+    fine, size = step / finer, time.size * finer
+    h = impulse_response(np.arange(-half, half, fine), fir)
+    first, rest = np.divmod(np.maximum(pulse.time - pulse.start, 0.0) / fine, 1.0)
+    shares = (1.0 - rest) * pulse.strength, rest * pulse.strength
+    strength = sum(np.bincount(first.astype(int) + n, share, size) for n, share in enumerate(shares))
+    return time, irfft(rfft(strength) * rfft(h, size), size)[::finer]
 
 
 def levels(pulse: Pulse, fir: Fir) -> Levels:

@@ -1,4 +1,4 @@
-"""Filters and interpolation kernels, and the filtered snap.
+"""Filters and interpolation kernels.
 
 The filters are the Kaiser-window FIR filters of `scipy.signal.firwin` and `kaiserord` in the limit of a high design
 rate: their impulse response is a function of time, symmetric and of finite length, so that a filtered snap is finite
@@ -12,20 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numpy.fft import irfft, rfft
 from scipy.special import i0, i0e
 
 from sonarsynth.conventions import Floats
-from sonarsynth.equations.bubble import snap_pressure
-from sonarsynth.equations.bubble.snap_pressure import Bubble
 from sonarsynth.equations.kernels.fourier_sums import fourier_sums
 
 SUPPORT_TOLERANCE = 1e-7
 """What a filtered snap may be, relative to its peak, outside of its support."""
 
 
-FINER = 64
-"""Steps of a table of an impulse response a step of a filtered snap; it is linear between, to 1e-5 of it."""
 TAPS = 64
 """Samples that `windowed_sinc` weighs."""
 
@@ -87,29 +82,6 @@ def response(frequency: npt.ArrayLike, fir: Fir) -> Floats:
     """Frequency response (real: zero phase) at frequencies (Hz), to 1e-13."""
     f = np.asarray(frequency, float)
     return (_transform(f.ravel(), fir) / _scale(fir)).reshape(f.shape)
-
-
-def pulse_support(bubble: Bubble, fir: Fir, tolerance: float = SUPPORT_TOLERANCE) -> tuple[float, float]:
-    """How long (s) before and after the collapse the filtered snap exceeds `tolerance` of its peak."""
-    t, step, wave = _filtered_snap(bubble, fir)
-    loud = np.flatnonzero(wave > tolerance * wave.max())
-    return float(max(step - t[loud[0]], 0.0)), float(max(t[loud[-1]] + step, 0.0))
-
-
-@lru_cache(maxsize=64)
-def _filtered_snap(bubble: Bubble, fir: Fir) -> tuple[Floats, float, Floats]:
-    """Times (time,) s about the collapse, their step, and the modulus of the filtered snap then, in any unit."""
-    half = 0.5 * duration(fir)
-    step = 1.0 / (8.0 * (fir.high + 0.5 * fir.transition))
-    t = np.arange(snap_pressure.onset(bubble) - half, half + step, step)
-    x, w = snap_pressure.quadrature(bubble, 2.0 * fir.high)
-    p = w * snap_pressure.pressure(-x, bubble)
-    fine, size = step / FINER, t.size * FINER
-    h = impulse_response(np.arange(-half, half, fine), fir)
-    first, rest = np.divmod(np.maximum(-snap_pressure.onset(bubble) - x, 0.0) / fine, 1.0)  # from the onset on
-    snap = sum(np.bincount(first.astype(int) + n, share * p, size) for n, share in enumerate((1.0 - rest, rest)))
-    wave = irfft(rfft(snap) * rfft(h, size), size)
-    return t, step, np.abs(wave[::FINER])
 
 
 def kaiser_bessel(x: npt.ArrayLike, width: float, beta: float) -> Floats:

@@ -1,4 +1,5 @@
-"""The Kirchhoff integral over flat facets and plates, exact for each of them, with no special case at the mirror angle.
+"""The Kirchhoff integral over flat facets and plates, exact for each of them, with no special case at the mirror angle
+(`kirchhoff_kernels.mesh_amplitude` sums it over facets).
 
 Of a plane wave of unit pressure at the origin, travelling along ki, a facet sends f exp(-ikr)/r along ks:
 
@@ -38,11 +39,7 @@ def divided_exponential(phases: npt.ArrayLike) -> Complexes:
     """
     p = np.asarray(phases, float)
     first = p[..., 0]
-    return np.asarray(np.exp(1j * first) * _divided(p[..., 1] - first, p[..., 2] - first))
-
-
-def _divided(second: Floats, third: Floats) -> Complexes:
-    """Second divided difference of the exponential at 0 and i times two phases (...)."""
+    second, third = p[..., 1] - first, p[..., 2] - first
     mean = (second + third) / 3.0
     x, y, z = -mean, second - mean, third - mean
     low, high = np.minimum(x, y), np.maximum(x, y)
@@ -54,7 +51,7 @@ def _divided(second: Floats, third: Floats) -> Complexes:
     out[near] = _series(a[near], b[near], c[near])
     a, b, c = a[far], b[far], c[far]
     out[far] = (_mean_exponential(b, c) - _mean_exponential(a, b)) * (-1j * (1.0 / (c - a)))
-    return np.asarray(out * np.exp(1j * mean))
+    return np.asarray(np.exp(1j * first) * np.asarray(out * np.exp(1j * mean)))
 
 
 def _mean_exponential(x: Floats, y: Floats) -> Complexes:
@@ -72,34 +69,6 @@ def _series(a: Floats, b: Floats, c: Floats) -> Complexes:
         factorial *= j + 2
         sums[j % 2] += s1 / factorial
     return np.asarray(sums[0] + 1j * sums[1])
-
-
-def triangle_integral(corners: npt.ArrayLike, wave: npt.ArrayLike) -> Complexes:
-    """Integral (...) (m2) of exp(i w.x) over triangles with corners (..., 3, xyz) (m), for waves w (..., xyz) (rad/m).
-
-    Exact, after Gordon (1975), IEEE Trans. Antennas Propag. 23, 590, but by `divided_exponential`, so that nothing is
-    0/0 square to the facet or to an edge. Error under 1e-15 of the area; a needle, a point or a line gives 0.
-    """
-    first, second, third = _edges(corners)
-    area = np.linalg.norm(np.cross(second, third), axis=-1)  # twice
-    return np.asarray(area * _half_mean(first, second, third, np.asarray(wave, float)))
-
-
-def facet_amplitude(
-    corners: npt.ArrayLike,
-    incident: npt.ArrayLike,
-    scattered: npt.ArrayLike,
-    wavenumber: npt.ArrayLike,
-    reflection: npt.ArrayLike = 1.0,
-) -> Complexes:
-    """Far-field amplitude f (...) (m) of triangles with corners (..., 3, xyz) (m), counter-clockwise from outside.
-
-    wavenumber k (...) (rad/m) and reflection coefficient V (...), which may be complex: all broadcast together. The
-    phase is that of the place of the facet: amplitudes of facets add, and those of the parts of a facet to its own.
-    """
-    first, second, third = _edges(corners)
-    wave = _wave(incident, scattered, wavenumber)
-    return _amplitude(dot(np.cross(second, third), wave), _half_mean(first, second, third, -wave), reflection)
 
 
 def local_grazing(incident: npt.ArrayLike, scattered: npt.ArrayLike) -> Floats:
@@ -173,14 +142,3 @@ def _wave(incident: npt.ArrayLike, scattered: npt.ArrayLike, wavenumber: npt.Arr
 
 def _amplitude(normal_wave: Floats, integral: Floats | Complexes, reflection: npt.ArrayLike) -> Complexes:
     return np.asarray(-0.25j / np.pi * np.asarray(reflection) * normal_wave * integral)
-
-
-def _edges(corners: npt.ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """First corner (..., xyz) and the edges from it to the second and to the third (m)."""
-    x = np.asarray(corners, float)
-    return x[..., 0, :], x[..., 1, :] - x[..., 0, :], x[..., 2, :] - x[..., 0, :]
-
-
-def _half_mean(first: Floats, second: Floats, third: Floats, wave: Floats) -> Complexes:
-    """Half the mean (...) of exp(i w.x) over triangles; phases within one count from its first corner."""
-    return np.asarray(np.exp(1j * dot(first, wave)) * _divided(dot(second, wave), dot(third, wave)))

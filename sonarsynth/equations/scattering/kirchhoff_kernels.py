@@ -1,5 +1,4 @@
-"""The Kirchhoff integral over many flat facets at many frequencies, compiled: `kirchhoff_integral.facet_amplitude`,
-summed."""
+"""The Kirchhoff integral over many flat facets at many frequencies, compiled; `kirchhoff_integral` has the formulas."""
 
 from __future__ import annotations
 
@@ -30,7 +29,8 @@ def mesh_amplitude(
     corners (facet, 3, xyz) (m), counter-clockwise from outside; incident, scattered: unit vectors of propagation
     (facet, xyz) or (xyz,), in and away; weight (facet,): reflection coefficient, complex if need be, and 0 where a
     facet is not lit or not seen; roughness (facet,): rms height (m) of the surface, which leaves the coherent part
-    exp(-g^2/2), g = k height n.(ks - ki). Formulas and phases as in `kirchhoff`; facets of weight 0 cost nothing.
+    exp(-g^2/2), g = k height n.(ks - ki). Formulas as in `kirchhoff_integral`; the phase of a facet is that of its
+    place, so that amplitudes add. Facets of weight 0 cost nothing.
     """
     args = _prepared(corners, incident, scattered, wavenumber, weight, roughness)
     out = np.zeros(args[3].size, complex)

@@ -158,7 +158,7 @@ def _between() -> CaseResult:
     blocked = traced([snap(source)], POINT, [body(mesh, (10.0, 0.0, 0.0))], [Kirchhoff()])
     results = [holds(len(blocked.delay) == 0, "blocked: no path")]
     for aside in (0.0, 0.1, 0.25, 0.4, 0.8):
-        law = Kirchhoff(forward="scattered", edges="sharp")
+        law = Kirchhoff(forward="scattered")
         arrivals = traced([snap(source)], POINT, [body(mesh, (10.0, aside, 0.0))], [law])
         pressure = transfer(arrivals, f) * 20.0 * np.exp(2j * np.pi * f * 20.0 / C)
         w = np.sqrt(2.0 * 20.0 * f / C / 100.0)

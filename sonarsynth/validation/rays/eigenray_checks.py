@@ -1,14 +1,13 @@
 """The eigenray search against computations that share no code with it: error against run time.
 
-Layers, of one speed and of one gradient among them, against arithmetic of 50 digits, with a dense fan that counts the
-rays of every family; the canonical profile of Munk, whose layers have an error of their own, against the ray equations
-of the smooth profile, integrated.
+Layers, of one speed and of one gradient among them, against rays followed leg by leg in long doubles, of which a dense
+fan counts the rays of every family; the canonical profile of Munk, whose layers have an error of their own, against the
+ray equations of the smooth profile, integrated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,8 +18,8 @@ from sonarsynth.equations.rays.ray_solutions import CAUSTIC
 from sonarsynth.validation.rays import ray_cases
 from sonarsynth.validation.rays.ray_cases import Case
 from sonarsynth.validation.rays.ray_matching import errors, miscounted, nearest, rays_of, worst
+from sonarsynth.validation.references.rays.exact_rays import exact_rays
 from sonarsynth.validation.references.rays.followed_rays import count_rays
-from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
 from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
 from sonarsynth.validation.run_time import timed
 from sonarsynth.validation.validation_rows import Row
@@ -29,16 +28,14 @@ if TYPE_CHECKING:
     from sonarsynth.equations.rays.ray_solutions import Eigenrays
 
 
-MANY_DIGITS, FAN = "50 digits", "a dense fan"
+FOLLOWED, FAN = "rays followed in long doubles", "a dense fan"
 SMOOTH = "DOP853, smooth profile"
 BATCH = 2e-3  # s: a search is timed on at least so much
 COST = "us a ray"  # CPU time of one core for one ray, in the complete search of the whole case
 
 
 def ray_accuracy(quick: bool = False) -> list[Row]:
-    """Errors and run times in every case; quick: fewer pairs. Raises ModuleNotFoundError without mpmath."""
-    if find_spec("mpmath") is None:
-        raise ModuleNotFoundError("the references for rays need mpmath: pip install 'sonarsynth[accuracy]'")
+    """Errors and run times in every case; quick: fewer pairs."""
     return [*_layered(quick), *_smooth(quick)]
 
 
@@ -72,12 +69,12 @@ def _layered(quick: bool) -> Iterator[Row]:
         yield Row(case.name, FAN, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(rays.pair)))
         keep = np.array(evenly(len(rays.pair), case.check))
         selected, trusted = rays.select(keep), np.asarray(eigenrays.flag[keep] != CAUSTIC)
-        exact = exact_rays(Layers(case.depth, case.speed), selected, eigenrays.slowness[keep], *ends)
+        exact = exact_rays(water, selected, eigenrays.slowness[keep], *ends)
         differing = float(sum(a != b for a, b in zip(selected.families, exact.families, strict=True)))
         columns = cost, COST, _counts(case, len(keep))
-        yield Row(case.name, MANY_DIGITS, "family", "wrong", 0.0, differing, *columns)
+        yield Row(case.name, FOLLOWED, "family", "wrong", 0.0, differing, *columns)
         for quantity, (unit, error, bound) in errors(selected, exact, trusted, case.bounds).items():
-            yield Row(case.name, MANY_DIGITS, quantity, unit, bound, error, *columns)
+            yield Row(case.name, FOLLOWED, quantity, unit, bound, error, *columns)
 
 
 def _smooth(quick: bool) -> Iterator[Row]:

@@ -1,1 +1,1 @@
-"""Rays by independent methods: shooting, images, arithmetic of many digits."""
+"""Rays by independent methods: shooting, images, rays followed leg by leg."""

@@ -7,7 +7,7 @@ multiplicities, no bounds, no chains. Works on one ray or on many that see the s
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -30,7 +30,7 @@ class Visit:
     bottom: int
     turning: int
     up: int
-    range: Any  # m, of one ray or of many
+    range: Any  # m, of one ray or of many; or what else was summed up
 
 
 def nodes(water: ray_solutions.Water, ends: tuple[float, float]) -> tuple[list[Any], list[Any]]:
@@ -59,12 +59,28 @@ def sides(z: list[Any], start: Any, end: Any) -> tuple[int, int]:
     return (first if start > end else last)[0], (first if end > start else last)[1]
 
 
+def range_through(p: Any, dz: Any, c1: Any, c2: Any) -> Any:
+    """Range (m) through a layer of thickness dz; c2 None where the ray becomes level."""
+    s1 = np.sqrt((1 - p * c1) * (1 + p * c1))
+    if c2 is None:
+        return (p * c1 + 1) * dz / s1
+    return p * (c1 + c2) * dz / (s1 + np.sqrt((1 - p * c2) * (1 + p * c2)))
+
+
 def follow(
-    z: list[Any], c: list[Any], ends: tuple[Any, Any], p: Any, up: int, vertices: int, reflections: int
+    z: list[Any],
+    c: list[Any],
+    ends: tuple[Any, Any],
+    p: Any,
+    up: int,
+    vertices: int,
+    reflections: int,
+    through: Callable[[Any, Any, Any, Any], Any] = range_through,
 ) -> Iterator[Visit]:
     """Visits of a ray of slowness p to the second depth, up to a number of vertices; it leaves the first up or down.
 
-    An end on a jump is on the side that faces the other end, on the lower side where both are there.
+    An end on a jump is on the side that faces the other end, on the lower side where both are there. through: what is
+    summed up over layers, in place of ranges.
     """
     last, typical = len(z) - 1, middle(p)
     i, receiver = sides(z, *ends)
@@ -89,14 +105,6 @@ def follow(
                 return
         if i == receiver:
             yield Visit(surface, bottom, turning, up, total)
-
-
-def through(p: Any, dz: Any, c1: Any, c2: Any) -> Any:
-    """Range (m) through a layer of thickness dz; c2 None where the ray becomes level."""
-    s1 = np.sqrt((1 - p * c1) * (1 + p * c1))
-    if c2 is None:
-        return (p * c1 + 1) * dz / s1
-    return p * (c1 + c2) * dz / (s1 + np.sqrt((1 - p * c2) * (1 + p * c2)))
 
 
 def fan(critical: list[Any], count: int = 600) -> Iterator[Floats]:
