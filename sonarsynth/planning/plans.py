@@ -20,7 +20,7 @@ from sonarsynth.planning.measured.chorus_reach import band_frequencies, chorus_r
 from sonarsynth.planning.measured.distant_chorus import DistantChorus, distant_chorus
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
-from sonarsynth.planning.plan_tables import Omission, Stage, as_text
+from sonarsynth.planning.plan_tables import Omission, Stage, as_html, as_text
 from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import Elements, elements
 from sonarsynth.recipe import Recipe
@@ -220,13 +220,20 @@ class Plan:
         return f"<Plan {self.recipe.title!r}: {self.recipe.frames} frames of {products}; print it for its stages>"
 
     def __str__(self) -> str:
+        return as_text(*self._printed)
+
+    def _repr_html_(self) -> str:
+        return as_html(*self._printed)
+
+    @property
+    def _printed(self) -> tuple[str, tuple[Stage, ...], tuple[Omission, ...], list[str]]:
         lines = [f"note: {warning}" for warning in self.warnings]
         lines.append(", ".join(counted(count, name) for name, count in self.sizes.items()))
         if self.odds:
             lines.append(f"in frames that were tried: {self.odds}")
         elif "image" in self.products and self.scene.sound_parts:
             lines.append("odds of finding targets: schedule.predict(plan).tried(plan) makes some frames and says them")
-        return as_text(self.recipe.title, self.stages, self.left_out, lines)
+        return self.recipe.title, self.stages, self.left_out, lines
 
     def as_json(self) -> dict[str, Any]:
         """The plan for a program: stages, left_out, predicted_seconds, predicted_bytes, sizes, windows.
