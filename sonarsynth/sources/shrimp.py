@@ -80,8 +80,8 @@ class SnappingShrimp(SoundSource):
     snap: SnapModel = LogarithmicBubble()
     """What a snap sounds like at 1 m."""
     source_level: Annotated[Decibels, Ge(-200), Le(300)] | None = None
-    """Peak source level (dB re 1 uPa at 1 m; before any filter, of a Keller-Miksis bubble below 200 kHz) to scale the
-    snap to; left out: the snap's own level."""
+    """Peak source level (dB re 1 uPa at 1 m; before any filter, of a Keller-Miksis bubble below its `level_below`) to
+    scale the snap to; left out: the snap's own level."""
     variation: SnapVariation = SnapVariation()
     """How its snaps differ; left out: they do not."""
     snap_times: tuple[Seconds, ...] = (0.0,)

@@ -7,11 +7,20 @@ from typing import Annotated, Literal, Self
 
 from annotated_types import Ge, Gt, Le
 
-from sonarsynth.conventions import Decibels, Metres, NonNegativeMetres, Number, Pascals, PositiveHertz
+from sonarsynth.conventions import (
+    Decibels,
+    Hertz,
+    KilogramsPerCubicMetre,
+    NonNegativeMetres,
+    Number,
+    Pascals,
+    PositiveHertz,
+    PositiveMetres,
+    WaterSoundSpeed,
+)
 from sonarsynth.description import description
 from sonarsynth.equations.bubble import bubble_collapse, bubble_pulse, waveforms
-from sonarsynth.equations.bubble.bubble_collapse import Collapse
-from sonarsynth.equations.bubble.bubble_equations import Cavity, ambient_pressure
+from sonarsynth.equations.bubble.bubble_collapse import Cavity, Collapse
 from sonarsynth.equations.bubble.pulses import Pulse
 from sonarsynth.sources.pulse_model import PulseModel
 from sonarsynth.sources.recordings import RecordedSnap
@@ -19,29 +28,49 @@ from sonarsynth.sources.recordings import RecordedSnap
 __all__ = ["Gabor", "KellerMiksis", "RecordedSnap", "Ricker", "SnapVariation"]
 
 
-LARGEST_MACH = 0.5
-"""Of the wall, over the speed of sound: the equation is of first order. Below 200 kHz even Mach 0.7 changes little."""
-
-
 @description
 class KellerMiksis(PulseModel):
-    """A bubble of vapour and a little gas that collapses from rest (Keller and Miksis 1980), in water of 20 degC. The
-    defaults give 206 dB re 1 uPa at 1 m, peak to peak, below 200 kHz, at 5 m.
+    """A bubble of vapour and a little gas that collapses from rest (Keller and Miksis 1980). The defaults, in water of
+    20 degC at 5 m, give 206 dB re 1 uPa at 1 m, peak to peak, below 200 kHz.
 
-    The first collapse is at t = 0. Deeper shrimp snap faster and louder. Levels are of the peak below 200 kHz: that
-    before any filter lasts nanoseconds and is not heard.
+    The first collapse is at t = 0. Deeper shrimp snap faster and louder.
     """
 
     kind: Literal["keller_miksis"] = "keller_miksis"
-    radius: Annotated[Metres, Ge(1e-4)] = 3.5e-3
+    radius: PositiveMetres = 3.5e-3
     """Largest radius, at rest."""
-    gas_pressure: Annotated[Pascals, Gt(0)] = 2000.0
-    """Pressure of the gas at the largest radius: less gas, a harder collapse. One whose wall would move faster than
-    half the speed of sound is refused."""
+    gas_pressure: Annotated[Pascals, Ge(0)] = 2000.0
+    """Pressure of the gas at the largest radius: less gas, a harder collapse."""
     depth: NonNegativeMetres | None = None
     """Depth whose pressure drives the collapse; left out: that of the shrimp."""
+    surface_pressure: Annotated[Pascals, Ge(0)] = 101325.0
+    """Pressure of the air above the sea."""
+    vapour_pressure: Annotated[Pascals, Ge(0)] = 2339.0
+    """Pressure of the vapour within the bubble, constant."""
+    surface_tension: Annotated[Number, Ge(0)] = 0.0725
+    """Surface tension in N/m."""
+    viscosity: Annotated[Number, Ge(0)] = 1e-3
+    """Viscosity of the water in Pa s."""
+    density: Annotated[KilogramsPerCubicMetre, Gt(0)] = 998.0
+    """Density of the water."""
+    sound_speed: WaterSoundSpeed = 1482.0
+    """In the water about the bubble: sets what it radiates, not how that travels."""
+    exponent: Annotated[Number, Ge(1), Le(3)] = 1.4
+    """Polytropic exponent of the gas: 1 is isothermal."""
+    core_ratio: Annotated[Number, Gt(1)] | None = None
+    """Radius of the gas at ambient pressure over that of its hard core (van der Waals): 8.86 argon, 8.5 air. Left out:
+    an ideal gas."""
     rebounds: Annotated[int, Ge(0), Le(10)] = 1
     """Collapses that are kept after the first; the pulse ends at the top of the last rebound."""
+    fade: Annotated[Number, Ge(0), Le(1)] = 0.5
+    """Part of the time before the first collapse, and after the last, over which the flow fades in and out."""
+    level_below: Annotated[Hertz, Ge(1e3), Le(2e6)] | None = 200e3
+    """Frequency of the low pass behind which its peak is taken, for `source_level` and the level that is stored; the
+    snap itself is not filtered. From 1 to 3000 Pa of gas at 5 m that peak moves by 3 dB, the unfiltered one (`null`),
+    which lasts nanoseconds and is not heard, by 32 dB."""
+    largest_mach: Annotated[Number, Gt(0)] = 0.5
+    """A bubble whose wall moves faster than this times the speed of sound is refused: the equation is of first order.
+    Below 200 kHz even Mach 0.7 changes little."""
 
     def at_depth(self, depth: float) -> Self:
         """As `PulseModel.at_depth`."""
@@ -49,17 +78,43 @@ class KellerMiksis(PulseModel):
 
     def pulse(self, depth: float, highest: float) -> Pulse:
         """As `PulseModel.pulse`. Raises ValueError as `collapse`."""
-        return bubble_pulse.pulse(self.collapse(depth), highest)
+        collapse = self.collapse(depth)
+        pulse = bubble_pulse.pulse(collapse, highest, self.fade)
+        if self.level_below is None:
+            return pulse
+        return replace(pulse, peak=bubble_pulse.peak_below(collapse, self.level_below, self.fade))
+
+    def cavity(self, depth: float) -> Cavity:
+        """The bubble at its own depth, or else at this one (m), as the equations take it."""
+        own_depth = depth if self.depth is None else self.depth
+        ambient = bubble_collapse.ambient_pressure(own_depth, self.density, surface=self.surface_pressure)
+        core = (
+            bubble_collapse.hard_core(self.radius, self.gas_pressure, ambient, self.core_ratio)
+            if self.core_ratio
+            else 0.0
+        )
+        return Cavity(
+            radius=self.radius,
+            gas_pressure=self.gas_pressure,
+            ambient_pressure=ambient,
+            vapour_pressure=self.vapour_pressure,
+            surface_tension=self.surface_tension,
+            viscosity=self.viscosity,
+            density=self.density,
+            sound_speed=self.sound_speed,
+            exponent=self.exponent,
+            core=core,
+        )
 
     def collapse(self, depth: float) -> Collapse:
-        """The solved bubble, at its own depth or else at this one (m). Raises ValueError where it does not collapse, or
-        too fast."""
-        ambient = ambient_pressure(depth if self.depth is None else self.depth)
-        collapse = bubble_collapse.collapse(Cavity(self.radius, self.gas_pressure, ambient), self.rebounds)
-        if collapse.mach > LARGEST_MACH:
+        """The solved bubble. Raises ValueError where it does not collapse, or faster than `largest_mach`."""
+        collapse = bubble_collapse.collapse(self.cavity(depth), self.rebounds)
+        if collapse.flag in {bubble_collapse.SETTLED, bubble_collapse.SINGULAR}:
+            raise ValueError(f"the bubble has no snap: {collapse.reason}")
+        if collapse.mach > self.largest_mach:
             raise ValueError(
-                f"the wall reaches {collapse.mach:.3g} times the speed of sound, over {LARGEST_MACH:g}: first-order "
-                "theory does not hold; more gas_pressure slows it"
+                f"the wall reaches {collapse.mach:.3g} times the speed of sound, over largest_mach "
+                f"{self.largest_mach:.3g}: first-order theory does not hold; more gas_pressure slows it"
             )
         return collapse
 

@@ -27,7 +27,7 @@ class Emission:
     position: Floats  # (xyz) m, world
     time: float  # s of the collapse on the clock of the frame
     model: PulseModel  # a bubble at its depth
-    source_level: float | None  # dB re 1 uPa at 1 m peak of the model; None: its own
+    source_level: float | None  # dB re 1 uPa at 1 m peak of the model (see `level_below`); None: its own
     gain: float = 1.0
     width: float = 1.0
     velocity: Floats = field(default_factory=lambda: np.zeros(3))  # (xyz) m/s of the source at that time, world

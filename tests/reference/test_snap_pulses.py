@@ -99,15 +99,22 @@ def test_scaling_stretches_the_spectrum(model: LogarithmicBubble) -> None:
 
 
 def test_a_shrimp_snaps_at_its_own_depth_unless_told() -> None:
-    assert KellerMiksis().collapse(5.0).cavity.ambient_pressure == pytest.approx(101325.0 + 998.0 * 9.81 * 5.0)
-    assert KellerMiksis(depth=2.0).collapse(5.0).cavity == KellerMiksis().collapse(2.0).cavity
+    assert KellerMiksis().cavity(5.0).ambient_pressure == pytest.approx(101325.0 + 998.0 * 9.81 * 5.0)
+    assert KellerMiksis(depth=2.0).cavity(5.0) == KellerMiksis().cavity(2.0)
+    cored = KellerMiksis(gas_pressure=1000.0, core_ratio=8.86).cavity(5.0)
+    assert cored.core == pytest.approx(74.30e-6, abs=5e-9)
     shallow, deep = (KellerMiksis().pulse(z, pulses.reach(FIR)) for z in (2.0, 20.0))
     assert deep.peak > shallow.peak and deep.start > shallow.start
 
 
 def test_a_bubble_too_fast_for_its_equation_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"reaches 0\.739 times .* over 0\.5"):
+    with pytest.raises(ValueError, match=r"reaches 0\.739 times .* largest_mach 0\.5"):
         KellerMiksis(gas_pressure=100.0).collapse(5.0)
+    assert KellerMiksis(gas_pressure=100.0, largest_mach=0.8).collapse(5.0).flag == 2
+    with pytest.raises(ValueError, match="nothing stops"):
+        KellerMiksis(gas_pressure=0.0, largest_mach=1e9).pulse(5.0, 1e5)
+    with pytest.raises(ValueError, match="settles"):
+        KellerMiksis(viscosity=100.0).pulse(5.0, 1e5)
 
 
 def written(path: Path, rate: float, wave: np.ndarray, start: float = -2e-4) -> RecordedSnap:

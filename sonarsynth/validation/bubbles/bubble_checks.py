@@ -1,7 +1,7 @@
 """Bubbles that collapse, against the equation as it is printed, and published levels.
 
-Keller-Miksis in R and t, and in water without compression; published levels; error against run time over the solver's
-tolerance. What is conserved, what is refused, and Rayleigh's closed form are in the table of extremes.
+Keller-Miksis and Rayleigh-Plesset in R and t; published levels; error against run time over the solver's tolerance.
+What is conserved, what is refused, and Rayleigh's closed form are in the table of extremes.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ import numpy as np
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
 from sonarsynth.equations.bubble import bubble_collapse, bubble_pulse, pulses
-from sonarsynth.equations.bubble.bubble_collapse import Collapse, moving, stretched
-from sonarsynth.equations.bubble.bubble_equations import Cavity, ambient_pressure
+from sonarsynth.equations.bubble.bubble_collapse import Cavity, Collapse
 from sonarsynth.validation.references.printed_bubble import PrintedBubble, printed_bubble
 from sonarsynth.validation.run_time import timed
 from sonarsynth.validation.validation_rows import Row
@@ -44,10 +43,11 @@ HALF_DIGIT: Final = 0.06
 """dB: half a digit of the table, and a little."""
 
 
-def described(gas: float, depth: float = DEPTH, *, compressible: bool = True) -> Cavity:
-    """The bubble of all cases: 3.5 mm, in water of 20 degC; without compression it is Rayleigh and Plesset's."""
-    cavity = Cavity(RADIUS, gas, ambient_pressure(depth))
-    return cavity if compressible else cavity._replace(sound_speed=np.inf)
+def described(gas: float, depth: float = DEPTH, *, compressible: bool = True, core: bool = False) -> Cavity:
+    """The bubble of all cases: 3.5 mm, in water of 20 degC."""
+    ambient = bubble_collapse.ambient_pressure(depth)
+    h = bubble_collapse.hard_core(RADIUS, gas, ambient) if core else 0.0
+    return Cavity(RADIUS, gas, ambient, core=h, compressible=compressible)
 
 
 @cache
@@ -76,10 +76,11 @@ def worst(values: tuple[float, ...], expected: tuple[float, ...]) -> float:
 
 
 def equation_rows(quick: bool) -> Iterator[Row]:
-    """Collapse and rebound, with and without compression."""
+    """Collapse and rebound by both equations, and with a hard core."""
     for gas in (1000.0,) if quick else (100.0, 1000.0):
         for equation, compressible in (("Rayleigh-Plesset", False), ("Keller-Miksis", True)):
             yield from printed_rows(f"{equation}, {gas:g} Pa", *solved(described(gas, compressible=compressible)))
+        yield from printed_rows(f"Keller-Miksis with a hard core, {gas:g} Pa", *solved(described(gas, core=True)))
 
 
 def printed_rows(case: str, bubble: Collapse, cost: float) -> Iterator[Row]:
@@ -87,11 +88,11 @@ def printed_rows(case: str, bubble: Collapse, cost: float) -> Iterator[Row]:
     best = exact(bubble.cavity)
     (low, high), (first, last) = best.radii, best.times
     again = bubble.largest[0]
-    yield row(case, PRINTED, "smallest radius", "1", TOLERANCE, bubble.smallest[0].radius / low - 1.0, cost, bubble)
+    yield row(case, PRINTED, "smallest radius", "1", TOLERANCE, bubble.minimum_radius / low - 1.0, cost, bubble)
     yield row(case, PRINTED, "collapse time", "1", 0.1 * TOLERANCE, bubble.collapse_time / first - 1.0, cost, bubble)
     rebound = (again.time + bubble.collapse_time, again.radius)
     yield row(case, PRINTED, "rebound", "1", TOLERANCE, worst(rebound, (last, high)), cost, bubble)
-    pressure = float(moving(stretched(0.0, bubble), bubble).pressure) / best.pressures[0]
+    pressure = float(bubble_collapse.pressure(0.0, bubble)) / best.pressures[0]
     yield row(case, PRINTED, "pressure at the collapse", "1", 1e-7, pressure - 1.0, cost, bubble)
     expected, own = waveform(exact_spectrum(best)), waveform(spectrum(bubble))
     miss = np.abs(expected - own).max() / np.abs(expected).max()
@@ -121,14 +122,9 @@ def tolerance_rows(quick: bool) -> Iterator[Row]:
     for tolerance in LOOSER[1:2] if quick else LOOSER:
         bubble, cost = solved(described(100.0), tolerance)
         case, bound = f"Keller-Miksis, 100 Pa, tolerance {tolerance:g}", 30.0 * tolerance
-        radii = worst((bubble.smallest[0].radius, bubble.largest[0].radius), best.radii)
+        radii = worst((bubble.minimum_radius, bubble.largest[0].radius), best.radii)
         yield row(case, PRINTED, "smallest radius, rebound", "1", bound, radii, cost, bubble)
         yield row(case, PRINTED, "collapse time", "1", bound, bubble.collapse_time / best.times[0] - 1.0, cost, bubble)
-
-
-def peak_level(bubble: Collapse) -> float:
-    """Peak source level (dB re 1 uPa at 1 m) before any filter."""
-    return float(20.0 * np.log10(bubble_pulse.peak(bubble)[1] / REFERENCE_PRESSURE))
 
 
 def level_rows(quick: bool) -> Iterator[Row]:
@@ -136,7 +132,7 @@ def level_rows(quick: bool) -> Iterator[Row]:
     for gas, (raw, *limited) in LEVELS.items():
         bubble, cost = solved(described(gas))
         case = f"Keller-Miksis, {gas:g} Pa"
-        yield row(case, TABLE, "peak", "dB", HALF_DIGIT, peak_level(bubble) - raw, cost, bubble)
+        yield row(case, TABLE, "peak", "dB", HALF_DIGIT, bubble_pulse.source_level(bubble) - raw, cost, bubble)
         S = spectrum(bubble)
         for corner, level in zip((200.0, 100.0), limited, strict=True):
             peak_to_peak = 20.0 * np.log10(np.ptp(waveform(S, 1e3 * corner)) / REFERENCE_PRESSURE)
@@ -144,4 +140,4 @@ def level_rows(quick: bool) -> Iterator[Row]:
     for (depth, gas), level in {} if quick else DEEPER.items():
         bubble, cost = solved(described(gas, depth))
         case = f"Keller-Miksis, {gas:g} Pa at {depth:g} m"
-        yield row(case, TABLE, "peak", "dB", HALF_DIGIT, peak_level(bubble) - level, cost, bubble)
+        yield row(case, TABLE, "peak", "dB", HALF_DIGIT, bubble_pulse.source_level(bubble) - level, cost, bubble)

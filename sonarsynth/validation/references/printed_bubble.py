@@ -2,9 +2,9 @@
 
     D R'' = N,   D = (1 - R'/c) R + 4 mu/(rho c),
     N = (1 + R'/c) p/rho + R/(rho c) (dp/dt + 4 mu R''/R) - 3/2 (1 - R'/(3 c)) R'^2,
-    p = p_v + p_g0 (R0/R)^(3 g) - 2 s/R - 4 mu R'/R - p_inf
+    p = p_v + p_g0 ((R0^3 - h^3)/(R^3 - h^3))^g - 2 s/R - 4 mu R'/R - p_inf
 
-(Keller and Miksis 1980, eq. 3.7.) It shares nothing with the solver but SciPy's
+(Keller and Miksis 1980, eq. 3.7; 1/c = 0 is Rayleigh-Plesset.) It shares nothing with the solver but SciPy's
 integrator: no stretched clock and no logarithm, in which R may become 0. Here R and R' change by powers of ten within
 nanoseconds, and steps are so short that this does not matter.
 """
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.equations.bubble.bubble_equations import Cavity
+from sonarsynth.equations.bubble.bubble_collapse import Cavity
 
 TOLERANCE = 3e-14
 """Relative, of a step."""
@@ -38,9 +38,11 @@ class PrintedBubble:
 
 def wall_acceleration(R: Floats, v: Floats, c: Cavity) -> Floats:
     """R'' (...) in m/s2 of a wall at radii R (...) in m with speeds v (...) in m/s."""
-    slowness, gas = 1.0 / c.sound_speed, c.gas_pressure * (c.radius / R) ** (3.0 * c.exponent)
+    slowness = 1.0 / c.sound_speed if c.compressible else 0.0
+    volume = R**3 - c.core**3
+    gas = c.gas_pressure * ((c.radius**3 - c.core**3) / volume) ** c.exponent
     p = c.vapour_pressure + gas - 2.0 * c.surface_tension / R - 4.0 * c.viscosity * v / R - c.ambient_pressure
-    rate = -3.0 * c.exponent * v * gas / R + (2.0 * c.surface_tension * v + 4.0 * c.viscosity * v**2) / R**2
+    rate = -3.0 * c.exponent * R**2 * v * gas / volume + (2.0 * c.surface_tension * v + 4.0 * c.viscosity * v**2) / R**2
     N = ((1.0 + slowness * v) * p + slowness * R * rate) / c.density - 1.5 * (1.0 - slowness * v / 3.0) * v**2
     return np.asarray(N / ((1.0 - slowness * v) * R + 4.0 * c.viscosity * slowness / c.density))
 
