@@ -46,14 +46,9 @@ class Snapshots:
         """Every step-th bin from the `first` on, whose transform is their own, unless that of all is made, or is to be,
         `together`; phases refer to a sample `begin` later."""
         of = self.having(self.spectra) if together or "spectra" in vars(self) else self
-        return replace(
-            of,
-            frequency=self.frequency[first::step],
-            spacing=step * self.spacing,
-            bins=of.bins[first::step],
-            start=self.start + begin / self.sampling_frequency,
-            begin=of.begin + begin,
-        )
+        frequency, bins, begin = self.frequency[first::step], of.bins[first::step], of.begin + begin
+        start = self.start + (begin - of.begin) / self.sampling_frequency
+        return replace(of, frequency=frequency, spacing=step * self.spacing, bins=bins, start=start, begin=begin)
 
     @property
     def duration(self) -> float:

@@ -156,16 +156,11 @@ def _turned_taper(count: int, sampling_frequency: float, bins: int, begin: int) 
 
 
 def gate_of(
-    pressure: npt.NDArray[np.floating],
-    sampling_frequency: float,
-    first_sample: int,
-    count: int,
+    pressure: npt.NDArray[np.floating], sampling_frequency: float, first_sample: int, count: int,
     band: tuple[float, float],
-) -> Gate:
-    """The gate of `count` samples of pressure (sensor, sample) Pa, and its bins in a band (low, high) in Hz.
-
-    Raises ValueError when no frequency in band is below half the sampling frequency.
-    """
+) -> Gate:  # fmt: skip
+    """The gate of `count` samples of pressure (sensor, sample) Pa, and its bins in a band (low, high) in Hz. Raises
+    ValueError when no frequency in band is below half the sampling frequency."""
     from sonarsynth.equations.kernels.sensor_rows import power_and_peak
 
     bins, every = range(*band_bins(count, sampling_frequency, band)), np.ones(len(pressure), bool)
