@@ -85,9 +85,7 @@ def points(tree: Stored, frames: Sequence[int] | np.ndarray) -> Points:
             chunks[name].append(lists[name][frame, row])
     columns = {name: np.concatenate(arrays) if arrays else np.zeros(0) for name, arrays in chunks.items()}
     frame = columns["frame"].astype(int)
-    placed_by = columns.pop("estimate", np.zeros(len(frame))).astype(
-        int
-    )  # a store from before there was that: the first
+    placed_by = columns.pop("estimate", np.zeros(len(frame))).astype(int)  # of earlier stores: the first
     return Points(**columns, clock=_clocks(tree, frame, placed_by))
 
 
@@ -96,7 +94,9 @@ def _clocks(tree: Stored, frames: np.ndarray, estimate: np.ndarray) -> np.ndarra
     if not (has(tree, "source_estimates/emission") and len(frames)):
         return np.full(len(frames), UNKNOWN)
     distinct, row = np.unique(frames, return_inverse=True)
-    emission = of_frames(tree, "source_estimates/emission", distinct)[row, estimate]
+    of_estimates = of_frames(tree, "source_estimates/emission", distinct)
+    known = (estimate >= 0) & (estimate < of_estimates.shape[1])
+    emission = np.where(known, of_estimates[row, np.where(known, estimate, 0)], UNKNOWN)
     no_emission = STRANGER if STRANGERS & set(other_sounds(tree)) else UNKNOWN
     return np.where(emission < 0, no_emission, emission.astype(int))
 

@@ -90,9 +90,9 @@ def _frame(tree: xr.DataTree, index: int, relative_to: str, names: list[str]) ->
     finite = np.isfinite(cloud["range"].values)
     columns = {name: cloud[name].values[finite] for name in KEPT if name in cloud}
     position = np.stack([cloud[axis].values[finite] for axis in "xyz"], axis=-1).astype(float)
-    normal = _normals(tree, bodies, columns["target"], columns["facet"], columns["emission"], names)
     sonar = Pose(truth["sonar_position"].values, truth["sonar_orientation"].values)
     clock = next(iter(tree["source_estimates"].dataset["time"].values[index]), np.nan)  # NaN: a scene without sources
+    normal = _normals(tree, bodies, columns["target"], columns["facet"], columns["emission"], names)
     heard, spin = clock + cloud["delay"].values[finite].astype(float), truth["sonar_spin"].values
     if relative_to == "sonar":
         normal = sonar.turn_to_body(turned(normal, spin, -heard))

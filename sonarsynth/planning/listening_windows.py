@@ -130,7 +130,7 @@ def frame_start(plan: Plan, frame: Frame) -> float:
     return planned if np.isfinite(planned) else _new_start(plan, frame)
 
 
-@lru_cache(maxsize=4)  # every stage of a frame asks for it
+@lru_cache(maxsize=32)  # every stage of a frame asks for it, and frames go through each together
 def _new_start(plan: Plan, frame: Frame) -> float:
     """As `frame_start`, of a frame that was not looked at before."""
     windows, scene = plan.windows, plan.scene

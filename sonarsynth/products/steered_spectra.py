@@ -44,8 +44,9 @@ class Snapshots:
 
     def every(self, step: int, first: int, begin: float = 0.0, *, together: bool = False) -> Snapshots:
         """Every step-th bin from the `first` on, whose transform is their own, unless that of all is made, or is to be,
-        `together`; phases refer to a sample `begin` later."""
-        of = self.having(self.spectra) if together or "spectra" in vars(self) else self
+        `together`, or its length is no multiple of the step; phases refer to a sample `begin` later."""
+        together = together or "spectra" in vars(self) or round(self.sampling_frequency / self.spacing) % step > 0
+        of = self.having(self.spectra) if together else self
         frequency, bins, begin = self.frequency[first::step], of.bins[first::step], of.begin + begin
         start = self.start + (begin - of.begin) / self.sampling_frequency
         return replace(of, frequency=frequency, spacing=step * self.spacing, bins=bins, start=start, begin=begin)

@@ -20,6 +20,7 @@ from sonarsynth.equations.arrays.gates import (
     gated_energy,
 )
 from sonarsynth.imaging.delay_and_sum.lattice_beams import LatticeBeams
+from sonarsynth.products import Snapshots
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, elements
 from tests.lattice import lattice_energies, stated_energies
 
@@ -136,8 +137,8 @@ def test_focus_delay_to_the_last_digits(focus):
 
 def test_spectra_are_those_of_numpy_and_obey_parseval():
     random = np.random.default_rng(1)
-    pressure = random.normal(size=(3, 900)).astype(np.float32)
-    rate, first, count = 196e3, 57, 731
+    pressure = random.normal(size=(3, 1300)).astype(np.float32)
+    rate, first, count = 196e3, 57, 1131
     gate = gate_of(pressure, rate, first, count, (1e-3, rate))
     frequencies, spectra = gate.frequency, gate(gate.bins)
     cut = pressure[:, first : first + count] * gate_taper(count, rate)
@@ -226,3 +227,20 @@ def test_a_taper_is_symmetric_and_flat_in_the_middle(count, rate):
     assert weights[count // 2] == 1.0
     assert (weights > 0).all()
     assert np.sum(weights < 1.0) <= min(2e-4 * rate + 2, count)
+
+
+@pytest.mark.parametrize("samples", [731, 1131])
+@pytest.mark.parametrize(("step", "first", "begin"), [(2, 1, 0.0), (3, 0, 40.0), (4, 3, 17.25), (7, 2, 5.0)])
+def test_every_so_manieth_bin_is_one_of_all(samples, step, first, begin):
+    """Of windows whose length is a multiple of the step, as of others."""
+    pressure = np.random.default_rng(2).normal(size=(3, samples)).astype(np.float32)
+    gate = gate_of(pressure, 196e3, 0, samples, (25e3, 85e3))
+    window = Snapshots(
+        gate.frequency, frequency_spacing(samples, 196e3), gate.bins, gate, 0.0, samples, 196e3, gate.power
+    )
+    part = window.every(step, first, begin)
+    turn = np.exp(2j * np.pi * part.frequency * begin / 196e3)
+    np.testing.assert_array_equal(part.frequency, gate.frequency[first::step])
+    expected = gate(gate.bins)[:, first::step] * turn
+    np.testing.assert_allclose(part.spectra, expected, atol=3e-6 * np.abs(expected).max())
+    assert part.start == pytest.approx(begin / 196e3)

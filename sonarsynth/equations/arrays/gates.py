@@ -18,8 +18,11 @@ SENSORS_AT_ONCE: Final = 64
 """Sensors whose gates are transformed together: they stay in the cache."""
 
 DIVISOR: Final = 12
-"""Divides the length of transforms: every second, third, fourth, sixth or twelfth bin, say, comes of as many fewer
+"""Divides the length of long transforms: every second, third, fourth, sixth or twelfth bin, say, comes of as many fewer
 samples."""
+
+LONG: Final = 1000
+"""Samples of a long transform; shorter ones take little time."""
 
 SHORT: Final = 256
 """Samples up to which waves in a matrix are faster than a transform."""
@@ -51,10 +54,11 @@ def gate_taper(count: int, sampling_frequency: float) -> npt.NDArray[np.float32]
 
 
 def fast_length(count: int) -> int:
-    """Length of the FFT of a gate of `count` samples: the next that is fast and a multiple of `DIVISOR`."""
+    """Length of the FFT of a gate of `count` samples: the next that is fast and, if `LONG`, a multiple of `DIVISOR`."""
     from scipy.fft import next_fast_len
 
-    return DIVISOR * int(next_fast_len(-(-count // DIVISOR), real=True))
+    divisor = DIVISOR if count >= LONG else 1
+    return divisor * int(next_fast_len(-(-count // divisor), real=True))
 
 
 def frequency_spacing(count: int, sampling_frequency: float) -> float:

@@ -55,7 +55,8 @@ def _longest_step(snapshots: Snapshots, travel_time: float, most: int) -> int:
     shared = np.zeros(2 * len(amplitude) + 1)  # by blocks later
     shared[: len(amplitude)] = np.correlate(amplitude, amplitude, "full")[len(amplitude) - 1 :]
     about = np.maximum(shared[:-1], shared[1:])
-    for step in (step for step in range(most, 1, -1) if round(rate / snapshots.spacing) % step == 0):
+    length = round(rate / snapshots.spacing)
+    for step in (step for step in range(most, 1, -1) if step <= TOGETHER or length % step == 0):
         late = np.arange(1, step) * (rate / (step * snapshots.spacing * block))
         if 2.0 * about[late.astype(int)].sum() <= OVERLAP * shared[0]:
             return step

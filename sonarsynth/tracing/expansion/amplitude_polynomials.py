@@ -48,9 +48,13 @@ def variations(blocks: Sequence[FacetBlock]) -> tuple[list[Floats], float]:
     """
     of_blocks = [_fitted(block, QUADRATIC_PROBES) for block in blocks]
     loudest, worst, every = max([SILENT, *(most for *_, most in of_blocks)]), 0.0, list[Floats]()
-    for block, (second, missed, counted, _) in zip(blocks, of_blocks, strict=True):
-        rest = np.abs(block.strength) * missed > block.array.context.tolerances.quadratic * loudest
-        rest |= 2 * np.count_nonzero(rest) > len(rest)  # most: to take them all costs less
+    rests = [
+        np.abs(block.strength) * missed > block.array.context.tolerances.quadratic * loudest
+        for block, (_, missed, *_) in zip(blocks, of_blocks, strict=True)
+    ]
+    if 2 * sum(map(np.count_nonzero, rests)) > sum(map(len, rests)):  # most of all: to take them all costs less
+        rests = [np.ones_like(rest) for rest in rests]
+    for block, rest, (second, missed, counted, _) in zip(blocks, rests, of_blocks, strict=True):
         if rest.any():
             more, missed[rest], counted[rest], _ = _fitted(block if rest.all() else block.select(rest), None)
             every.append(stacked([second, more])[np.where(rest, len(rest) - 1 + np.cumsum(rest), np.arange(len(rest)))])
