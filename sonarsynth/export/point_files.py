@@ -14,8 +14,8 @@ from sonarsynth.store.files.place import write_atomically
 if TYPE_CHECKING:
     import xarray as xr
 
-FORMATS = {"ply": b"end_header\n", "pcd": b"DATA binary\n"}
-"""Endings of names, and how the header of such a file ends."""
+FORMATS = {"ply": (b"end_header\n", 3), "pcd": (b"DATA binary\n", 4)}
+"""Endings of names, how the header of such a file ends, and bytes that the colour of a point has in it."""
 DECIBELS = 25.0
 """Range of the colours, below the point of most energy."""
 LABELS = {
@@ -65,8 +65,9 @@ def write_points(points: xr.Dataset, path: str | Path) -> Path:
         written = Path(scratch, f"points.{ending}")
         done = o3d.t.io.write_point_cloud(written, cloud, write_ascii=False)
         content = written.read_bytes() if done else b""
-    _, _, rows = content.partition(FORMATS[ending])
-    if len(rows) < points.sizes["point"] * POINT_BYTES:  # Open3D does not tell a PLY that a full disk has cut
+    header, colour = FORMATS[ending]
+    _, _, rows = content.partition(header)
+    if len(rows) != points.sizes["point"] * (POINT_BYTES + colour):  # Open3D does not say that a PLY is cut
         raise OSError(errno.ENOSPC, f"Open3D did not write all points in {tempfile.gettempdir()}", str(file))
     file.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(file, content)

@@ -55,18 +55,20 @@ def files_of_at_most(size: int) -> Iterator[None]:
 
 @pytest.mark.parametrize("ending", FORMATS)
 def test_a_file_of_points_is_all_there_or_as_it_was(ending: str, tmp_path: Path) -> None:
-    """On a full disk a PLY of a third of its points was said to be written."""
+    """On a full disk a PLY of a third of its points was said to be written; the last byte counts as well."""
     rows = np.random.default_rng(1).normal(size=(2000, 3))
     names = {"energy", "snr", "range_error", "frame", "target", "family"}
     columns = {name: ("point", np.abs(rows[:, 0])) for name in names}
     cloud = xr.Dataset({"position": (("point", "xyz"), rows), "normal": (("point", "xyz"), rows), **columns})
     file = tmp_path / f"a.{ending}"
     write_points(cloud, file)  # all that it imports is compiled: Python's files of that would be cut as well
+    whole = file.stat().st_size
     file.write_text("an earlier export")
-    with files_of_at_most(20_000), pytest.raises(OSError) as raised:
-        write_points(cloud, file)
-    assert raised.value.filename == str(file)
-    assert file.read_text() == "an earlier export" and list(tmp_path.iterdir()) == [file]
+    for size in (20_000, whole - 1):
+        with files_of_at_most(size), pytest.raises(OSError) as raised:
+            write_points(cloud, file)
+        assert raised.value.filename == str(file)
+        assert file.read_text() == "an earlier export" and list(tmp_path.iterdir()) == [file]
 
 
 @pytest.mark.parametrize(("to", "module"), [("coco", coco_files), ("sonar-netcdf", sonar_netcdf)])

@@ -10,16 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
+from sonarsynth.products.steered_spectra import PARTS
 
 GATE_TAPER: Final = 1e-4
 """Length (s) of the raised cosine at each end of a gate; a quarter of the gate at most."""
 
 SENSORS_AT_ONCE: Final = 64
 """Sensors whose gates are transformed together: they stay in the cache."""
-
-DIVISOR: Final = 12
-"""Divides the length of long transforms: every second, third, fourth, sixth or twelfth bin, say, comes of as many fewer
-samples."""
 
 LONG: Final = 1000
 """Samples of a long transform; shorter ones take little time."""
@@ -54,10 +51,10 @@ def gate_taper(count: int, sampling_frequency: float) -> npt.NDArray[np.float32]
 
 
 def fast_length(count: int) -> int:
-    """Length of the FFT of a gate of `count` samples: the next that is fast and, if `LONG`, a multiple of `DIVISOR`."""
+    """Length of the FFT of a gate of `count` samples: the next that is fast and, if `LONG`, a multiple of `PARTS`."""
     from scipy.fft import next_fast_len
 
-    divisor = DIVISOR if count >= LONG else 1
+    divisor = PARTS if count >= LONG else 1
     return divisor * int(next_fast_len(-(-count // divisor), real=True))
 
 
@@ -130,8 +127,8 @@ class Gate:
     def __call__(self, bins: range, begin: float = 0.0) -> npt.NDArray[np.complex64]:
         """rfft spectra (sensor, bin) in Pa at bins whose step divides the length; phases refer to `begin` (samples).
 
-        They are those of sound that is wound round a circle of a step-th of the length, and turned, unless bins are
-        multiples of their step, by the rest.
+        They are those of sound that is wound round a circle of a step-th of the length (time aliasing), and turned,
+        unless bins are multiples of their step, by the rest.
         """
         from scipy.fft import fft, rfft
 

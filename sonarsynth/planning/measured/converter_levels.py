@@ -105,7 +105,8 @@ def _noise(scene: Scene) -> list[str]:
 def _coarse_echoes(plan: Plan, frames: Sequence[Frame]) -> list[str]:
     """In how many frames echoes have few counts or none, where no other sound carries them over the steps."""
     converter = plan.scene.sonar.converter
-    if converter is None or _dithered(plan.scene):
+    assert converter is not None
+    if _dithered(plan.scene):
         return []
     echoing = [frame for frame in frames if frame.moment.bodies]
     heard = [echoing[n] for n in evenly(len(echoing), ECHOES_HEARD)] if echoing else []

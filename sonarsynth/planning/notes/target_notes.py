@@ -164,11 +164,10 @@ def hiding_notes(look: SampledScene) -> list[str]:
         solid = [b for b, law in zip(frame.moment.bodies, look.scene.laws, strict=True) if not law.passes_sound]
         array = frame.sonar_pose.to_world(outermost)
         snaps = [snap.position for snap in frame.moment.snaps if snap.illuminates]
-        behind = [(b.name, occluded((b,), alike(place, len(array)), array)) for place in snaps for b in solid]
-        blocked = [occluded(tuple(solid), alike(place, len(array)), array).all() for place in snaps]
-        if blocked and all(blocked):
+        lines = [[occluded((b,), alike(place, len(array)), array) for b in solid] for place in snaps]
+        if lines and all(np.any(of_snap, axis=0).all() for of_snap in lines):
             hidden.append(frame.index)
-            names |= {name for name, lines in behind if lines.any()}
+            names |= {b.name for of_snap in lines for b, hides in zip(solid, of_snap, strict=True) if hides.any()}
     if not hidden:
         return []
     reflected = look.scene.physics.tracing.bounces > 0
