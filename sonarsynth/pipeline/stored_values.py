@@ -102,7 +102,7 @@ def signal_values(signals: Signals, counts: bool) -> Values:
     return table("/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside)
 
 
-NOT_STORED = ("position_by_speed", "pressure", "light_time", "light_position", "light_covariance")
+NOT_STORED = ("position_by_speed", "pressure", "as_snap_time", "as_snap_position", "as_snap_covariance")
 """What ranging knows of source estimates beside what the store has."""
 
 

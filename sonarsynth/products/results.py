@@ -69,9 +69,9 @@ class SourceEstimates:
     )
     reason: Ints  # (estimate,) index into REASONS
     pressure: Floats  # (estimate,) Pa: peak of the envelope at the array centre; also of what may be an echo
-    light_time: Floats  # (estimate,) s: `time`; of what may be an echo, as if it were a snap
-    light_position: Floats  # (estimate, xyz) m: the same of `position`
-    light_covariance: Floats  # (estimate, xyz, xyz) m2: the same of `position_covariance`
+    as_snap_time: Floats  # (estimate,) s: `time`; of what may be an echo, as if it were a snap
+    as_snap_position: Floats  # (estimate, xyz) m: the same of `position`
+    as_snap_covariance: Floats  # (estimate, xyz, xyz) m2: the same of `position_covariance`
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ class PointCloud(Columns):
     energy: npt.NDArray[np.float32]  # (point,) Pa2 s: of the echo, or of its beam, as it was picked
     snr: npt.NDArray[np.float32]  # (point,) dB: power of the echo's peak over the mean power of noise in its beam
     overflow: int = 0  # points that were left out: the faintest
-    estimate: Ints | int = 0  # (point,) the row of `SourceEstimates` whose light it is placed by
+    estimate: Ints | int = 0  # (point,) the row of `SourceEstimates` that it is placed by
 
     def __len__(self) -> int:
         """Number of points."""

@@ -14,7 +14,7 @@ from sonarsynth.equations.arrays.apertures import defocus_spread
 from sonarsynth.geometry import Pose, unit
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import PointCloud, SourceEstimates, no_points
-from sonarsynth.ranging.illumination import by_light, with_suspects
+from sonarsynth.ranging.illumination import by_snap, with_suspects
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes
 from sonarsynth.ranging.placing.solution import Solution
 from sonarsynth.ranging.range_profiles import aperture_moments
@@ -40,21 +40,21 @@ def point_cloud(
     if not window.located:
         return no_points()
     echoes = returned_rows(picking, "picks", picking.picks(window), PickedEchoes, "delay", ("azimuth", "delay"), {})
-    velocity, spin, lights = np.zeros(3), np.zeros(3), window.estimates
+    velocity, spin, snaps = np.zeros(3), np.zeros(3), window.estimates
     if track is not None and not track.still:
         middle = 0.5 * float(np.mean(echoes.delay)) if len(echoes.delay) else 0.0
-        clock = float(lights.time[0])
+        clock = float(snaps.time[0])
         sonar_pose, (velocity, spin) = track.later(clock).pose, track.later(clock + middle).in_own_frame
         echoes = _at_true_directions(echoes, velocity, window)
     placer = _Placer(placing, sonar_pose, profile, velocity, spin)
-    lights = with_suspects(lights)
-    rows = np.flatnonzero(np.isfinite(lights.position).all(axis=1))
-    clouds = [_placed(echoes, window, lights, int(row), placer) for row in rows]
+    snaps = with_suspects(snaps)
+    rows = np.flatnonzero(np.isfinite(snaps.position).all(axis=1))
+    clouds = [_placed(echoes, window, snaps, int(row), placer) for row in rows]
     if len(rows) == 1:
         (cloud,) = clouds
     else:
-        start, stop = (t - float(lights.time[0]) for t in (window.image.start, window.image.stop))
-        cloud = by_light(clouds, rows, lights, (start, stop))
+        start, stop = (t - float(snaps.time[0]) for t in (window.image.start, window.image.stop))
+        cloud = by_snap(clouds, rows, snaps, (start, stop))
     return cloud.select(np.flatnonzero(np.isfinite(cloud.range) & (cloud.range > 0) & np.isfinite(cloud.range_error)))
 
 
@@ -69,21 +69,21 @@ class _Placer(NamedTuple):
 
 
 def _placed(
-    echoes: PickedEchoes, window: ReceivedWindow, lights: SourceEstimates, row: int, placer: _Placer
+    echoes: PickedEchoes, window: ReceivedWindow, snaps: SourceEstimates, row: int, placer: _Placer
 ) -> PointCloud:
-    """A point of every echo, as lit by a row of `lights`; NaN where there is no place."""
-    source, beam = lights.position[row], direction(echoes.azimuth, echoes.elevation)
-    delay = echoes.delay - float(lights.time[row] - lights.time[0])
+    """A point of every echo, as lit by a row of `snaps`; NaN where there is no place."""
+    source, beam = snaps.position[row], direction(echoes.azimuth, echoes.elevation)
+    delay = echoes.delay - float(snaps.time[row] - snaps.time[0])
     wide = {"position": (3,), "by_source": (3,)}
     solution = placer.placing.place(delay, beam, source, window.sonar, placer.pose, placer.profile)
     solution = returned_rows(placer.placing, "place", solution, Solution, "range", (), wide, len(beam))
     if placer.velocity.any() or placer.spin.any():
         shift = -delay[:, None] * (placer.velocity + np.cross(placer.spin, source))
         solution = solution.as_array_moves(source, shift)
-    late = window.late if row == 0 else np.hypot(window.late, np.hypot(lights.time_error[0], lights.time_error[row]))
+    late = window.late if row == 0 else np.hypot(window.late, np.hypot(snaps.time_error[0], snaps.time_error[row]))
     echoes = replace(echoes, delay_error=np.hypot(echoes.delay_error, late))
     echoes = _with_defocus(echoes, solution.range, window)
-    error = range_error(solution, echoes, lights, window.sonar, row)
+    error = range_error(solution, echoes, snaps, window.sonar, row)
     if not placer.profile.uniform:
         echoes = _with_bending(echoes, beam, solution.range, placer.pose, placer.profile)
     return PointCloud(

@@ -13,7 +13,7 @@ from sonarsynth import planning
 from sonarsynth.conventions import Floats, direction
 from sonarsynth.equations.arrays.bistatic_range import bistatic_range, excess_path
 from sonarsynth.products import ORIGINS, REASONS, PointCloud
-from sonarsynth.ranging.illumination import by_light, lit_by, with_suspects
+from sonarsynth.ranging.illumination import by_snap, which_snap, with_suspects
 from sonarsynth.ranging.location.candidates import as_estimates
 from sonarsynth.ranging.location.source_position import ACCEPTED, ECHO, refused
 from tests.laws.test_predicted_errors import C, Family, scene
@@ -77,7 +77,7 @@ SNAPS = np.array([[9.0, 5.0, -7.0], [12.0, -6.0, -7.0]])
 
 
 def placed(points: Floats, lit: list[int], late: float) -> Floats:
-    """Places (light, echo, xyz) of echoes from points (echo, xyz), each lit by one snap, as either would put them; the
+    """Places (snap, echo, xyz) of echoes from points (echo, xyz), each lit by one snap, as either would put them; the
     second is heard `late` (s) after the first."""
     r = np.linalg.norm(points, axis=1)
     beam, heard = points / r[:, None], np.array([0.0, late])
@@ -88,7 +88,7 @@ def placed(points: Floats, lit: list[int], late: float) -> Floats:
 
 
 @pytest.mark.parametrize("late", [-9e-3, -2e-3, 2e-3, 5e-3, 9e-3])
-def test_echoes_of_a_body_that_both_light_agree(late: float) -> None:
+def test_echoes_of_a_body_that_both_illuminate_agree(late: float) -> None:
     """Points of a body 0.3 m long are placed by the snap that lit each, wherever it is, or in doubt, as all are that
     both would put at about one place."""
     random, lit, rows = np.random.default_rng(5), [0, 1] * 4, []
@@ -96,8 +96,8 @@ def test_echoes_of_a_body_that_both_light_agree(late: float) -> None:
         body = random.uniform(12.0, 30.0) * direction(*random.uniform(-0.3, 0.3, 2))
         real = body + random.uniform(-0.15, 0.15, (8, 3))
         places = placed(real, lit, late)
-        light, doubt = lit_by(places)
-        rows.append([light == lit, doubt, np.linalg.norm(places[0] - places[1], axis=1)])
+        snap, doubt = which_snap(places)
+        rows.append([snap == lit, doubt, np.linalg.norm(places[0] - places[1], axis=1)])
     right, doubts, apart = np.array(rows).transpose(1, 0, 2)
     assert np.all((right > 0.0) | (doubts > 0.4 * apart)) and right.mean() > 0.9
     assert np.mean(doubts > 0.0, where=apart > 1.0) < 0.3
@@ -107,8 +107,8 @@ def test_a_lone_echo_is_placed_by_the_clock_and_in_doubt() -> None:
     """By half of how far the other snap would put it; of what only one can have lit there is none."""
     places = placed(np.array([[20.0, 1.0, -2.0], [15.0, -2.0, 1.0]]), [1, 0], 4e-3)
     places[1, 1] = np.nan
-    light, doubt = lit_by(places)
-    assert light.tolist() == [0, 0]
+    snap, doubt = which_snap(places)
+    assert snap.tolist() == [0, 0]
     assert doubt == pytest.approx([0.5 * np.linalg.norm(places[0, 0] - places[1, 0]), 0.0])
 
 
@@ -116,10 +116,10 @@ def test_a_lone_echo_is_placed_by_the_clock_and_in_doubt() -> None:
     ("pressure", "window", "doubted"),
     [(1.0, (1e-3, 40e-3), True), (0.01, (1e-3, 40e-3), False), (1.0, (20e-3, 40e-3), False)],
 )
-def test_light_too_faint_or_at_another_time_is_not_asked(
+def test_a_snap_too_faint_or_at_another_time_is_not_asked(
     pressure: float, window: tuple[float, float], doubted: bool
 ) -> None:
-    """An echo by the clock 24 ms after it, and 15 ms after a snap that may be an echo: of as much light, of 40 dB less,
+    """An echo by the clock 24 ms after it, and 15 ms after a snap that may be an echo: as loud there, 40 dB fainter,
     and where echoes come 20 ms after any snap, or later."""
     late, delay = 9e-3, np.full(1, 24e-3)
     fixes = [
@@ -127,12 +127,12 @@ def test_light_too_faint_or_at_another_time_is_not_asked(
         for t, place, loud in zip((0.0, late), SNAPS, (1.0, pressure), strict=True)
     ]
     fixes[1] = replace(refused(ECHO), amplitude=pressure, suspect=fixes[1])
-    lights = with_suspects(as_estimates(fixes, 2))
+    snaps = with_suspects(as_estimates(fixes, 2))
     beam, clouds, one = np.array([[1.0, 0.0, 0.0]]), [], np.full(1, 0.1, np.float32)
     for t, place in zip((0.0, late), SNAPS, strict=True):
         r = bistatic_range(C * (delay - t), beam, place).range
         clouds.append(PointCloud(r[:, None] * beam, r, one, one, one, one, one, delay.astype(np.float32), one, one))
-    found = by_light(clouds, np.arange(2), lights, window)
+    found = by_snap(clouds, np.arange(2), snaps, window)
     apart = float(np.abs(clouds[0].range - clouds[1].range)[0])
     assert found.range[0] == clouds[0].range[0] and np.asarray(found.estimate).tolist() == [0] and apart > 3.0
     assert found.range_error[0] == pytest.approx(np.hypot(0.1, 0.5 * apart) if doubted else 0.1)

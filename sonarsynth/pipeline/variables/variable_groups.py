@@ -135,7 +135,7 @@ WHOSE = comment(
 SEVERAL = (
     *NONE,
     *comment(
-        "of those whose light may come back then, the one that other echoes confirm, or else the first, and then "
+        "of those whose echoes may arrive then, the one that other echoes confirm, or else the first, and then "
         "range_error holds how far from there others place it"
     ),
 )
@@ -159,7 +159,7 @@ _CLOUD = group_of(
     row(
         "delay", POINT, "s", "delay of the echo after the direct arrival of the first source estimate", dtype="float32"
     ),
-    row("estimate", POINT, "1", "source estimate whose light the point is placed by", dtype="int8", attributes=SEVERAL),
+    row("estimate", POINT, "1", "source estimate that the point is placed by", dtype="int8", attributes=SEVERAL),
     row("energy", POINT, "Pa2 s", "energy of the echo of the point, or of its beam, as it was picked", dtype="float32"),
     row("snr", POINT, "dB", "power of the peak of the echo over the mean power of noise in its beam", dtype="float32"),
     row("x", POINT, "m", "position of the point, forward, in the sonar frame", dtype="float32"),

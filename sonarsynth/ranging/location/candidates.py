@@ -240,7 +240,7 @@ def as_estimates(rows: list[SourceFix], snaps: int, reason: int = SILENT) -> Sou
         bottom_used=column(lambda r: r.bottom_used).astype(np.int64),
         reason=column(lambda r: r.reason).astype(np.int64),
         pressure=column(lambda r: r.amplitude),
-        light_time=column(lambda r: (r.suspect or r).time),
-        light_position=column(lambda r: (r.suspect or r).position, 3),
-        light_covariance=column(lambda r: (r.suspect or r).covariance, 3, 3),
+        as_snap_time=column(lambda r: (r.suspect or r).time),
+        as_snap_position=column(lambda r: (r.suspect or r).position, 3),
+        as_snap_covariance=column(lambda r: (r.suspect or r).covariance, 3, 3),
     )

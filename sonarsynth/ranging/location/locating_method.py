@@ -21,7 +21,7 @@ class LocatingMethod(Method):
         """What `locate` returns, once it has the shape of that."""
         found = self.locate(signals, receiver, survey, snaps)
         wide = {"position": (3,), "position_covariance": (3, 3), "position_by_speed": (3,)}
-        wide |= {"light_position": (3,), "light_covariance": (3, 3)}
+        wide |= {"as_snap_position": (3,), "as_snap_covariance": (3, 3)}
         estimates: SourceEstimates = returned_rows(self, "locate", found, SourceEstimates, "time", (), wide, snaps)
         return estimates
 
