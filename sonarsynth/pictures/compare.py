@@ -27,6 +27,7 @@ from sonarsynth.pictures.store_reading import (
     pictures_of,
     read,
 )
+from sonarsynth.pictures.summary import spread
 from sonarsynth.store import Folder, folder_of
 
 if TYPE_CHECKING:
@@ -123,7 +124,8 @@ def _fit(tree: xr.DataTree, path: Folder) -> xr.DataTree:
 def _common(
     trees: Sequence[xr.DataTree], paths: Sequence[Folder], frame: int | None, say: Callable[[str], None]
 ) -> list[int]:
-    """Frames that all stores have; refuses stores whose images do not fit together."""
+    """Frames that all stores have, or of very many some, spread over all; refuses stores whose images do not fit
+    together."""
     for tree, path in zip(trees[1:], paths[1:], strict=True):
         same = [np.array_equal(a, b) for a, b in zip(beam_grid(tree), beam_grid(trees[0]), strict=True)]
         if not all(same):
@@ -141,7 +143,10 @@ def _common(
         )
     if any(len(frames) > len(common) for frames in available):
         say(f"only the {len(common)} frames that all stores have")
-    return common
+    compared = {*spread(np.array(common)).tolist(), *([] if frame is None else [frame])}
+    if len(compared) < len(common):
+        say(f"compared: {len(compared)} of {len(common)} frames, spread over all")
+    return sorted(compared)
 
 
 def _grid(tree: xr.DataTree) -> str:

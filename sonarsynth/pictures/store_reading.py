@@ -59,8 +59,8 @@ def _variable(tree: xr.DataTree, name: str) -> xr.Variable | None:
         return None
 
 
-def read(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray | None:
-    """A variable ("image/energy"), of one frame or whole; None where the store does not hold it."""
+def read(tree: xr.DataTree, name: str, frame: int | np.ndarray | None = None) -> np.ndarray | None:
+    """A variable ("image/energy"), of one frame, of some, or whole; None where the store does not hold it."""
     data = _variable(tree, name)
     if data is None:
         return None
@@ -161,18 +161,18 @@ def _poses(tree: xr.DataTree, index: int) -> tuple[Pose, ...]:
     return tuple(Pose(*pose) for pose in zip(centre, orientation, strict=True))
 
 
-def echo_levels(tree: xr.DataTree, frame: int) -> tuple[Floats, list[str]] | None:
+def echo_levels(tree: xr.DataTree, frame: int | np.ndarray) -> tuple[Floats, list[str]] | None:
     """Levels (target, family) in dB re the direct echo of each target, and the families; None where none are stored.
 
-    A target without a direct echo: re its strongest.
+    A target without a direct echo: re its strongest. frame: one, or several (frame,), which are the leading axis then.
     """
     level, families = read(tree, "truth/targets/echo_level", frame), read(tree, "truth/targets/family")
     if level is None or families is None:
         return None
     names = [str(name) for name in families]
-    direct = level[:, names.index("direct")]
-    strongest = np.max(level, axis=1, initial=-np.inf, where=np.isfinite(level))
-    return level - np.where(np.isfinite(direct), direct, strongest)[:, None], names
+    direct = level[..., names.index("direct")]
+    strongest = np.max(level, axis=-1, initial=-np.inf, where=np.isfinite(level))
+    return level - np.where(np.isfinite(direct), direct, strongest)[..., None], names
 
 
 def ghosts(tree: xr.DataTree, frame: int) -> tuple[Ghost, ...]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import counted
+from sonarsynth.conventions import counted, evenly
 from sonarsynth.evaluation import bounds, brightest_beam_on_target, range_errors
 from sonarsynth.pictures.store_reading import built, echo_levels, mesh_group, needed, read
 from sonarsynth.products import View
@@ -23,9 +23,13 @@ VARIABLES = {
 }
 """The variable that stands for each group in a summary."""
 
+JUDGED = 500
+"""Frames that pictures judge at most, spread over all: to read one takes some 20 ms where each is in another file."""
+
 
 def summary(tree: xr.DataTree, store: Folder) -> str:
-    """What a store holds and how well it agrees with its own truth, over the frames that were built."""
+    """What a store holds, of the frames that were built, and how well these agree with their own truth (of more than
+    `JUDGED`, some spread over all)."""
     frames = built(tree)
     total = tree["truth"].sizes["frame"]
     size = bytes_of(store)
@@ -36,7 +40,15 @@ def summary(tree: xr.DataTree, store: Folder) -> str:
     ]
     if not len(frames):
         return "\n".join(lines)
-    return "\n".join([*lines, *_targets(tree, frames), *_agreement(tree, frames)])
+    judged, some = spread(frames), []
+    if len(judged) < len(frames):
+        some = [f"  judged     {len(judged)} of these frames, spread over all ('sonarsynth verify' reads every one)"]
+    return "\n".join([*lines, *_targets(tree, frames), *some, *_agreement(tree, judged)])
+
+
+def spread(frames: np.ndarray) -> np.ndarray:
+    """The frames that are judged: all, or `JUDGED` of them, spread evenly."""
+    return frames[evenly(len(frames), JUDGED)]
 
 
 def _shape(tree: xr.DataTree, name: str) -> str:
@@ -78,10 +90,10 @@ def _ratios(snr: np.ndarray) -> str:
 
 def _ghosts(tree: xr.DataTree, frames: np.ndarray, names: list[str]) -> list[str]:
     """Levels of each target's echoes by the boundaries they touched on their way to the array, medians over frames."""
-    echoes = [levels for frame in frames if (levels := echo_levels(tree, int(frame))) is not None]
-    if not echoes:
+    echoes = echo_levels(tree, frames)
+    if echoes is None:
         return []
-    families, decibels = echoes[0][1], np.array([level for level, _ in echoes])  # (frame, target, family)
+    decibels, families = echoes
     lines = []
     for i, name in enumerate(names):
         ghosts = [

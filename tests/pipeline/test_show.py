@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from sonarsynth.pictures import show
 from sonarsynth.pictures.compare import moment
 from sonarsynth.pictures.steered_beams import beams, choose
 from sonarsynth.pictures.store_reading import opened, stored
+from sonarsynth.pictures.summary import summary
 
 SPEED = 1540.0
 RATE = 196e3
@@ -244,6 +246,13 @@ def test_the_summary_agrees_with_the_closed_form(shown: tuple[list[Path], list[s
     text = shown[1][0]
     assert f"hull: {len(ellipsoid(Size().rings)[1])} facets, 12.00 to 12.04 m away, in sight in 2 frames" in text
     assert f"median error {0.01 * np.sqrt(3):.3g} m" in text  # every coordinate of the located snap is 1 cm off
+
+
+def test_of_very_many_frames_some_are_judged_and_all_are_counted(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules[summary.__module__], "JUDGED", 1)
+    text = summary(opened(store), store)
+    assert "2 of 3 built" in text and "in sight in 2 frames" in text
+    assert "1 of these frames" in text and "brightest beam on target: 1 of 1 frames" in text
 
 
 def test_beams_hear_the_echo_when_the_truth_says(store: Path) -> None:
