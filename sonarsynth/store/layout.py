@@ -1,8 +1,8 @@
 """The layout of a store, from a plan alone: every array with its shape, chunks and type. No frame is rendered for it.
 
 A frame is one chunk, and a shard of frames is one file of each array, in the array's own folder (image/energy/c.3.0.0).
-Variables so small that a chunk would be mostly overhead (positions, counts) put a whole shard of frames into one chunk;
-the rule "one task, one file" is the same.
+Variables so small that a chunk would be mostly overhead (positions, counts) put a whole shard of frames into one chunk,
+and lists of points, which are mostly room for more, some frames; the rule "one task, one file" is the same.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 SMALL_BYTES: Final = 4096
 """A frame of an array under this size gets no chunk of its own."""
+
+LIST_BYTES: Final = 2**18
+"""Of a chunk of points at most, decoded: readers take a millisecond a chunk, whatever is in it."""
 
 _FIXED: Final = {"xyz": 3, "xyz_other": 3, "wxyz": 4, "corner": 8, "loudest": 3}
 """Sizes of axes that no scene changes."""
@@ -132,7 +135,9 @@ class Layout:
         elsewhere."""
         fill = np.broadcast_to(np.asarray(array.variable.fill, array.dtype), array.inner)
         rows = [frames[frame][array.key] if frame in frames else fill for frame in self.region(shard)]
-        return [row[None] for row in rows] if array.chunk == 1 else [np.stack(rows)]
+        if array.chunk == 1:
+            return [row[None] for row in rows]
+        return [np.stack(rows[first : first + array.chunk]) for first in range(0, len(rows), array.chunk)]
 
 
 @lru_cache(maxsize=8)
@@ -145,9 +150,15 @@ def layout_of(plan: Plan) -> Layout:
         if variable.dims[:1] != ("frame",):
             raise ValueError(f"{variable.group}/{variable.name} must have frame as its first axis")
         inner = tuple(_size(plan, static, variable.group, dim) for dim in variable.dims[1:])
-        small = np.dtype(variable.dtype).itemsize * int(np.prod(inner)) < SMALL_BYTES
-        arrays.append(ArrayLayout(variable, (frames, *inner), shard, shard if small else 1))
+        size = np.dtype(variable.dtype).itemsize * int(np.prod(inner))
+        chunk = shard if size < SMALL_BYTES else _dividing(shard, LIST_BYTES // size) if "point" in variable.dims else 1
+        arrays.append(ArrayLayout(variable, (frames, *inner), shard, chunk))
     return Layout(tuple(arrays), frames, shard, len(static))
+
+
+def _dividing(shard: int, most: int) -> int:
+    """The largest part of a shard of frames, `most` at most, that it is made of without a rest."""
+    return max((count for count in range(1, min(most, shard) + 1) if shard % count == 0), default=1)
 
 
 def _size(plan: Plan, static: Mapping[tuple[str, str], Any], group: str, dim: str) -> int:
