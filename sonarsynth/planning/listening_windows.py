@@ -12,6 +12,7 @@ from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.description import FieldError
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays.ray_solutions import mean_slowness, water
+from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.planning.measured.ray_bending import unlike_straight
 from sonarsynth.planning.measured.sampled_frames import SampledScene
@@ -285,7 +286,8 @@ def _disturbed(span: _ArrivalInterval, start: float, stop: float) -> bool:
 
 def _straight_time(profile: Profile, bottom_depth: float, a: Floats, b: Floats) -> Floats:
     """Travel time (...) along straight lines a to b (..., xyz): distance times the mean slowness between them."""
-    distance = np.asarray(np.linalg.norm(a - b, axis=-1))
+    away = a - b
+    distance = np.sqrt(dot(away, away))
     if profile.uniform:
         return np.asarray(distance / profile.speed[0])
     ends = np.broadcast_arrays(depth(a), depth(b))

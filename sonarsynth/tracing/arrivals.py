@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -19,10 +20,10 @@ from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.expansion.amplitude_polynomials import fitted
 from sonarsynth.tracing.expansion.aperture_paths import aperture_paths
 from sonarsynth.tracing.expansion.coincident_paths import with_coincident_added
-from sonarsynth.tracing.facet_paths import FacetPaths, facet_paths, facet_paths_at_rest
+from sonarsynth.tracing.facet_paths import FacetPaths, bending, facet_paths, facet_paths_at_rest
 from sonarsynth.tracing.meetings import meetings, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
-from sonarsynth.tracing.receive_paths import Starts, rays_to_centre
+from sonarsynth.tracing.receive_paths import ReceivePaths, Starts, rays_to_centre
 from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, directed, join, no_arrivals
 
 if TYPE_CHECKING:
@@ -97,17 +98,59 @@ def _echoes(array: FacetPaths, snaps: Iterable[int]) -> list[Arrivals]:
     return blocks
 
 
+@dataclass(frozen=True)
+class _Straight:
+    """What sound that comes straight from a snap depends on, but for bodies: equal where all of that is."""
+
+    what: tuple[Hashable, ...]
+    context: FrameContext = field(compare=False)
+    propagation: Propagation = field(compare=False)
+    meeting: Meeting | None = field(compare=False)
+    index: int
+    ways: tuple[int, ...] | None
+
+    @staticmethod
+    def of(array: FacetPaths, index: int, ways: tuple[int, ...] | None) -> _Straight:
+        """Emission `index` to array, by some families (None: all)."""
+        context, heard, snap = array.context, array.meeting, array.context.snaps[index]
+        water, receiver = context.medium, context.receiver
+        described = water.environment, water.profile, water.absorption, receiver.sonar, receiver.elements
+        arrays = snap.position, snap.velocity, receiver.pose.position, receiver.pose.orientation
+        at = None if heard is None else heard.arrival_time if heard.sonar.still else id(heard)
+        same = *map(id, (*described, snap.directivity)), array.propagation, snap.time, at
+        what = *same, *(array.tobytes() for array in arrays)
+        return _Straight(what, context, array.propagation, heard, index, ways)
+
+
 def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) -> Arrivals:
     """Emission `index` to array, by some families (None: all), where no body stands in between that sound does not
     pass."""
-    context, meeting = array.context, array.meeting
-    medium, receiver, snap = context.medium, context.receiver, context.snaps[index]
-    legs = rays_to_centre(medium, snap.position[None, :], receiver, array.propagation).by(ways)
-    legs = legs.select(picked(directed(snap, legs.departure)[0] * legs.spreading != 0.0))
-    view = array.view(blocking_bodies(context, snap.position))
-    legs = view.visible(legs, Starts(legs.point))
+    same = _Straight.of(array, index, ways)
+    rays, direct = _unhidden(same)
+    view = array.view(blocking_bodies(array.context, array.context.snaps[index].position))
+    legs = view.visible(rays, Starts(rays.point))
     legs = view.settled(legs, Starts(legs.point))
-    over = aperture_paths(legs, np.zeros(len(legs.row), int), array.bending, receiver, array.propagation)
+    if len(legs.row) < len(rays.row) or legs.occluded.any():
+        return _heard(same, legs)
+    return direct.but(occluded=np.zeros((len(direct.delay), legs.occluded.shape[1]), np.uint8))
+
+
+@lru_cache(maxsize=4)
+def _unhidden(of: _Straight) -> tuple[ReceivePaths, Arrivals]:
+    """Rays from a snap to the array centre, and what is heard of them where there are no bodies: that of the last
+    frame, where the sonar and the snap are where they were."""
+    receiver, snap = of.context.receiver, of.context.snaps[of.index]
+    rays = rays_to_centre(of.context.medium, snap.position[None, :], receiver, of.propagation).by(of.ways)
+    rays = rays.select(picked(directed(snap, rays.departure)[0] * rays.spreading != 0.0))
+    return rays, _heard(of, rays)
+
+
+def _heard(of: _Straight, legs: ReceivePaths) -> Arrivals:
+    """What is heard of a snap by some legs from it."""
+    context, meeting, index = of.context, of.meeting, of.index
+    medium, receiver, snap = context.medium, context.receiver, context.snaps[index]
+    bent = bending(medium, of.propagation, receiver)
+    over = aperture_paths(legs, np.zeros(len(legs.row), int), bent, receiver, of.propagation)
     rows = np.arange(len(legs.row))
     gain, fronts = over.gain(rows), over.expansion
     if snap.directivity is not None:  # seen from the source, hydrophones are in other directions than the centre
@@ -116,7 +159,7 @@ def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) 
         legs, fronts, gain = with_coincident_added(legs, fronts, gain, receiver)
     count = len(legs.row)
     one, none, none_out = np.ones(count), np.full(count, NO_TARGET), TransmitPaths.none(count)
-    amplitude, error = fitted(array, gain, legs.spreading * legs.boundary)
+    amplitude, error = fitted(receiver, gain, legs.spreading * legs.boundary)
     met = MotionTerms.direct(count, snap)
     legs = legs if meeting is None else received(legs, met, meeting, medium, receiver.centre)
     loud, turned = directed(snap, legs.departure)

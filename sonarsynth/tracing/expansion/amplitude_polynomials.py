@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.products.array_expansion import stacked
+from sonarsynth.state import Receiver
 from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
 
 if TYPE_CHECKING:
@@ -69,21 +70,21 @@ def _fitted(block: FacetBlock, few: int | None) -> tuple[Floats, Floats, Floats,
     (echo,) and the largest with the gain. Echoes that end at the limb of some probe are the same everywhere, those that
     are tapered to nothing there are followed; both have no strength. All sensors share what the centre sees."""
     gain, counted, most = block.gains(few)
-    return *_terms(block.array, gain), counted, most
+    return *_terms(block.array.context.receiver, gain), counted, most
 
 
-def fitted(array: FacetPaths, gain: Floats, strength: Floats) -> tuple[Floats, float]:
+def fitted(receiver: Receiver, gain: Floats, strength: Floats) -> tuple[Floats, float]:
     """Polynomials (path, term) of gain (path, probe) - 1 over the aperture; no columns where it is 1 everywhere.
 
     And their largest error at the probes, for paths of that strength (path,), relative to the strongest.
     """
-    terms, missed = _terms(array, gain)
+    terms, missed = _terms(receiver, gain)
     loudest = float(np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0))
     return terms, float((np.abs(strength) * missed).max(initial=0.0)) / max(loudest, SILENT)
 
 
-def _terms(array: FacetPaths, gain: Floats) -> tuple[Floats, Floats]:
+def _terms(receiver: Receiver, gain: Floats) -> tuple[Floats, Floats]:
     """Polynomials as above, and the largest error (path,) at the probes."""
     if (gain == 1.0).all():
         return np.empty((len(gain), 0)), np.zeros(len(gain))
-    return probes(array.context.receiver.elements).expand(gain - 1.0)
+    return probes(receiver.elements).expand(gain - 1.0)
