@@ -99,7 +99,7 @@ def _echoes(array: FacetPaths, snaps: Iterable[int]) -> list[Arrivals]:
 
 
 @dataclass(frozen=True)
-class _Straight:
+class _DirectSound:
     """What sound that comes straight from a snap depends on, but for bodies: equal where all of that is."""
 
     what: tuple[Hashable, ...]
@@ -110,7 +110,7 @@ class _Straight:
     ways: tuple[int, ...] | None
 
     @staticmethod
-    def of(array: FacetPaths, index: int, ways: tuple[int, ...] | None) -> _Straight:
+    def of(array: FacetPaths, index: int, ways: tuple[int, ...] | None) -> _DirectSound:
         """Emission `index` to array, by some families (None: all)."""
         context, heard, snap = array.context, array.meeting, array.context.snaps[index]
         water, receiver = context.medium, context.receiver
@@ -119,13 +119,13 @@ class _Straight:
         at = None if heard is None else heard.arrival_time if heard.sonar.still else id(heard)
         same = *map(id, (*described, snap.directivity)), array.propagation, snap.time, at
         what = *same, *(array.tobytes() for array in arrays)
-        return _Straight(what, context, array.propagation, heard, index, ways)
+        return _DirectSound(what, context, array.propagation, heard, index, ways)
 
 
 def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) -> Arrivals:
     """Emission `index` to array, by some families (None: all), where no body stands in between that sound does not
     pass."""
-    same = _Straight.of(array, index, ways)
+    same = _DirectSound.of(array, index, ways)
     rays, direct = _unhidden(same)
     view = array.view(blocking_bodies(array.context, array.context.snaps[index].position))
     legs = view.visible(rays, Starts(rays.point))
@@ -136,7 +136,7 @@ def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) 
 
 
 @lru_cache(maxsize=4)
-def _unhidden(of: _Straight) -> tuple[ReceivePaths, Arrivals]:
+def _unhidden(of: _DirectSound) -> tuple[ReceivePaths, Arrivals]:
     """Rays from a snap to the array centre, and what is heard of them where there are no bodies: that of the last
     frame, where the sonar and the snap are where they were."""
     receiver, snap = of.context.receiver, of.context.snaps[of.index]
@@ -145,7 +145,7 @@ def _unhidden(of: _Straight) -> tuple[ReceivePaths, Arrivals]:
     return rays, _heard(of, rays)
 
 
-def _heard(of: _Straight, legs: ReceivePaths) -> Arrivals:
+def _heard(of: _DirectSound, legs: ReceivePaths) -> Arrivals:
     """What is heard of a snap by some legs from it."""
     context, meeting, index = of.context, of.meeting, of.index
     medium, receiver, snap = context.medium, context.receiver, context.snaps[index]

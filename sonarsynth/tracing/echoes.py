@@ -248,8 +248,9 @@ def _ways_to_facets(array: FacetPaths, snap: Emission) -> TransmitPaths:
     out = out.select(picked(out.spreading != 0.0)).merged()
     if array.ways is not None:
         out = out.select(np.isin(out.family, [way for way, _ in array.ways]))
-    owner, facet = facets.owner[out.facet], facets.facet[out.facet]
-    out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet), (owner, facet))))
+    if not array.lit:
+        owner, facet = facets.owner[out.facet], facets.facet[out.facet]
+        out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet), (owner, facet))))
     for number, before in overlapping(bodies):
         owned = np.flatnonzero(facets.owner[out.facet] == number)
         of = out.facet[owned]

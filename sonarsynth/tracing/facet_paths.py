@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonarsynth.casting.ray_casting import occluded
+from sonarsynth.columns import alike, picked
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.environment.sea import Profile
@@ -50,6 +52,7 @@ class FacetPaths:
     owners: tuple[int, ...] | None = None  # of the facets; None: all
     meeting: Meeting | None = None  # when bodies and array are where they are here; None: nothing moves
     ways: Ways | None = None  # by which snaps light them and they are heard; None: all
+    lit: bool = False  # whether it is known that no body hides them from the one snap that they are for
 
     @property
     def fronts(self) -> AperturePaths:
@@ -156,6 +159,7 @@ def facet_paths(
     columns: tuple[list[ReceivePaths], list[Facets]] = [], []
     count = 0
     straight = propagation.layered and not propagation.bounces and medium.profile.uniform
+    alone = straight and not slack and snaps is not None and len(snaps) == 1
     families = None if ways is None else {on for _, on in ways}
     lights = [snap.position for snap in snaps or () if snap.illuminates]
 
@@ -173,16 +177,26 @@ def facet_paths(
         lit = _lit(every, lights, medium) if lights and propagation.layered and not straight else None
         if lit is not None and not propagation.bounces:
             every, lit = every.select(lit), None
+        if alone:  # what is hidden from either is left out before anything is known of it
+            every = every.select(picked(~_hidden(every, bodies, [receiver.pose.position, *lights])))
         leaving = receive_paths(every, medium, receiver, propagation, slack, lit).by(families)
-        leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
+        if not alone:
+            leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
         first = np.diff(leaving.row, prepend=-1) > 0
         reached = leaving.row[first]
         columns[0].append(leaving.but(row=count - 1 + np.cumsum(first)))
-        columns[1].append(every.select(reached))
+        columns[1].append(every if len(reached) == len(every.facet) else every.select(reached))
         count += len(reached)
     legs, facets = concatenate(columns[0]), concatenate(columns[1])
     over = expansion_source(legs, facets.owner[legs.row], bent, receiver, propagation)
-    return FacetPaths(legs, over, facets, context, propagation, owners=owners, ways=ways)
+    return FacetPaths(legs, over, facets, context, propagation, owners=owners, ways=ways, lit=alone)
+
+
+def _hidden(facets: Facets, bodies: tuple[PlacedTarget, ...], places: list[Floats]) -> Bools:
+    """Which facets (facet,) a body hides from any of some places (xyz), by straight lines."""
+    of = facets.owner, facets.facet
+    hides = [occluded(bodies, facets.clear, alike(place, len(facets.facet)), *of) for place in places]
+    return np.logical_or.reduce(hides)
 
 
 def _in_front(surface: Scatterers, rows: Ints, receiver: Receiver, slack: float, lights: list[Floats]) -> Ints:

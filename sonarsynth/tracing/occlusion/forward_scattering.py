@@ -61,4 +61,4 @@ def forward_paths(array: FacetPaths) -> FacetPaths | None:
     reached, row = np.unique(legs.row, return_inverse=True)
     legs, facets = legs.but(row=row), every.select(reached)
     over = expansion_source(legs, facets.owner[legs.row], array.bending, receiver, propagation)
-    return replace(array, legs=legs, wavefronts=over, facets=facets)
+    return replace(array, legs=legs, wavefronts=over, facets=facets, lit=False)
