@@ -11,8 +11,8 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.description import FieldError
 from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.kernels.placing import distances
 from sonarsynth.equations.rays.ray_solutions import mean_slowness, water
-from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.planning.measured.ray_bending import unlike_straight
 from sonarsynth.planning.measured.sampled_frames import SampledScene
@@ -215,14 +215,16 @@ def _span(frame: Frame, sonar: Sonar, profile: Profile, bottom_depth: float, bou
     snaps = frame.moment.snaps
     if not snaps:
         return _ArrivalInterval(0.0, 0.0, 0.0, np.nan, np.nan, 0.0)
-    direct = np.array([s.time + float(_straight_time(profile, bottom_depth, s.position, array)) for s in snaps])
+    direct = np.array(
+        [s.time + float(_straight_time(profile, bottom_depth, s.position[None], array)[0]) for s in snaps]
+    )
     earliest, late_echo = np.full(len(snaps), np.inf), [-np.inf] * len(snaps)
     blocks = [(body, facets) for body in frame.moment.bodies for facets in in_blocks(len(body.mesh.faces))]
     for body, facets in blocks:
         points = body.pose.to_world(body.mesh.centroid[facets])
         back = _straight_time(profile, bottom_depth, points, array)
         for n, snap in ((n, snap) for n, snap in enumerate(snaps) if snap.illuminates):
-            echo = snap.time + _straight_time(profile, bottom_depth, snap.position, points) + back
+            echo = snap.time + _straight_time(profile, bottom_depth, points, snap.position) + back
             earliest[n] = min(earliest[n], echo.min(initial=np.inf))
             late_echo[n] = max(late_echo[n], echo.max(initial=-np.inf))
     echoes = bool(np.isfinite(earliest).any())
@@ -284,12 +286,11 @@ def _disturbed(span: _ArrivalInterval, start: float, stop: float) -> bool:
     return any(first < span.clock + stop and last > span.clock + start for first, last in span.others)
 
 
-def _straight_time(profile: Profile, bottom_depth: float, a: Floats, b: Floats) -> Floats:
-    """Travel time (...) along straight lines a to b (..., xyz): distance times the mean slowness between them."""
-    away = a - b
-    distance = np.sqrt(dot(away, away))
+def _straight_time(profile: Profile, bottom_depth: float, points: Floats, place: Floats) -> Floats:
+    """Travel time (point,) along straight lines from points (point, xyz) to a place (xyz): distance times the mean
+    slowness between them."""
+    distance = distances(points, place)
     if profile.uniform:
         return np.asarray(distance / profile.speed[0])
-    ends = np.broadcast_arrays(depth(a), depth(b))
-    slowness = mean_slowness(water(profile.depth, profile.speed, bottom_depth), *(np.atleast_1d(z) for z in ends))
-    return np.asarray(distance * slowness.reshape(distance.shape))
+    ends = depth(points), np.broadcast_to(depth(place), len(points))
+    return np.asarray(distance * mean_slowness(water(profile.depth, profile.speed, bottom_depth), *ends))

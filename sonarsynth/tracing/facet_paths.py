@@ -133,7 +133,7 @@ def facet_paths_at_rest(context: FrameContext, propagation: Propagation, snaps: 
     """As `facet_paths`, where nothing moves while sound is under way: frames that differ in their snaps alone, or in
     nothing, share it. Not of straight, unreflected rays, which take less time than to know which snaps light what."""
     facets = sum(map(len, context.scattering))
-    if facets > KEPT or (propagation.layered and not propagation.bounces and context.medium.profile.uniform):
+    if facets > KEPT or _plain(context.medium, propagation):
         return facet_paths(context, propagation, snaps=snaps)
     return replace(way_to_array(_SameWay.of(context), propagation), context=context)
 
@@ -157,8 +157,7 @@ def facet_paths(
     slack = receiver.elements.aperture if tolerances.occlusion == "sensors" else 0.0
     view = Occlusion(bodies, bent, receiver, propagation, tolerances)
     columns: tuple[list[ReceivePaths], list[Facets]] = [], []
-    count = 0
-    straight = propagation.layered and not propagation.bounces and medium.profile.uniform
+    count, straight = 0, _plain(medium, propagation)
     alone = straight and not slack and snaps is not None and len(snaps) == 1
     families = None if ways is None else {on for _, on in ways}
     lights = [snap.position for snap in snaps or () if snap.illuminates]
@@ -170,15 +169,11 @@ def facet_paths(
         return _in_front(context.scattering[number], rows, receiver, slack, lights) if straight else rows
 
     for block in in_blocks(sum(map(len, context.scattering))):
-        every = facets_of(context.scattering, block, chosen)
-        if propagation.layered and not straight:
-            facing = may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack)
-            every = every.select(facing)
-        lit = _lit(every, lights, medium) if lights and propagation.layered and not straight else None
-        if lit is not None and not propagation.bounces:
-            every, lit = every.select(lit), None
+        every, lit = facets_of(context.scattering, block, chosen), None
         if alone:  # what is hidden from either is left out before anything is known of it
             every = every.select(picked(~_hidden(every, bodies, [receiver.pose.position, *lights])))
+        elif propagation.layered and not straight:
+            every, lit = _facing(every, context, propagation, lights, slack)
         leaving = receive_paths(every, medium, receiver, propagation, slack, lit).by(families)
         if not alone:
             leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
@@ -192,11 +187,27 @@ def facet_paths(
     return FacetPaths(legs, over, facets, context, propagation, owners=owners, ways=ways, lit=alone)
 
 
+def _plain(medium: Medium, propagation: Propagation) -> bool:
+    """Whether all rays are straight and unreflected, at one speed."""
+    return propagation.layered and not propagation.bounces and medium.profile.uniform
+
+
+def _facing(
+    facets: Facets, context: FrameContext, propagation: Propagation, lights: list[Floats], slack: float
+) -> tuple[Facets, Ints | None]:
+    """Those of some facets that may have a ray in layers to the array, and that direct light; where others are wanted
+    as well, which of them (facet,) have that."""
+    position = context.receiver.pose.position
+    facets = facets.select(may_face_receiver(facets, position, propagation.bounces, context.medium, slack))
+    lit = _lit(facets, lights, context.medium) if lights else None
+    return (facets, lit) if lit is None or propagation.bounces else (facets.select(lit), None)
+
+
 def _hidden(facets: Facets, bodies: tuple[PlacedTarget, ...], places: list[Floats]) -> Bools:
     """Which facets (facet,) a body hides from any of some places (xyz), by straight lines."""
     of = facets.owner, facets.facet
     hides = [occluded(bodies, facets.clear, alike(place, len(facets.facet)), *of) for place in places]
-    return np.logical_or.reduce(hides)
+    return np.asarray(np.logical_or.reduce(hides))
 
 
 def _in_front(surface: Scatterers, rows: Ints, receiver: Receiver, slack: float, lights: list[Floats]) -> Ints:

@@ -16,6 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, depth
+from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation.images import lengths
@@ -205,7 +206,18 @@ def family_times(
     tracks: Sequence[Track], snaps: tuple[Emission, ...], bottom_depth: float, bounces: int, speed: float
 ) -> Floats:
     """When the sound of each snap meets what is on each track by each family of up to so many reflections (family,
-    snap, track), s on the clock of the frame: by straight lines and their images, at one speed (m/s)."""
+    snap, track), s on the clock of the frame: by straight lines and their images, at one speed (m/s).
+
+    Where tracks are straight and nothing is reflected, |p + v t - s| = c t is a quadratic equation of t after the snap.
+    """
+    if not bounces and all(track.straight for track in tracks):
+        ends = [(track.pose.position, track.velocity) for track in tracks]
+        place, velocity = np.reshape(ends, (-1, 2, 3)).swapaxes(0, 1)
+        start = np.reshape([snap.position for snap in snaps], (-1, 1, 3))
+        sent = np.array([snap.time for snap in snaps])[:, None]
+        away = place + sent[..., None] * velocity - start  # when a snap sounds (snap, track, xyz)
+        along, slower = dot(velocity, away), speed**2 - dot(velocity, velocity)
+        return np.asarray(sent + (along + np.sqrt(along**2 + slower * dot(away, away))) / slower)[None]
     travel_time = partial(_times_of_families, bottom_depth, bounces, speed)
     return meeting_times(tracks, snaps, travel_time, (2 * bounces + 1,))
 

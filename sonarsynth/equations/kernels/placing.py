@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Floats, Ints
+
+
+@compiled
+def distances(points: Floats, place: Floats) -> Floats:
+    """How far points (point, xyz) are from a place (xyz)."""
+    out = np.empty(len(points))
+    for i in range(len(points)):
+        x, y, z = points[i, 0] - place[0], points[i, 1] - place[1], points[i, 2] - place[2]
+        out[i] = math.sqrt(x * x + y * y + z * z)
+    return out
 
 
 @compiled
