@@ -126,7 +126,7 @@ def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) 
     """Emission `index` to array, by some families (None: all), where no body stands in between that sound does not
     pass."""
     same = _DirectSound.of(array, index, ways)
-    rays, direct = _unhidden(same)
+    rays, direct = direct_sound(same)
     view = array.view(blocking_bodies(array.context, array.context.snaps[index].position))
     legs = view.visible(rays, Starts(rays.point))
     legs = view.settled(legs, Starts(legs.point))
@@ -136,7 +136,7 @@ def _direct(array: FacetPaths, index: int, ways: tuple[int, ...] | None = None) 
 
 
 @lru_cache(maxsize=4)
-def _unhidden(of: _DirectSound) -> tuple[ReceivePaths, Arrivals]:
+def direct_sound(of: _DirectSound) -> tuple[ReceivePaths, Arrivals]:
     """Rays from a snap to the array centre, and what is heard of them where there are no bodies: that of the last
     frame, where the sonar and the snap are where they were."""
     receiver, snap = of.context.receiver, of.context.snaps[of.index]

@@ -88,10 +88,11 @@ class FacetPaths:
     def settled(self, leg: Ints) -> tuple[ReceivePaths, Bools]:
         """Those of some legs (row,) that a hydrophone sees, with the hydrophones that bodies hide them from, and which
         (row,) these are."""
-        doubtful, in_sight = self.legs.open[leg] > 0, np.ones(len(leg), bool)
-        number, row = np.unique(leg[doubtful], return_inverse=True)
-        if not len(number):
+        in_sight = np.ones(len(leg), bool)
+        if not self.legs.open.any():
             return self.legs.select(leg), in_sight
+        doubtful = self.legs.open[leg] > 0
+        number, row = np.unique(leg[doubtful], return_inverse=True)
         pending = self.legs.select(number)
         starts = self.facets.starts(pending.row, pending.departure)
         pending = self.view(self.context.bodies).settled(pending.but(row=np.arange(len(number))), starts)
@@ -175,8 +176,7 @@ def facet_paths(
         elif propagation.layered and not straight:
             every, lit = _facing(every, context, propagation, lights, slack)
         leaving = receive_paths(every, medium, receiver, propagation, slack, lit).by(families)
-        if not alone:
-            leaving = view.visible(leaving, every.starts(leaving.row, leaving.departure))
+        leaving = leaving if alone else view.visible(leaving, every.starts(leaving.row, leaving.departure))
         first = np.diff(leaving.row, prepend=-1) > 0
         reached = leaving.row[first]
         columns[0].append(leaving.but(row=count - 1 + np.cumsum(first)))

@@ -20,7 +20,7 @@ from sonarsynth.scattering import Isotropic, MirrorLobe, Scatterers
 from sonarsynth.scattering.scatterers import PointScatterer
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver
-from sonarsynth.tracing.arrivals import trace, trace_each
+from sonarsynth.tracing.arrivals import direct_sound, trace, trace_each
 from sonarsynth.tracing.expansion.probe_sensors import probes
 from sonarsynth.tracing.facet_paths import way_to_array
 from tests.bodies import mesh_from
@@ -121,6 +121,7 @@ def test_arrivals_are_sorted_by_snap_target_and_facet() -> None:
 def alone(context: FrameContext, bounces: int = 0) -> Arrivals:
     """Traced by a process that has traced nothing before."""
     way_to_array.cache_clear()
+    direct_sound.cache_clear()
     return trace(context, AutoTracing(bounces=bounces))
 
 
@@ -141,12 +142,15 @@ def test_legs_of_the_array_side_serve_a_moved_shrimp(profile: Profile, bounces: 
     assert all(map(equal, anew, together)) and all(map(equal, anew, later))
 
 
-def test_legs_of_a_frame_before_serve_another_only_where_all_that_they_depend_on_is_the_same() -> None:
+@pytest.mark.parametrize(("profile", "bounces"), [(UNIFORM, 0), (LAYERED, 1)])
+def test_what_a_frame_before_had_serves_another_only_where_all_that_it_depends_on_is_the_same(
+    profile: Profile, bounces: int
+) -> None:
     still, snaps = body((20.0, 1.0, -11.0)), (snap((3.0, 6.0, -30.0)),)
     one = FrameContext(
-        0.0, (still,), snaps, Medium(ENVIRONMENT, LAYERED, 0.02), Receiver(SONAR, ROMANIS), (MirrorLobe(),)
+        0.0, (still,), snaps, Medium(ENVIRONMENT, profile, 0.02), Receiver(SONAR, ROMANIS), (MirrorLobe(),)
     )
-    warmer = Profile(LAYERED.depth, LAYERED.speed + [0.0, 0.5, 0.5, 0.0])
+    warmer, propagation = Profile(profile.depth, profile.speed + 0.5), AutoTracing(bounces=bounces)
     stones = Scatterers("volume", PointScatterer(0.1), np.array([[18.0, 0.0, -12.0]]), np.zeros((1, 3)), np.ones(1))
     lower = replace(SONAR, position=SONAR.position - [0.0, 0.0, 0.1])
     others = [
@@ -157,16 +161,20 @@ def test_legs_of_a_frame_before_serve_another_only_where_all_that_they_depend_on
         replace(one, receiver=replace(one.receiver, pose=lower)),
         replace(one, receiver=replace(one.receiver, elements=elements(Romanis(pitch=0.06)))),
         replace(one, medium=replace(one.medium, profile=warmer)),
-        replace(one, medium=replace(one.medium, environment=replace(ENVIRONMENT, depth=31.0))),
+        replace(one, bodies=(still, body((1.5, 3.0, -20.0))), laws=one.laws * 2),  # hides the snap itself
+        replace(one, snaps=(snap((3.0, 6.001, -30.0)),)),
+        replace(one, snaps=(snap((3.0, 6.0, -30.0), 1e-9),)),
+        replace(one, medium=replace(one.medium, environment=replace(ENVIRONMENT, depth=31.0), profile=warmer)),
         replace(one, tolerances=replace(one.tolerances, every=2)),
         replace(one, scatterers=(stones,)),
         replace(one, laws=(Isotropic(),)),
         replace(one, medium=replace(one.medium, absorption=0.05)),
     ]
-    anew, own = [alone(other, 1) for other in others], alone(one, 1)
+    anew, own = [alone(other, bounces) for other in others], alone(one, bounces)
+    assert not any(anew[7].direct) or bounces
     for other, expected in zip(others, anew, strict=True):
-        assert equal(trace(other, AutoTracing(bounces=1)), expected) and not equal(expected, own)
-        assert equal(trace(one, AutoTracing(bounces=1)), own)
+        assert equal(trace(other, propagation), expected) and not equal(expected, own)
+        assert equal(trace(one, propagation), own)
 
 
 @pytest.mark.parametrize("time", [-50.0, 1e4])
