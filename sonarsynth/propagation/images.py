@@ -24,17 +24,20 @@ class Image:
 
 def images(start: Floats, end: Floats, bottom_depth: float, bounces: int) -> list[Image]:
     """All paths from depths start to depths end (pair,) with at most `bounces` reflections; the straight one first."""
+    climb, none = np.asarray(start - end, float), np.zeros(1)
+    paths = [Image(0, 0, climb, 1.0, none, np.abs(climb), none)]
+    if not bounces:
+        return paths
     top, bottom = np.minimum(start, end), np.maximum(start, end)
-    span, paths = bottom - top, []
-    for n in range(bounces + 1):
-        for down in (True, False) if n else (True,):
+    for n in range(1, bounces + 1):
+        for down in (True, False):
             below = (n + 1) // 2 if down else n // 2
             surface = n - below
             towards = (start <= end) == down  # launched towards the depth of the other end
-            passes = np.where(towards, 2 * (n // 2) + 1, 2 * ((n - 1) // 2) + 1) if n else np.ones(len(top))
-            climbs = (2.0 * surface * top, passes * span, 2.0 * below * (bottom_depth - bottom))
-            climb = start - end if n == 0 else (-1.0 if down else 1.0) * sum(climbs)
-            paths.append(Image(surface, below, np.asarray(climb, float), 1.0 - 2.0 * (n % 2), *climbs))
+            passes = np.where(towards, 2 * (n // 2) + 1, 2 * ((n - 1) // 2) + 1)
+            climbs = (2.0 * surface * top, passes * (bottom - top), 2.0 * below * (bottom_depth - bottom))
+            climb = np.asarray((-1.0 if down else 1.0) * sum(climbs), float)
+            paths.append(Image(surface, below, climb, 1.0 - 2.0 * (n % 2), *climbs))
     return paths
 
 
