@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SMALL_BYTES: Final = 4096
 """A frame of an array under this size gets no chunk of its own."""
 
-LIST_BYTES: Final = 2**18
+POINTS_BYTES: Final = 2**18
 """Of a chunk of points at most, decoded: readers take a millisecond a chunk, whatever is in it."""
 
 _FIXED: Final = {"xyz": 3, "xyz_other": 3, "wxyz": 4, "corner": 8, "loudest": 3}
@@ -150,15 +150,17 @@ def layout_of(plan: Plan) -> Layout:
         if variable.dims[:1] != ("frame",):
             raise ValueError(f"{variable.group}/{variable.name} must have frame as its first axis")
         inner = tuple(_size(plan, static, variable.group, dim) for dim in variable.dims[1:])
-        size = np.dtype(variable.dtype).itemsize * int(np.prod(inner))
-        chunk = shard if size < SMALL_BYTES else _dividing(shard, LIST_BYTES // size) if "point" in variable.dims else 1
-        arrays.append(ArrayLayout(variable, (frames, *inner), shard, chunk))
+        arrays.append(ArrayLayout(variable, (frames, *inner), shard, _chunk_frames(variable, inner, shard)))
     return Layout(tuple(arrays), frames, shard, len(static))
 
 
-def _dividing(shard: int, most: int) -> int:
-    """The largest part of a shard of frames, `most` at most, that it is made of without a rest."""
-    return max((count for count in range(1, min(most, shard) + 1) if shard % count == 0), default=1)
+def _chunk_frames(variable: Variable, inner: tuple[int, ...], shard: int) -> int:
+    """Frames in a chunk of a variable whose frames have the shape `inner`: a number that divides those of a shard."""
+    size = np.dtype(variable.dtype).itemsize * int(np.prod(inner))
+    if size < SMALL_BYTES:
+        return shard
+    most = min(POINTS_BYTES // size, shard) if "point" in variable.dims else 1
+    return max((count for count in range(1, most + 1) if shard % count == 0), default=1)
 
 
 def _size(plan: Plan, static: Mapping[tuple[str, str], Any], group: str, dim: str) -> int:

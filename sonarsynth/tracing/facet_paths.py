@@ -134,7 +134,7 @@ def facet_paths_at_rest(context: FrameContext, propagation: Propagation, snaps: 
     """As `facet_paths`, where nothing moves while sound is under way: frames that differ in their snaps alone, or in
     nothing, share it. Not of straight, unreflected rays, which take less time than to know which snaps light what."""
     facets = sum(map(len, context.scattering))
-    if facets > KEPT or _plain(context.medium, propagation):
+    if facets > KEPT or _straight(context.medium, propagation):
         return facet_paths(context, propagation, snaps=snaps)
     return replace(way_to_array(_SameWay.of(context), propagation), context=context)
 
@@ -158,8 +158,8 @@ def facet_paths(
     slack = receiver.elements.aperture if tolerances.occlusion == "sensors" else 0.0
     view = Occlusion(bodies, bent, receiver, propagation, tolerances)
     columns: tuple[list[ReceivePaths], list[Facets]] = [], []
-    count, straight = 0, _plain(medium, propagation)
-    alone = straight and not slack and snaps is not None and len(snaps) == 1
+    count, straight = 0, _straight(medium, propagation)
+    one_snap = straight and not slack and snaps is not None and len(snaps) == 1
     families = None if ways is None else {on for _, on in ways}
     lights = [snap.position for snap in snaps or () if snap.illuminates]
 
@@ -171,12 +171,12 @@ def facet_paths(
 
     for block in in_blocks(sum(map(len, context.scattering))):
         every, lit = facets_of(context.scattering, block, chosen), None
-        if alone:  # what is hidden from either is left out before anything is known of it
+        if one_snap:  # what is hidden from either is left out before anything is known of it
             every = every.select(picked(~_hidden(every, bodies, [receiver.pose.position, *lights])))
         elif propagation.layered and not straight:
             every, lit = _facing(every, context, propagation, lights, slack)
         leaving = receive_paths(every, medium, receiver, propagation, slack, lit).by(families)
-        leaving = leaving if alone else view.visible(leaving, every.starts(leaving.row, leaving.departure))
+        leaving = leaving if one_snap else view.visible(leaving, every.starts(leaving.row, leaving.departure))
         first = np.diff(leaving.row, prepend=-1) > 0
         reached = leaving.row[first]
         columns[0].append(leaving.but(row=count - 1 + np.cumsum(first)))
@@ -184,10 +184,10 @@ def facet_paths(
         count += len(reached)
     legs, facets = concatenate(columns[0]), concatenate(columns[1])
     over = expansion_source(legs, facets.owner[legs.row], bent, receiver, propagation)
-    return FacetPaths(legs, over, facets, context, propagation, owners=owners, ways=ways, lit=alone)
+    return FacetPaths(legs, over, facets, context, propagation, owners=owners, ways=ways, lit=one_snap)
 
 
-def _plain(medium: Medium, propagation: Propagation) -> bool:
+def _straight(medium: Medium, propagation: Propagation) -> bool:
     """Whether all rays are straight and unreflected, at one speed."""
     return propagation.layered and not propagation.bounces and medium.profile.uniform
 

@@ -12,7 +12,7 @@ from sonarsynth.conventions import Floats, Ints
 
 @compiled
 def distances(points: Floats, place: Floats) -> Floats:
-    """How far points (point, xyz) are from a place (xyz)."""
+    """How far (point,) in m points (point, xyz) are from a place (xyz)."""
     out = np.empty(len(points))
     for i in range(len(points)):
         x, y, z = points[i, 0] - place[0], points[i, 1] - place[1], points[i, 2] - place[2]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints, Progress
+from sonarsynth.conventions import Floats, Ints, Progress, evenly
 from sonarsynth.detection import Detections, ImagePeaks, by_kind, detections_of, from_rows, views
 from sonarsynth.evaluation import cloud_scores, points
 from sonarsynth.evaluation.detectors import DetectorReport, TrueObjects, true_objects
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 BASELINES: Final = ("peaks", "cfar")
 MOST_JUDGED: Final = 2000
-"""Frames that clouds and baselines are judged in; of more, even steps."""
+"""Frames that ranges, clouds and baselines are judged in; of more, so many, spread evenly."""
 HARDEST: Final = 10
 BINS: Final = 20
 QUANTITIES: Final = {"range": "m", "aspect": "deg", "snr": "dB", "visible": "share"}
@@ -46,7 +46,7 @@ def numbers_of(tree: xr.DataTree, warnings: Sequence[str] = (), progress: Progre
         "categories": _by_category(tree, objects, whose),
         "histograms": {name: _histogram(getattr(objects, name), whose) for name in QUANTITIES},
         "leakage": leakage(tree, built, split),
-        "range_errors": _range_errors(tree, built),
+        "range_errors": _range_errors(tree, _judged_frames(built)),
         "clouds": cloud_scores(tree, _judged_frames(built)) if "cloud" in tree.children else {},
         "baselines": {},
         "hardest": [],
@@ -123,7 +123,7 @@ def _range_errors(tree: xr.DataTree, frames: Ints) -> dict[str, Any]:
 
 def _judged_frames(frames: Ints) -> Ints:
     """Those that are judged."""
-    return frames if len(frames) <= MOST_JUDGED else frames[np.linspace(0, len(frames) - 1, MOST_JUDGED).astype(int)]
+    return frames[evenly(len(frames), MOST_JUDGED)]
 
 
 def _judge(numbers: dict[str, Any], tree: xr.DataTree, built: Ints, progress: Progress | None) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sonarsynth.conventions import Ints
+from sonarsynth.conventions import Ints, evenly
 from sonarsynth.evaluation.detectors import true_objects
 from sonarsynth.evaluation.detectors.true_objects import TrueObjects, category_names
 from sonarsynth.pictures.report_figures.report_numbers import QUANTITIES
@@ -29,7 +29,7 @@ def film(tree: xr.DataTree, frames: Ints) -> Figure | None:
         return None
     import plotly.graph_objects as go
 
-    chosen = frames if len(frames) <= MOST_SHOWN else frames[np.linspace(0, len(frames) - 1, MOST_SHOWN).astype(int)]
+    chosen = frames[evenly(len(frames), MOST_SHOWN)]
     image = tree["image"].dataset
     azimuth, elevation = image["azimuth"].values, image["elevation"].values
     objects, names = true_objects(tree, chosen), [escape(name) for name in category_names(tree)]
