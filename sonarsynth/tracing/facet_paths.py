@@ -159,7 +159,7 @@ def facet_paths(
     view = Occlusion(bodies, bent, receiver, propagation, tolerances)
     columns: tuple[list[ReceivePaths], list[Facets]] = [], []
     count, straight = 0, _straight(medium, propagation)
-    one_snap = straight and not slack and snaps is not None and len(snaps) == 1
+    one_snap = straight and tolerances.occlusion == "centre" and snaps is not None and len(snaps) == 1
     families = None if ways is None else {on for _, on in ways}
     lights = [snap.position for snap in snaps or () if snap.illuminates]
 

@@ -15,7 +15,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.planning import choosing
 from sonarsynth.planning.choosing import PerSensorReference
 from sonarsynth.products import Arrivals
-from sonarsynth.products.array_expansion import aperture_terms
+from sonarsynth.products.array_expansion import aperture_terms, stacked
 from sonarsynth.propagation import Refracted
 from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.receiver.subarrays import subarray
@@ -112,3 +112,9 @@ def test_occlusion_that_matters_where_it_was_measured_is_followed_where_it_was_n
     monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index, **how: Measured()))
     plan = planning.plan(reading.recipe_of(reading.read(TANK, [f"repeats={sequences}"])), products=())
     assert choosing._subarrays(plan, [0]).occlusion == occlusion
+
+
+def test_rows_of_blocks_keep_their_type_where_some_lack_columns() -> None:
+    """Bits of who is hidden from which hydrophone are bytes: of paths that none are known of, 0."""
+    joined = stacked([np.zeros((2, 0), np.uint8), np.full((1, 3), 7, np.uint8)])
+    assert joined.dtype == np.uint8 and joined.tolist() == [[0, 0, 0], [0, 0, 0], [7, 7, 7]]
