@@ -17,6 +17,7 @@ OUTLIERS = 0.02
 """Share of the points that may be further off than three predicted errors, and a standard deviation of how many that
 are: errors of overlapping echoes have longer tails than normal ones. One may be whatever their number."""
 
+AS_PREDICTED = "98 % within 3 predicted errors, but for chance"
 MOST_ROWS = 2_000_000
 """Points, and room for points, that are read at once."""
 UNKNOWN, STRANGER = -1, -2
@@ -47,9 +48,17 @@ class Points:
     @property
     def judged(self) -> np.ndarray:
         """(point,) of a target, directly, in the main lobe, by the right snap: their ranges are claimed to be right."""
+        return np.asarray(self._direct & ~self.strange)
+
+    @property
+    def misplaced(self) -> np.ndarray:
+        """(point,) the same by a wrong snap that is known: their predicted errors are claimed to hold the right one."""
+        return np.asarray(self._direct & self.strange & (self.clock >= 0))
+
+    @property
+    def _direct(self) -> np.ndarray:
         direct = (self.target >= 0) & (self.family == 0) & (self.lit_by == 0)
-        direct &= self.origin == ORIGINS.index("main lobe")
-        return np.asarray(direct & ~self.strange)
+        return np.asarray(direct & (self.origin == ORIGINS.index("main lobe")))
 
     @property
     def error(self) -> np.ndarray:
@@ -113,11 +122,12 @@ def range_errors(tree: Stored, frames: np.ndarray) -> list[Check]:
     numbers: dict[str, float] = {word: int(mask.sum()) for word, mask in kinds(cloud).items()}
     numbers |= {"points": int(cloud.judged.sum()), "off_target": int((~cloud.judged).sum())}
     whose = Check("origin of points", reported, _said(numbers), None, numbers, warning=_few(numbers))
+    others = [*_by_wrong_snaps(cloud), whose]
     if not cloud.judged.any():
-        return [Check(name, reported, "no points on a target", None, numbers), whose]
+        return [Check(name, reported, "no points on a target", None, numbers), *others]
     error, ratio = cloud.error[cloud.judged], _ratio(cloud)[cloud.judged]
     missed = ~(np.abs(ratio) <= 3.0)
-    finite, likely = ratio[np.isfinite(ratio)], OUTLIERS * len(ratio)
+    finite = ratio[np.isfinite(ratio)]
     numbers |= {
         "median_m": float(np.median(np.abs(error))),
         "largest_m": float(np.abs(error).max()),
@@ -130,14 +140,34 @@ def range_errors(tree: Stored, frames: np.ndarray) -> list[Check]:
         Check(name, reported, f"{spread}, over {len(error)} points", None, numbers),
         Check(
             "predicted range errors",
-            "98 % within 3 predicted errors, but for chance",
+            AS_PREDICTED,
             within + f"{numbers['pull_rms']:.2g}",
-            bool(missed.sum() <= max(1, likely + np.sqrt(likely))),
+            _as_predicted(missed),
             numbers,
             numbered(np.unique(cloud.frame[cloud.judged][missed])),
         ),
-        whose,
+        *others,
     ]
+
+
+def _by_wrong_snaps(cloud: Points) -> list[Check]:
+    """Whether predicted errors of points that are placed by another snap than lit them say how far off that puts them;
+    none where there are no such points."""
+    wrong = cloud.misplaced
+    if not wrong.any():
+        return []
+    missed, largest = ~(np.abs(_ratio(cloud)[wrong]) <= 3.0), float(np.abs(cloud.error[wrong]).max())
+    share = 1.0 - float(missed.mean())
+    result = f"{100 * share:.4g} % within, of {int(wrong.sum())} points; at most {largest:.2g} m off"
+    numbers = {"points": int(wrong.sum()), "share_within_3": share, "largest_m": largest}
+    frames = numbered(np.unique(cloud.frame[wrong][missed]))
+    return [Check("ranges by another snap", AS_PREDICTED, result, _as_predicted(missed), numbers, frames)]
+
+
+def _as_predicted(missed: np.ndarray) -> bool:
+    """Whether so few points (point,) are further off than three predicted errors as `OUTLIERS` lets be."""
+    likely = OUTLIERS * len(missed)
+    return bool(missed.sum() <= max(1, likely + np.sqrt(likely)))
 
 
 def _ratio(cloud: Points) -> np.ndarray:

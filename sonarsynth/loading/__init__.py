@@ -31,6 +31,6 @@ def open(path: Folder | Path | str) -> xr.DataTree:
     Raises
     ------
     Mismatch where there is no store of ours, or one of another format. Reading a variable raises Damage where its file
-    is damaged or missing.
+    is damaged or missing; chunks that were exchanged whole are found by `verify` alone.
     """
     return open_store(path)

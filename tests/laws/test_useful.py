@@ -115,7 +115,6 @@ def test_errors_that_contradict_their_predictions_fail() -> None:
 @pytest.mark.parametrize(
     ("labels", "said"),
     [
-        ({"emission": (60, 1)}, "240 lit by another snap"),
         ({"family": (60, 1)}, "240 ghosts by surface"),
         ({"family": (60, 2)}, "240 ghosts by bottom"),
         ({"origin": (60, ORIGINS.index("mirror image"))}, "240 mirror images"),
@@ -134,6 +133,19 @@ def test_what_no_range_is_judged_of_is_named_counted_and_warned_of(labels: dict[
     assert said in whose.got and "160 points on target, 240 off" in whose.got
     assert said in whose.warning and whose.warning.startswith("only 40 % of the points")
     assert row(checks, "range of points on target").numbers["points"] == 160
+
+
+@pytest.mark.parametrize(("predicted", "honest"), [(2.0, True), (0.02, False)])
+def test_ranges_by_another_snap_than_lit_them_are_within_what_is_predicted(predicted: float, honest: bool) -> None:
+    """60 of the 100 points of each frame are lit by the second snap, and placed by the first, 3 m off."""
+    store = tree(emission=(60, 1))
+    store["cloud/range"].values[:, :60] += 3.0
+    store["cloud/range_error"].values[:, :60] = predicted
+    checks = range_errors(store, ALL)
+    assert "160 points on target, 240 off (240 lit by another snap)" in row(checks, "origin of points").got
+    assert row(checks, "predicted range errors").ok
+    check = row(checks, "ranges by another snap")
+    assert check.ok is honest and check.frames == (() if honest else (0, 1, 2, 3))
 
 
 def test_a_store_whose_points_have_no_labels_is_not_judged_by_them() -> None:

@@ -44,7 +44,14 @@ _SIGNALS = group_of(
 _IMAGE = group_of(
     "/image",
     "image",
-    row("energy", BEAMS, "Pa2 s", "energy of the beam in the echo window", dtype="float32"),
+    row(
+        "energy",
+        BEAMS,
+        "Pa2 s",
+        "energy of the beam in the echo window",
+        dtype="float32",
+        attributes=comment("of all snaps whose echoes come then; the window is that of the first source estimate"),
+    ),
     row("start", ("frame",), "s", "start of the echo window after the instant of the frame"),
     row("stop", ("frame",), "s", "end of the echo window after the instant of the frame"),
     row(
@@ -82,7 +89,8 @@ _RANGES = group_of(
         "power at this range of the loudest beam of this azimuth, over that of an echo as strong as the direct pulse",
         dtype="float32",
         attributes=comment(
-            "beams are matched to the direct pulse; NaN: not in the echo window, or no snap was located"
+            "beams are matched to the direct pulse; NaN: not in the echo window, or no snap was located. Ranges are by "
+            "the first source estimate: echoes of another that came then are at wrong ones, by metres"
         ),
     ),
     row(

@@ -60,11 +60,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
             "every other frame is checked when it is rendered, and fails if it does not fit"
         )
     lines += population_notes(recipe) + _shared(recipe, looks) + unlit(plan)
-    if plan.windows.disturbed:
-        lines.append(
-            f"{plan.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest: "
-            "where other echoes do not tell which lit a point, its range_error is half of what that leaves open"
-        )
+    lines += _several_snaps(plan)
     if scene.world.chorus is not None and plan.chorus is not None:
         reach, distant = plan.chorus, 0.0 if plan.distant_chorus is None else plan.distant_chorus.share
         level = reach.level - 10.0 * np.log10(1.0 - distant)
@@ -93,6 +89,19 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         lines += validity(look.scene, look.profile)
         lines += law_notes(look)
     return once(lines, recipe)
+
+
+def _several_snaps(plan: Plan) -> list[str]:
+    """What becomes of echoes of other snaps than the one that is the clock."""
+    if not plan.windows.disturbed:
+        return []
+    line = (
+        f"{plan.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest: "
+        "where other echoes do not tell which lit a point, its range_error is half of what that leaves open; images "
+        "hold the echoes of both"
+    )
+    ranged = ", and range images have those of the other at wrong ranges, for their clock is the first source estimate"
+    return [line + (ranged if "range_image" in plan.products else "")]
 
 
 def noted(looks: Sequence[SampledScene]) -> list[SampledScene]:
