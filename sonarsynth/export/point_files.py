@@ -27,14 +27,16 @@ LABELS = {
     "range_error": np.float32,
 }
 """Columns beside place, normal and colour, and their types."""
-POINT_BYTES = 4 * (3 + 3 + len(LABELS))
-"""Of each point, beside its colour."""
+POINT_BYTES = 4 * (3 + len(LABELS))
+"""Of each point, beside its place and its colour."""
+ROUNDED = 1e-4
+"""m: places that single precision rounds by more, as those in the world kilometres from its origin, have double."""
 
 
 def write_points(points: xr.Dataset, path: str | Path) -> Path:
     """Write the points of `sonarsynth.points` to a file whose name ends as one of `FORMATS`: all of it, or nothing.
 
-    Positions in m, normals (0 where there is none), colours by energy over 25 dB, and `frame`, `target`, `family`,
+    Positions in m, to a tenth of a millimetre however far off, normals (0 where there is none), colours by energy over 25 dB, and `frame`, `target`, `family`,
     `energy`, `snr` and `range_error` of each point by those names. Raises ValueError for another ending, or where there
     is no point; ImportError where Open3D is not installed; OSError where the file cannot be written.
     """
@@ -56,7 +58,9 @@ def write_points(points: xr.Dataset, path: str | Path) -> Path:
         rows = values if values.ndim == 2 else values[:, None]
         cloud.point[name] = o3d.core.Tensor.from_numpy(np.ascontiguousarray(rows, kind))
 
-    put("positions", points["position"].values, np.float32)
+    far = np.spacing(np.float32(np.abs(points["position"].values).max())) > ROUNDED
+    place = np.float64 if far else np.float32
+    put("positions", points["position"].values, place)
     put("normals", np.nan_to_num(points["normal"].values), np.float32)
     put("colors", np.rint(255.0 * shade), np.uint8)
     for name, kind in LABELS.items():
@@ -67,7 +71,7 @@ def write_points(points: xr.Dataset, path: str | Path) -> Path:
         content = written.read_bytes() if done else b""
     header, colour = FORMATS[ending]
     _, _, rows = content.partition(header)
-    if len(rows) != points.sizes["point"] * (POINT_BYTES + colour):  # Open3D does not say that a PLY is cut
+    if len(rows) != points.sizes["point"] * (3 * np.dtype(place).itemsize + POINT_BYTES + colour):  # Open3D does not say that a PLY is cut
         raise OSError(errno.ENOSPC, f"Open3D did not write all points in {tempfile.gettempdir()}", str(file))
     file.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(file, content)

@@ -14,7 +14,7 @@ from sonarsynth.environment.noise.noise_field import SECONDS as DRAW_SECONDS
 from sonarsynth.geometry.motion import pose
 from sonarsynth.receiver import SensorErrors
 from sonarsynth.signals.noise.drawing import coherence_error, seconds
-from sonarsynth.sources.noise_source import NoiseRecording
+from sonarsynth.sources.noise_source import NoiseRecording, NoiseSource
 
 if TYPE_CHECKING:
     from sonarsynth.planning.plans import Plan
@@ -31,6 +31,8 @@ PLAYED_SECONDS = 70e-9
 """Of one core for a sample of one hydrophone of a recording that is played."""
 ERROR_SECONDS = 40e-9
 """Of one core to filter a sample of one channel."""
+LEAST_OFF = 1e-3
+"""degree: a source of noise that passes by less in a record stands still."""
 NoiseRow = tuple[str, str, str, str, float, int]
 """As `costs.Row`."""
 
@@ -92,8 +94,24 @@ def _source_rows(plan: Plan) -> list[NoiseRow]:
             level = 10.0 * np.log10(density / REFERENCE_PRESSURE**2)
             text = f"{level:.1f} dB re 1 uPa2/Hz at 1 m and {centre / 1e3:.3g} kHz"
         method = f"{source.sound.kind} from one place, each path at each hydrophone"
-        rows.append((f"noise of {source.name}", method, text, "none", PATH_SECONDS * samples, 0))
+        off = _passing(plan, source)
+        error = f"at one place in a record: directions up to {off:.2g} degrees off" if off > LEAST_OFF else "none"
+        rows.append((f"noise of {source.name}", method, text, error, PATH_SECONDS * samples, 0))
     return rows
+
+
+def _passing(plan: Plan, source: NoiseSource) -> float:
+    """How far (degree) a source and the array pass each other in a record, at most."""
+    trajectory, off = plan.scene.trajectory, 0.0
+    longest = plan.windows.samples / plan.scene.sonar.sampling_frequency
+    for step in range(trajectory.frames):
+        time = trajectory.time(step)
+        first, last = (
+            pose(source.motion, at).position - pose(trajectory.sonar, at).position for at in (time, time + longest)
+        )
+        across = float(np.linalg.norm(np.cross(first, last)))
+        off = max(off, float(np.rad2deg(np.arctan2(across, first @ last))))
+    return off
 
 
 def _channel_rows(plan: Plan) -> list[NoiseRow]:

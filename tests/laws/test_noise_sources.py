@@ -12,6 +12,8 @@ from scipy.signal.windows import hann
 import sonarsynth as ss
 from sonarsynth.pipeline.synthesis import digitise
 from sonarsynth.planning import frame_start
+from sonarsynth.planning.costs import frame_size
+from sonarsynth.planning.noise_rows import noise_rows
 from sonarsynth.products import Signals
 
 FS, C = 196e3, 1540.0
@@ -115,6 +117,18 @@ def test_a_spectrum_is_heard_at_its_level_and_changes_no_draw_of_the_ambient_noi
 def test_what_cannot_be_is_refused(tmp_path: Path, source: str, message: str) -> None:
     with pytest.raises((ss.RecipeError, ss.FieldError), match=message):
         heard(tmp_path, source)
+
+
+@pytest.mark.parametrize("speed", [0.0, 10.0])
+def test_the_plan_says_how_far_a_source_passes_in_a_record(tmp_path: Path, speed: float) -> None:
+    """Which is heard from one place: a boat that crosses 12 m ahead at 10 m/s is 0.14 degrees on after 3 ms."""
+    motion = f"{{kind: line, start: [12, 0, -20], stop: [12, {speed}, -20], duration: 1 s}}"
+    source = f"{{name: boat, motion: {motion if speed else STILL}, sound: {{kind: flat, level: 120 dB}}}}"
+    (tmp_path / "recipe.yaml").write_text(RECIPE.replace("SOURCE", source).replace("NOISE", "null"))
+    plan = ss.plan(ss.load(tmp_path / "recipe.yaml"), products=["signals"])
+    passed = np.rad2deg(np.arctan(speed * plan.windows.samples / FS / 12.0))
+    (row,) = noise_rows(plan, frame_size(plan))
+    assert row[3] == (f"at one place in a record: directions up to {passed:.2g} degrees off" if speed else "none")
 
 
 def test_a_noise_that_is_appended_changes_nothing_of_those_before_it(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location import pulse_times
+from sonarsynth.ranging.location.plane_waves import PlaneWaveFit, without
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
     ECHO,
@@ -54,6 +55,8 @@ FAR = 1e7
 RISING = 0.15
 """Sine of the elevation above which no direct sound comes from the bottom below: a ray that turned above the array,
 where sound is faster by 1 %, comes from sqrt(0.02) at most."""
+LOUD = 0.01
+"""Power over that of the loudest pulse, of those beside which others are looked for: echoes are fainter."""
 QUIET = 2.0
 """The mean power while a pulse passes over the array must exceed that of the quiet by this factor."""
 
@@ -130,14 +133,53 @@ class Candidates:
 
     @property
     def rows(self) -> list[SourceFix]:
-        """Those that are accepted, then those that are refused."""
+        """Those that are accepted, then those that may be echoes, whose places count as well, then the others."""
         judged = [self._judged(candidate) for candidate in self.found]
-        return sorted(judged, key=lambda row: row.reason not in (ACCEPTED, RANGE))
+        return sorted(judged, key=lambda row: 0 if row.reason in (ACCEPTED, RANGE) else 1 + (row.suspect is None))
 
     @property
     def accepted(self) -> int:
         """How many are."""
         return sum(row.reason in (ACCEPTED, RANGE) for row in self.rows)
+
+    def look_beside(
+        self, signals: Signals, track: Track | None, width: int, quiet: float,
+        look: Callable[[Signals, float, float], Candidate],
+    ) -> None:  # fmt: skip
+        """Add pulses that are heard within `width` samples of a louder one, and are louder than `quiet` (Pa2): by
+        `look` at the signals without that one."""
+        elements, sonar, rate = self.known.elements, self.known.sonar, signals.sampling_frequency
+        loudest = max((candidate.power for candidate in self.found), default=0.0)
+        for candidate in tuple(self.found):
+            row, n = candidate.row, self.found.index(candidate)
+            if row.reason not in (ACCEPTED, RANGE) or candidate.power < LOUD * loudest:
+                continue
+            self.found[n] = candidate._replace(centre=row.time)  # the loudest window may have held both
+            front, own = PlaneWaveFit(row.chord, row.curvature[0], row.time), when_heard(self.known, track, row.time)
+            late = front.delays(elements, sonar.assumed_sound_speed) - row.time
+            moved = replace(elements, position=elements.position + late[:, None] * own.velocity)
+            rest = without(signals, moved, sonar, front, width / rate)
+            if rest is None:
+                continue
+            middle = round((row.time - signals.start) * rate)
+            first = max(middle - 2 * width, 0)
+            cut = replace(rest, pressure=np.ascontiguousarray(rest.pressure[:, first : middle + 2 * width]))
+            heard = loudness(cut, elements.gain != 0, width).track
+            beside = heard[max(middle - width - first, 0) : middle + width + 1 - first]
+            top = int(beside.argmax())
+            if beside[top] > quiet:
+                at = signals.start + (max(middle - width, first) + top) / rate
+                self._add(look(rest, at, float(beside[top])), pulse_times.half_length(sonar.band), n)
+
+    def _add(self, found: Candidate, apart: float, cause: int) -> None:
+        """Add a pulse by how loud it is, but one within `apart` (s) of any that is known beside its `cause`."""
+        time = found.row.time
+        if not np.isfinite(time):
+            return
+        known = [other.row.time for n, other in enumerate(self.found) if n != cause]
+        if not any(abs(other - time) < apart for other in known):
+            fainter = (n for n, other in enumerate(self.found) if other.power < found.power)
+            self.found.insert(next(fainter, len(self.found)), found._replace(centre=time))
 
     def _judged(self, candidate: Candidate) -> SourceFix:
         row = candidate.row

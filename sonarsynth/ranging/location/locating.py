@@ -117,15 +117,19 @@ def locate(
         elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, reflected
     )
     track, candidates = loud.track.copy(), Candidates(knowledge)
+
+    def look(heard: Signals, centre: float, power: float) -> Candidate:
+        own = when_heard(knowledge, receiver.track, centre)
+        return Candidate(centre, power, candidate(heard, own, centre, half, None if bend is None else bend(own.pose)))
+
     for _ in range(4 * snaps):
         top = _loudest(track, candidates, signals, snaps)
         if top is None or not track[top] > QUIET * loud.quiet:
             break
-        centre = signals.start + top / signals.sampling_frequency
-        own = when_heard(knowledge, receiver.track, centre)
-        row = candidate(signals, own, centre, half, None if bend is None else bend(own.pose))
-        candidates.found.append(Candidate(centre, float(track[top]), row))
+        candidates.found.append(look(signals, signals.start + top / signals.sampling_frequency, float(track[top])))
         track[max(top - width, 0) : top + width + 1] = 0.0
+    if snaps > 1:
+        candidates.look_beside(signals, receiver.track, width, QUIET * loud.quiet, look)
     return as_estimates(candidates.rows, snaps)
 
 
@@ -292,6 +296,5 @@ def _refit(
     measured: the speed (m/s) that `wave` was fitted with, where it is another.
     """
     q = elements.position
-    own = wavefront_delays(q, wave.direction, wave.curvature, measured or speed)
-    delay = wave.time + own + wave.residual - extra
+    delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, measured or speed) + wave.residual - extra
     return spherical_wave(delay, q, speed, pulse.weight, wave.direction, wave.curvature) or wave

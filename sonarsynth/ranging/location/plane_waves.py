@@ -24,6 +24,13 @@ STEPS: Final = 4
 """Tilts of half a beam width tried on either side, at most."""
 ROUNDS: Final = 4
 """Fits of the wavefront to the lags that the last one left."""
+FEW: Final = 64
+"""Sensors, all over the array, that are asked whether they hear anything beside a pulse."""
+OWN: Final = 1.5
+"""Half lengths of a pulse about its wavefront in which nothing else is told from it."""
+BESIDE: Final = 0.005
+"""Energy of what else is heard about it, over that of the pulse (23 dB below it), that is looked at: echoes are fainter,
+but of bodies close by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +157,22 @@ def part_of(
     since = arrival - np.floor(arrival) + samples
     back = ranging_kernels.turned(explained, -since / rate, 0.0, aligned.spacing)
     return WindowSegment(front, arrival, irfft(back, 2 * samples, axis=1))
+
+
+def without(
+    signals: Signals, elements: Elements, sonar: Sonar, front: PlaneWaveFit, reach: float
+) -> Signals | None:
+    """Signals without the pulse on a wavefront; None where nothing within `reach` (s) of it is `BESIDE` as loud."""
+    rate, half = signals.sampling_frequency, OWN * pulse_times.half_length(sonar.band)
+    some = np.flatnonzero(elements.gain)[:: max(elements.count // FEW, 1)]
+    first = np.floor((front.delays(elements, sonar.assumed_sound_speed) - signals.start) * rate).astype(int)
+    late = np.arange(-int(reach * rate), int(reach * rate) + 1)
+    index, samples = first[some, None] + late, signals.pressure.shape[1]
+    heard = signals.pressure[some[:, None], np.clip(index, 0, samples - 1)] * ((index >= 0) & (index < samples))
+    power, own = np.einsum("qt,qt->t", heard, heard), np.abs(late) <= half * rate
+    if not power[~own].sum() > BESIDE * power[own].sum():
+        return None
+    return subtract(signals, part_of(signals, elements, sonar, front, half))[0]
 
 
 def subtract(signals: Signals, segment: WindowSegment) -> tuple[Signals, float]:
