@@ -63,11 +63,19 @@ def test_points_lit_by_either_snap_are_where_they_are_predicted(seed: int) -> No
     assert np.abs(rows[:, 1]).max() > 10.0
 
 
+@pytest.mark.parametrize("seed", [64, 89, 269, 385])
+def test_points_lit_by_a_snap_heard_within_a_millisecond_of_another_are_where_they_are_predicted(seed: int) -> None:
+    """0.16 and 0.54 ms after it, 0.51 and 0.19 ms before: it was not noticed, and 22 of these 24 points were 16 to 415
+    predicted errors off."""
+    rows, noticed = points(seed)
+    assert noticed
+    assert np.abs(rows[:, 0]).max() < 3.0
+
+
 @pytest.mark.long
 def test_points_of_two_snaps_err_by_what_is_predicted() -> None:
-    """Of 32 scenes, but for those in which the sonar notices one of the snaps alone: by the clock a third is off."""
-    scenes = [points(seed) for seed in range(64, 128, 2)]
-    rows = np.concatenate([found for found, noticed in scenes if noticed])
+    """Of 32 scenes: by the clock a third is off."""
+    rows = np.concatenate([points(seed)[0] for seed in range(64, 128, 2)])
     beyond = ~(np.abs(rows[:, :2]) < 3.0)
     assert len(rows) > 60 and np.mean(rows[:, 3] > 0) > 0.2
     assert beyond[:, 0].mean() < 0.02 and beyond[:, 1].mean() > 0.2

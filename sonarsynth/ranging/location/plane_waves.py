@@ -29,8 +29,8 @@ FEW: Final = 64
 OWN: Final = 1.5
 """Half lengths of a pulse about its wavefront in which nothing else is told from it."""
 BESIDE: Final = 0.005
-"""Energy of what else is heard about it, over that of the pulse (23 dB below it), that is looked at: echoes are fainter,
-but of bodies close by."""
+"""Energy of what else is heard about it, over that of the pulse (23 dB below it), that is looked at: echoes are
+fainter, but of bodies close by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,9 +159,7 @@ def part_of(
     return WindowSegment(front, arrival, irfft(back, 2 * samples, axis=1))
 
 
-def without(
-    signals: Signals, elements: Elements, sonar: Sonar, front: PlaneWaveFit, reach: float
-) -> Signals | None:
+def without(signals: Signals, elements: Elements, sonar: Sonar, front: PlaneWaveFit, reach: float) -> Signals | None:
     """Signals without the pulse on a wavefront; None where nothing within `reach` (s) of it is `BESIDE` as loud."""
     rate, half = signals.sampling_frequency, OWN * pulse_times.half_length(sonar.band)
     some = np.flatnonzero(elements.gain)[:: max(elements.count // FEW, 1)]
