@@ -122,8 +122,13 @@ def _channel_rows(plan: Plan) -> list[NoiseRow]:
         usual = SensorErrors()
         changed = [name for name in vars(usual) if getattr(errors, name) != getattr(usual, name) and name != "known"]
         method = f"{', '.join(changed) or 'no errors'}; processing knows {errors.known}"
+        off = 2.0 * np.pi * sonar.band.high / sonar.assumed_sound_speed * errors.position
+        aside = (
+            f"{(1.0 - np.sqrt(0.5)) * off:.2g} rad rms off for sound from 45 degrees aside, {2.0 * off:.2g} from behind"
+        )
+        error = f"positions along the axis as delays of sound from ahead: {aside}" if off else "none"
         rows.append(
-            (SENSORS, method.replace("_", " "), "requested", "none", ERROR_SECONDS * samples, 36 * sizes["sensor"])
+            (SENSORS, method.replace("_", " "), "requested", error, ERROR_SECONDS * samples, 36 * sizes["sensor"])
         )
     if sonar.electronics is not None:
         text = f"{sonar.electronics.level:.1f} dB re 1 uPa2/Hz"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.io import wavfile
 from scipy.signal.windows import hann
 
 import sonarsynth as ss
-from sonarsynth.pipeline.synthesis import digitise
+from sonarsynth.pipeline.synthesis import digitise, errors_of
 from sonarsynth.planning import frame_start
 from sonarsynth.planning.costs import frame_size
 from sonarsynth.planning.noise_rows import noise_rows
@@ -32,6 +33,7 @@ scene:
     beams: {azimuths: 3, elevations: 3}
   trajectory: {frames: 2, interval: 0.5 s, sonar: {kind: still, position: [0, 0, -20], heading: 90 deg}}
 """
+SOUND = "{kind: noise_recording, path: tone.wav}"
 STILL = "{kind: still, position: [12, 3, -17]}"
 
 
@@ -129,6 +131,32 @@ def test_the_plan_says_how_far_a_source_passes_in_a_record(tmp_path: Path, speed
     passed = np.rad2deg(np.arctan(speed * plan.windows.samples / FS / 12.0))
     (row,) = noise_rows(plan, frame_size(plan))
     assert row[3] == (f"at one place in a record: directions up to {passed:.2g} degrees off" if speed else "none")
+
+
+@pytest.mark.parametrize(("position", "which"), [((12.0, 12.0, -20.0), 0), ((-12.0, 0.0, -20.0), 1)])
+def test_the_plan_says_what_positions_along_the_axis_do_to_sound_that_is_not_from_ahead(
+    tmp_path: Path, position: tuple[float, float, float], which: int
+) -> None:
+    """They count as delays of sound from ahead: tones of a source 45 degrees aside, and behind, have phases off by as
+    much, of what they have where hydrophones are."""
+    tone(tmp_path, 60e3)
+    places = [[0.0, 0.3 * np.cos(t), 0.3 * np.sin(t)] for t in np.linspace(0.0, 6.0, 100)]
+    table = f"positions: {np.round(places, 3).tolist()}}}\n    sensor_errors: {{position: 1 mm}}"
+    source = f"{{name: a, motion: {{kind: still, position: {list(position)}}}, sound: {SOUND}}}"
+    text = RECIPE.replace("positions: [[0, 0, 0], [0, 0.4, 0.1], [0.2, -0.3, 0.5]]}", table)
+    (tmp_path / "recipe.yaml").write_text(text.replace("SOURCE", source).replace("NOISE", "null"))
+    plan = ss.plan(ss.load(tmp_path / "recipe.yaml"), products=["signals"])
+    frame = plan.recipe.frame(0)[1]
+    quiet = Signals(np.zeros((100, 4000), np.float32), frame_start(plan, frame), FS, 0.0, 0, 0)
+    pressure, drawn = digitise(plan, frame, quiet).pressure[:, 500:3500], errors_of(plan, frame)
+    assert drawn is not None
+    real = frame.sonar_pose.to_world(plan.elements.position + drawn.position)
+    turns = np.exp(-2j * np.pi * 60e3 * np.arange(3000) / FS) * hann(3000)
+    wave = (pressure @ turns) * np.exp(2j * np.pi * 60e3 / C * np.linalg.norm(real - position, axis=1))
+    off = np.std(np.angle(wave / wave.mean()))
+    (row,) = (row for row in noise_rows(plan, frame_size(plan)) if row[0] == "sensors")
+    said = [float(number) for number in re.findall(r"[\d.]+(?= rad| from)", row[3])]
+    assert off == pytest.approx(said[which] * 60e3 / plan.scene.sonar.band.high, rel=0.25)
 
 
 def test_a_noise_that_is_appended_changes_nothing_of_those_before_it(tmp_path: Path) -> None:
