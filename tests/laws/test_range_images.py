@@ -140,6 +140,19 @@ def test_two_bodies_one_before_the_other_leave_what_is_between_them_to_nobody() 
     assert np.count_nonzero(apart == 0) == 2  # no surface that is seen is so steep
 
 
+@pytest.mark.parametrize("times", [(0.0,), (0.0, 3e-3)])
+def test_the_plan_says_that_ranges_are_by_the_first_of_two_snaps(times: tuple[float, ...]) -> None:
+    """Echoes of the other are in the image as well, 2.3 m off: it comes 3 ms later."""
+    made = plan(scene(SnappingShrimp(position=(10.0, 3.0, -55.0), snap_times=times)), ["range_image"])
+    said = [line for line in made.warnings if "range images have those of the other at wrong ranges" in line]
+    assert len(said) == len(times) - 1
+    image = render(made, 0)["range_image/energy"]
+    assert "Ranges are by the first source estimate" in image.attrs["comment"]
+    profile = np.nan_to_num(image.values).max(axis=1)
+    loud = image["range"].values[profile > 0.01 * profile.max()]
+    assert (np.ptp(loud) > 2.0) == (len(times) > 1)
+
+
 def test_a_range_image_without_ranges_is_refused_in_one_line() -> None:
     with pytest.raises(FieldError, match=r"scene\.sonar\.ranges: is left out: a range image needs near, far and step"):
         plan(scene(PING, ranges=None), ["range_image"])
