@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import REFERENCE_PRESSURE, depth
+from sonarsynth.conventions import REFERENCE_PRESSURE, depth, evenly
 from sonarsynth.description import FieldError
 from sonarsynth.description.method import FrameSize
 from sonarsynth.environment.noise import Noise
 from sonarsynth.environment.noise.noise_field import SECONDS as DRAW_SECONDS
 from sonarsynth.geometry.motion import pose
+from sonarsynth.planning.measured.sampled_frames import MAX_SAMPLED_FRAMES
 from sonarsynth.receiver import SensorErrors
 from sonarsynth.signals.noise.drawing import coherence_error, seconds
 from sonarsynth.sources.noise_source import NoiseRecording, NoiseSource
@@ -101,10 +102,11 @@ def _source_rows(plan: Plan) -> list[NoiseRow]:
 
 
 def _passing(plan: Plan, source: NoiseSource) -> float:
-    """How far (degree) a source and the array pass each other in a record, at most."""
+    """How far (degree) a source and the array pass each other in a record, at most, by the frames that a plan samples
+    of one sequence."""
     trajectory, off = plan.scene.trajectory, 0.0
     longest = plan.windows.samples / plan.scene.sonar.sampling_frequency
-    for step in range(trajectory.frames):
+    for step in evenly(trajectory.frames, MAX_SAMPLED_FRAMES):
         time = trajectory.time(step)
         first, last = (
             pose(source.motion, at).position - pose(trajectory.sonar, at).position for at in (time, time + longest)
