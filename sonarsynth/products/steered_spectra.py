@@ -40,7 +40,8 @@ class Snapshots:
 
     def having(self, spectra: Spectra) -> Snapshots:
         """The same window with other spectra (sensor, bin)."""
-        return replace(self, bins=range(len(self.frequency)), transform=partial(_some, spectra, self), begin=0)
+        some = partial(_some, spectra, self.frequency / self.sampling_frequency)
+        return replace(self, bins=range(len(self.frequency)), transform=some, begin=0)
 
     def every(self, step: int, first: int, begin: float = 0.0, *, together: bool = False) -> Snapshots:
         """Every step-th bin from the `first` on, whose transform is their own, unless that of all is made, or is to be,
@@ -75,8 +76,19 @@ class Snapshots:
         before and after it, to the beginning of which phases then refer. As it is where no k over 1 is possible.
 
         Silent is what single precision leaves of the loudest. `PARTS` is a multiple of k, and what is left begins at a
-        quarter of such a part: so its delays are among those of the whole.
+        quarter of such a part: so its delays are among those of the whole. Found once: it is imaged and ranged.
         """
+        part = self._parts.get(margin) or self._without_silence(margin)
+        if part is not self:
+            self._parts[margin] = part
+        return part
+
+    @cached_property
+    def _parts(self) -> dict[float, Snapshots]:
+        """By their margins, s."""
+        return {}
+
+    def _without_silence(self, margin: float) -> Snapshots:
         heard = np.flatnonzero(self.sample_power > np.finfo(np.float32).eps ** 2 * self.sample_power.max(initial=0.0))
         around, whole = margin * self.sampling_frequency, self.sampling_frequency / self.spacing
         first, stop = (heard[0] - around, heard[-1] + 1 + around) if len(heard) else (0.0, whole)
@@ -89,10 +101,10 @@ class Snapshots:
         return self
 
 
-def _some(spectra: Spectra, of: Snapshots, bins: range, begin: float) -> Spectra:
-    """As `Snapshots.transform`, of spectra (sensor, bin) that are given."""
+def _some(spectra: Spectra, frequency: Floats, bins: range, begin: float) -> Spectra:
+    """As `Snapshots.transform`, of spectra (sensor, bin) that are given, at frequencies (bin,) in turns a sample."""
     some = slice(bins.start, None, bins.step)
-    turn = np.exp(2j * np.pi * of.frequency[some] * begin / of.sampling_frequency).astype(np.complex64)
+    turn = np.exp(2j * np.pi * frequency[some] * begin).astype(np.complex64)
     return spectra[:, some] * turn if begin else spectra[:, some]
 
 

@@ -21,34 +21,36 @@ OVERLAP = 0.03
 by 0.01 dB rms with two bounces; by 0.02, and 0.3 at most, where it is 0.1."""
 LONGEST = 0.8
 """Longest sound that the ends of the band are weighted for, over the inverse of the bins' distance."""
-FEWEST = 84
-"""Bins that are left, at least: of 64 the ends of the band err by 0.01 to 0.03 dB, of 84 by 0.002 to 0.03, 0.01 on
+FEWEST = 83
+"""Bins that are left, at least: of 64 the ends of the band err by 0.01 to 0.03 dB, of 83 by 0.001 to 0.03, 0.01 on
 average (remus.yaml)."""
 TOGETHER = 4
-"""Every fourth bin or more are taken from the transform of all: ranging needs as many, and it takes no longer."""
+"""Every fourth bin or more are taken from the transform of all: it takes no longer."""
 WEIGHTED = 200
 """Most bins whose weights are solved for: of more, those in the middle weigh one. Over 600 to 1000 bins that changes
 weights by 1e-4, and the sum by 1e-5 of what the weights leave wrong."""
 
 
-def fewer_bins(snapshots: Snapshots, travel_time: float) -> Snapshots:
+def fewer_bins(snapshots: Snapshots, transit: float, widest: float = 1.0) -> Snapshots:
     """Every k-th bin of a window, weighted so that energies of beams are those of all bins; all, where sound lasts as
-    long as the window.
+    long as the window. They are among those that ranging takes, where a part of the window has all of its sound.
 
-    travel_time (s): of sound from the widest beam over half of the array, by which that spreads out what comes from
-    elsewhere.
+    transit (s): of sound over half of the array; widest: sine of the angle to the widest beam.
     """
-    bins = len(snapshots.frequency)
-    step = _longest_step(snapshots, travel_time, bins // FEWEST)
+    bins, part = len(snapshots.frequency), snapshots.without_silence(transit)
+    least = round(part.spacing / snapshots.spacing)
+    step = _longest_step(snapshots, widest * transit, len(part.frequency) // FEWEST, least)
     if step < 2:
         return snapshots
-    chosen, weight = weighted_bins(bins, step)
-    few = snapshots.every(step, int(chosen[0]), together=step <= TOGETHER)
+    skipped = (len(part.frequency) - 1) % (step // least) // 2
+    weight = weighted_bins(bins, step, round((part.frequency[skipped] - snapshots.frequency[0]) / snapshots.spacing))[1]
+    few = part.every(step // least, skipped, together=least > 1 or step <= TOGETHER)
     return few.having(few.spectra * np.sqrt(weight).astype(np.float32))
 
 
-def _longest_step(snapshots: Snapshots, travel_time: float, most: int) -> int:
-    """From bin to bin, `most` at most, with which `OVERLAP` is kept: of all sensors together, give or take a block."""
+def _longest_step(snapshots: Snapshots, travel_time: float, most: int, least: int) -> int:
+    """From bin to bin, in steps of `least` with which `OVERLAP` is kept, and `most` of them: of all sensors together,
+    give or take a block. travel_time (s): by which the array spreads out what comes from elsewhere."""
     rate, power = snapshots.sampling_frequency, snapshots.sample_power
     block = max(round(travel_time * rate), -(-len(power) // 256))
     amplitude = np.sqrt(np.add.reduceat(power, np.arange(0, len(power), block), dtype=float))
@@ -56,20 +58,21 @@ def _longest_step(snapshots: Snapshots, travel_time: float, most: int) -> int:
     shared[: len(amplitude)] = np.correlate(amplitude, amplitude, "full")[len(amplitude) - 1 :]
     about = np.maximum(shared[:-1], shared[1:])
     length = round(rate / snapshots.spacing)
-    for step in (step for step in range(most, 1, -1) if step <= TOGETHER or length % step == 0):
+    for step in (n for n in range(most * least, least, -least) if least > 1 or n <= TOGETHER or length % n == 0):
         late = np.arange(1, step) * (rate / (step * snapshots.spacing * block))
         if 2.0 * about[late.astype(int)].sum() <= OVERLAP * shared[0]:
             return step
-    return 1
+    return least
 
 
 @lru_cache(maxsize=64)
-def weighted_bins(bins: int, step: int) -> tuple[Ints, Floats]:
-    """Every `step`-th of so many bins, and weights, about one, with which `step` times their sum is that over all."""
-    chosen = np.arange((bins - 1) % step // 2, bins, step)
+def weighted_bins(bins: int, step: int, first: int | None = None) -> tuple[Ints, Floats]:
+    """Every `step`-th of so many bins, from the `first` on or as many at either end left out, and weights, about one,
+    with which `step` times their sum is that over all."""
+    chosen = np.arange((bins - 1) % step // 2 if first is None else first, bins, step)
     unweighted = len(chosen) - WEIGHTED
     if unweighted > 0:
-        ends = weighted_bins(bins - unweighted * step, step)[1]
+        ends = weighted_bins(bins - unweighted * step, step, int(chosen[0]))[1]
         return chosen, np.insert(ends, WEIGHTED // 2, np.ones(unweighted))
     longest = LONGEST / step  # periods of a cosine over a bin
     turns = 2.0 * np.pi * np.linspace(0.0, longest, int(6 * bins * longest) + 8)

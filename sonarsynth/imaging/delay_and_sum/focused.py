@@ -102,7 +102,7 @@ class FocusedDelayAndSum(Steering):
         weight, grid, speed = weights(elements, self.shading), sonar.beams, sonar.assumed_sound_speed
         if self.bins == "few":
             widest = sin(0.5 * max(grid.azimuth_span, grid.elevation_span))
-            snapshots = fewer_bins(snapshots, widest * elements.aperture / speed)
+            snapshots = fewer_bins(snapshots, elements.aperture / speed, widest)
         spectra, frequency = snapshots.spectra, snapshots.frequency
         zones = steered_zones(elements, grid, self.focus, speed, self._cut(elements, sonar))
         return snapshots.unit * lattice_image(spectra, elements, weight, frequency, grid, zones)
