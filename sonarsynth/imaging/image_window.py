@@ -24,9 +24,11 @@ def snapshots_of(signals: Signals, sonar: Sonar, start: float, stop: float) -> S
 
     Raises ValueError when the window reaches outside the signals, or is too short to resolve the band.
     """
-    rate = signals.sampling_frequency
+    from sonarsynth.equations.kernels.sensor_rows import heard_power
+
+    rate, band = signals.sampling_frequency, (sonar.band.low, sonar.band.high)
     first, count = gate_samples(start, stop, signals.start, rate, signals.pressure.shape[1])
-    gate = gate_of(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
+    gate = gate_of(signals.pressure, rate, first, count, band, heard_power(signals, first, first + count)[0])
     spacing, begin = frequency_spacing(count, rate), signals.start + first / rate
     return Snapshots(gate.frequency, spacing, gate.bins, gate, begin, count, rate, gate.power)
 

@@ -6,7 +6,7 @@ the clock cancel: what is left is the delay.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -43,6 +43,10 @@ EDGE = 0.1
 """Share of the band, at either end, within which a pulse may end and be tapered over all of the band: by 0.1 there."""
 FLAT = 0.75
 """Share of the window about a pulse in which that is whole, as `pulse_times.align` cuts."""
+ENOUGH, ALIKE = 168, 0.99
+"""Sensors that the direct pulse is taken from, where it is so much of all that they hear about it; else all."""
+MARGIN = 2e-5
+"""s: more of the record than the pulse takes, for where samples fall."""
 RESIDUE = 1e-7
 """Of the loudest pressure: what the tail of the direct pulse may still be in the echo window, as synthesis cuts it."""
 
@@ -151,8 +155,14 @@ def direct_spectrum(
     """
     c, front = sonar.assumed_sound_speed, PlaneWaveFit.of(estimates)
     half = max(pulse / FLAT, pulse_times.PULSE_HALF)
-    aligned = pulse_times.cut(signals, elements.gain, front.delays(elements, c), half, None)
-    wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
+    near, begin = pulse_times.excerpt(signals, front.time, half + pulse_times.transit(elements, c) + MARGIN)
+    for rows in (slice(None, None, max(elements.count // ENOUGH, 1)), slice(None)):
+        own, some = elements.select(rows), replace(signals, pressure=np.ascontiguousarray(near[rows]), start=begin)
+        aligned = pulse_times.cut(some, own.gain, front.delays(own, c), half, None)
+        wave = pulse_times.waveform(aligned, own, c, front.direction, front.curvature, front.time)
+        heard = np.abs(aligned.spectrum).ravel()
+        if len(own.gain) == elements.count or wave.power @ np.abs(wave.template) ** 2 > ALIKE * heard @ heard:
+            break
     return template_spectrum(wave.template, length)
 
 

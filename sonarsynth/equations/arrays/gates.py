@@ -158,14 +158,15 @@ def _turned_taper(count: int, sampling_frequency: float, bins: int, begin: int) 
 
 def gate_of(
     pressure: npt.NDArray[np.floating], sampling_frequency: float, first_sample: int, count: int,
-    band: tuple[float, float],
+    band: tuple[float, float], power: Floats | None = None,
 ) -> Gate:  # fmt: skip
-    """The gate of `count` samples of pressure (sensor, sample) Pa, and its bins in a band (low, high) in Hz. Raises
-    ValueError when no frequency in band is below half the sampling frequency."""
+    """The gate of `count` samples of pressure (sensor, sample) Pa, and its bins in a band (low, high) in Hz; its power
+    (sample,) where that is known. Raises ValueError when no frequency in band is below half the sampling frequency."""
     from sonarsynth.equations.kernels.sensor_rows import power_and_peak
 
     bins, every = range(*band_bins(count, sampling_frequency, band)), np.ones(len(pressure), bool)
-    power, _ = power_and_peak(pressure, every, first_sample, first_sample + count)
+    if power is None:
+        power, _ = power_and_peak(pressure, every, first_sample, first_sample + count)
     return Gate(pressure, sampling_frequency, first_sample, count, bins, power)
 
 

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from sonarsynth.compiling import compiled
+from sonarsynth.products import Signals
+
+_whole: WeakKeyDictionary[Signals, Any] = WeakKeyDictionary()
+"""Of signals: power and peak of all sensors, as of `heard_power` over the whole record."""
 
 
 @compiled
@@ -35,6 +40,19 @@ def power_and_peak(pressure: Any, live: Any, first: int, stop: int) -> Any:
             low, top = max(abs(a[n]), abs(b[n]), abs(c[n]), abs(d[n])), max(abs(e[n]), abs(f[n]), abs(g[n]), abs(h[n]))
             high[n] = max(high[n], low, top)
     return power, float(high.max()) if samples > 0 else 0.0
+
+
+def heard_power(signals: Signals, first: int, stop: int) -> Any:
+    """As `power_and_peak`, of all sensors. Memory is read once: a part of a record whose whole was asked for before is
+    cut out of that, with its peak."""
+    pressure = signals.pressure
+    if signals not in _whole:
+        of_part = power_and_peak(pressure, np.ones(len(pressure), bool), first, stop)
+        if stop - first < pressure.shape[1]:
+            return of_part
+        _whole[signals] = of_part
+    power, peak = _whole[signals]
+    return power[first:stop], peak
 
 
 @compiled

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from sonarsynth.conventions import Bools, Floats, azimuth_elevation
-from sonarsynth.equations.kernels.sensor_rows import power_and_peak
+from sonarsynth.equations.kernels.sensor_rows import heard_power, power_and_peak
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Signals, SourceEstimates
@@ -75,7 +75,8 @@ def loudness(signals: Signals, live: Bools, length: int) -> PowerTrack:
 
     The quiet power is the tenth part from below of short means: a snap and its echoes fill no more of the signals.
     """
-    power, peak = power_and_peak(signals.pressure, live, 0, signals.pressure.shape[1])
+    every = 0, signals.pressure.shape[1]
+    power, peak = heard_power(signals, *every) if live.all() else power_and_peak(signals.pressure, live, *every)
     track = uniform_filter1d(power, min(length, len(power)), mode="constant")
     tenth = len(power) // 10
     quiet = np.sort(uniform_filter1d(power, min(16, len(power))))[tenth]  # NumPy's `partition` takes ten times as long
