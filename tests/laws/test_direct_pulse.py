@@ -14,12 +14,13 @@ from sonarsynth.imaging import Clean, FocusedDelayAndSum
 from sonarsynth.planning import plan
 from sonarsynth.planning.measured.lost_echoes import losses
 from sonarsynth.products import SourceEstimates
-from sonarsynth.ranging import SensorDelays
+from sonarsynth.ranging import SensorDelays, range_profiles
 from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
-from sonarsynth.receiver import BeamGrid, Converter, PlanarLattice, Sonar, elements
+from sonarsynth.ranging.range_profiles import direct_spectrum
+from sonarsynth.receiver import BeamGrid, Converter, PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.recipe.scene import Processing
 from sonarsynth.state import Receiver, Survey
-from tests.heard import add_noise, cloud_of, hear, pulse_spectrum, silence
+from tests.heard import RATE, add_noise, cloud_of, hear, pulse_spectrum, silence
 from tests.scenes import point_scene
 
 C = 1500.0
@@ -75,6 +76,21 @@ def imaged(signals, excess, estimates=None, method=IMAGE):
         return method.image(some, ARRAY, SONAR, start, stop)
 
     return trusted(imaging(left, *window), signals, left, SONAR, imaging, CLOCK - LENGTH)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 0.3])
+def test_some_sensors_tell_the_direct_pulse_where_they_hear_what_all_do(noise, monkeypatch):
+    """noise: root mean square, over the peak of the pulse. Where that hides part of it, all of 508 are heard."""
+    array, random = elements(Romanis()), np.random.default_rng(3)
+    pulse = hear(silence(array, START, 1000), array, SNAP, 0.0, 1.0, C)
+    heard = add_noise(pulse, noise * float(np.abs(pulse.pressure).max()), random)
+    some = direct_spectrum(heard, located(direct()), array, SONAR, 1152, 1e-4)
+    monkeypatch.setattr(range_profiles, "ENOUGH", array.count)
+    every = direct_spectrum(heard, located(direct()), array, SONAR, 1152, 1e-4)
+    band = slice(round(25e3 * 1152 / RATE), round(85e3 * 1152 / RATE))
+    wrong = np.abs(some - every)[band].max() / np.abs(every).max()
+    assert (wrong == 0.0) == (noise == 0.3)
+    assert wrong < 2e-3
 
 
 BENT = 40e-9 * np.sin(np.linspace(0, 9, ARRAY.count)), 1 + 0.01 * np.cos(np.linspace(0, 20, ARRAY.count))

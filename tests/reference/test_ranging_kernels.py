@@ -11,9 +11,10 @@ from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import element_directivity, focus_delay
 from sonarsynth.equations.kernels.lanes import LANES, store
 from sonarsynth.equations.kernels.phasors import phasors
-from sonarsynth.equations.kernels.sensor_rows import power_and_peak
+from sonarsynth.equations.kernels.sensor_rows import heard_power, power_and_peak
 from sonarsynth.imaging.delay_and_sum.lattice_beams import LatticeBeams
 from sonarsynth.imaging.delay_and_sum.lattice_sums import TERM, sums_of_one, sums_of_two
+from sonarsynth.products import Signals
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location.pulse_times import in_band
 from sonarsynth.ranging.range_profiles import HALFWAY, template_spectrum
@@ -126,6 +127,17 @@ def test_powers_count_who_is_live(sensors):
         power, peak = power_and_peak(pressure, live, some.start, some.stop)
         np.testing.assert_allclose(power, np.sum(pressure[live, some].astype(float) ** 2, axis=0), rtol=1e-14)
         assert peak == np.abs(pressure[live, some]).max()
+
+
+def test_power_of_a_part_of_a_record_is_that_of_its_whole():
+    """Whether the whole was asked for before or not, bit for bit."""
+    signals = Signals(np.random.default_rng(3).normal(size=(11, 50)).astype(np.float32), 0.0, 196e3, 0.0, 0, 0)
+    before = heard_power(signals, 7, 41)[0]
+    every, peak = heard_power(signals, 0, 50)
+    after, same = heard_power(signals, 7, 41)
+    np.testing.assert_array_equal(before, after)
+    np.testing.assert_array_equal(before, every[7:41])
+    assert peak == same == np.abs(signals.pressure).max()
 
 
 def test_lags_and_templates_are_the_sums_of_their_formulas():
