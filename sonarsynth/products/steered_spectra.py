@@ -43,10 +43,10 @@ class Snapshots:
         some = partial(_some, spectra, self.frequency / self.sampling_frequency)
         return replace(self, bins=range(len(self.frequency)), transform=some, begin=0)
 
-    def every(self, step: int, first: int, begin: float = 0.0, *, together: bool = False) -> Snapshots:
-        """Every step-th bin from the `first` on, whose transform is their own, unless that of all is made, or is to be,
-        `together`, or its length is no multiple of the step; phases refer to a sample `begin` later."""
-        together = together or "spectra" in vars(self) or round(self.sampling_frequency / self.spacing) % step > 0
+    def every(self, step: int, first: int, begin: float = 0.0) -> Snapshots:
+        """Every step-th bin from the `first` on, whose transform is their own, unless that of all is made or its length
+        is no multiple of the step; phases refer to a sample `begin` later."""
+        together = "spectra" in vars(self) or round(self.sampling_frequency / self.spacing) % step > 0
         of = self.having(self.spectra) if together else self
         frequency, bins, begin = self.frequency[first::step], of.bins[first::step], of.begin + begin
         start = self.start + (begin - of.begin) / self.sampling_frequency

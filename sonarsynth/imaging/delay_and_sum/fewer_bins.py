@@ -22,10 +22,8 @@ by 0.01 dB rms with two bounces; by 0.02, and 0.3 at most, where it is 0.1."""
 LONGEST = 0.8
 """Longest sound that the ends of the band are weighted for, over the inverse of the bins' distance."""
 FEWEST = 83
-"""Bins that are left, at least: of 64 the ends of the band err by 0.01 to 0.03 dB, of 83 by 0.001 to 0.03, 0.01 on
-average (remus.yaml)."""
-TOGETHER = 4
-"""Every fourth bin or more are taken from the transform of all: it takes no longer."""
+"""Bins that are left, at least: of 64 the ends of the band err by 0.01 to 0.03 dB, of 83 by 0.001 to 0.03, 0.008
+rms (remus.yaml)."""
 WEIGHTED = 200
 """Most bins whose weights are solved for: of more, those in the middle weigh one. Over 600 to 1000 bins that changes
 weights by 1e-4, and the sum by 1e-5 of what the weights leave wrong."""
@@ -44,7 +42,7 @@ def fewer_bins(snapshots: Snapshots, transit: float, widest: float = 1.0) -> Sna
         return snapshots
     skipped = (len(part.frequency) - 1) % (step // least) // 2
     weight = weighted_bins(bins, step, round((part.frequency[skipped] - snapshots.frequency[0]) / snapshots.spacing))[1]
-    few = part.every(step // least, skipped, together=least > 1 or step <= TOGETHER)
+    few = part.having(part.spectra).every(step // least, skipped)
     return few.having(few.spectra * np.sqrt(weight).astype(np.float32))
 
 
@@ -57,8 +55,7 @@ def _longest_step(snapshots: Snapshots, travel_time: float, most: int, least: in
     shared = np.zeros(2 * len(amplitude) + 1)  # by blocks later
     shared[: len(amplitude)] = np.correlate(amplitude, amplitude, "full")[len(amplitude) - 1 :]
     about = np.maximum(shared[:-1], shared[1:])
-    length = round(rate / snapshots.spacing)
-    for step in (n for n in range(most * least, least, -least) if least > 1 or n <= TOGETHER or length % n == 0):
+    for step in range(most * least, least, -least):
         late = np.arange(1, step) * (rate / (step * snapshots.spacing * block))
         if 2.0 * about[late.astype(int)].sum() <= OVERLAP * shared[0]:
             return step
