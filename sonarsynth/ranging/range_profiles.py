@@ -45,8 +45,6 @@ FLAT = 0.75
 """Share of the window about a pulse in which that is whole, as `pulse_times.align` cuts."""
 ENOUGH, ALIKE = 168, 0.99
 """Sensors that the direct pulse is taken from, where it is so much of all that they hear about it; else all."""
-MARGIN = 2e-5
-"""s: more of the record than the pulse takes, for where samples fall."""
 RESIDUE = 1e-7
 """Of the loudest pressure: what the tail of the direct pulse may still be in the echo window, as synthesis cuts it."""
 
@@ -155,7 +153,8 @@ def direct_spectrum(
     """
     c, front = sonar.assumed_sound_speed, PlaneWaveFit.of(estimates)
     half = max(pulse / FLAT, pulse_times.PULSE_HALF)
-    near, begin = pulse_times.excerpt(signals, front.time, half + pulse_times.transit(elements, c) + MARGIN)
+    around = half + pulse_times.transit(elements, c) + 2.0 / signals.sampling_frequency
+    near, begin = pulse_times.excerpt(signals, front.time, around)
     for rows in (slice(None, None, max(elements.count // ENOUGH, 1)), slice(None)):
         own, some = elements.select(rows), replace(signals, pressure=np.ascontiguousarray(near[rows]), start=begin)
         aligned = pulse_times.cut(some, own.gain, front.delays(own, c), half, None)
