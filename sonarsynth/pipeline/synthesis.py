@@ -113,7 +113,7 @@ def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> tuple[dict[int
 def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements, *, whole: bool = True) -> Signals:
     """Pressure at hydrophones, of arrivals that are expanded over all of them; the baffle weakens sound from behind.
     whole: as of `Reception`."""
-    reception = reception_of(plan, frame)._replace(elements=sensors, whole=whole)
+    reception = reception_of(plan, frame)._replace(elements=sensors, whole=whole, still=not frame.sonar_velocity.any())
     method, heard = plan.choices.synthesis, behind_baffle(arrivals, plan.scene.sonar)
     made = method.signals(heard, frame.moment.snaps, reception)
     samples = (reception.samples,) if whole else np.shape(getattr(made, "pressure", 0))[1:]

@@ -105,7 +105,7 @@ class DirectSum(UnroundedSynthesis):
 
     def pressure(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> tuple[Floats, int]:
         """As `UnroundedSynthesis.pressure`; the period of the transform is the window and a pulse at either end."""
-        elements, sonar, absorption, start, samples, _ = reception
+        elements, sonar, absorption, start, samples, *_ = reception
         fs = sonar.sampling_frequency
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
         front = from_the_sharpest(front, 0.5 * fs)  # elsewhere factors could be larger than numbers may be

@@ -3,7 +3,8 @@ domain."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
@@ -15,12 +16,13 @@ from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import stop_frequency
-from sonarsynth.signals.array_paths import ArrayPaths, array_paths, reach
+from sonarsynth.signals.array_paths import ArrayPaths, array_paths, content, reach
 from sonarsynth.signals.direct_sum import UnroundedSynthesis, attenuation
 from sonarsynth.signals.gridded.bins import bins_of
 from sonarsynth.signals.gridded.deposit import add_segment
+from sonarsynth.signals.gridded.tiles import FEW
 from sonarsynth.signals.pulse_variation import from_the_sharpest
-from sonarsynth.signals.segments import GUARD, Layout, Reception, layout
+from sonarsynth.signals.segments import GUARD, Layout, Reception, Segment, layout
 from sonarsynth.state import Emission
 
 ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
@@ -63,13 +65,30 @@ def _neighbours_apart(paths: Ints) -> Ints:
     return paths[places[places < paths.size]]
 
 
-def _sounding(plan: Layout, front: ArrayPaths, sampling_frequency: float, samples: int) -> tuple[int, int]:
-    """First sample of a window, and the one after the last, between which its stretches are at all hydrophones."""
+def _sounding(plan: Layout, front: ArrayPaths, sampling_frequency: float, samples: int) -> list[tuple[int, int]]:
+    """Of each stretch, the first sample of the window where it is at any hydrophone, and the one after the last."""
     apart = int(np.ceil(reach(front).max(initial=0.0) * sampling_frequency)) + 2 * GUARD
-    low = min((span.first for span in plan.stretches), default=0) - apart
-    high = max((span.first + span.samples for span in plan.stretches), default=0) + apart
-    low = min(max(low, 0), samples)
-    return low, min(max(high, low), samples)
+    ends = [(span.first - apart, span.first + span.samples + apart) for span in plan.stretches] or [(0, apart)]
+    return [(min(max(low, 0), samples), min(max(high, 0), samples)) for low, high in ends]
+
+
+@dataclass(frozen=True)
+class _FewPaths:
+    """Few paths of a stretch, the same as others where all that is known of them is: in each frame of a still snap."""
+
+    content: tuple[Any, ...]
+    within: tuple[int, int]  # of the window: the first sample where they are heard, and the one after the last
+    span: Segment = field(compare=False)
+    paths: ArrayPaths = field(compare=False)
+
+
+@lru_cache(maxsize=4)
+def sound_of_few(few: _FewPaths, method: GriddedSynthesis, reception: Reception) -> npt.NDArray[Any]:
+    """Pressure (sensor, sample) of few paths, where they are heard."""
+    first, stop = few.within
+    out = np.zeros((reception.elements.count, stop - first), method.precision)
+    method.add(out, first, few.span, few.paths, reception)
+    return out
 
 
 @description
@@ -158,17 +177,28 @@ class GriddedSynthesis(UnroundedSynthesis):
     ) -> tuple[npt.NDArray[Any], int, int]:
         """Pressure (sensor, sample), the sample of the window where it begins, and the number of arrivals that the
         window cuts."""
-        elements, sonar, absorption, start, samples, whole = reception
+        elements, sonar, absorption, _, samples, whole, still = reception
         fs = sonar.sampling_frequency
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
         front = from_the_sharpest(front, stop_frequency(sonar.antialias))
         plan = layout(arrivals, front, snaps, reception, tolerance=0.01 * self.tolerance)
-        low, high = (0, samples) if whole else _sounding(plan, front, fs, samples)
+        sounding = _sounding(plan, front, fs, samples)
+        low, high = (0, samples) if whole else (min(low for low, _ in sounding), max(high for _, high in sounding))
         out = np.zeros((elements.count, high - low), self.precision)
-        method = (self.width, self.oversampling, self.precision, self.tolerance)
-        for span in plan.stretches:
-            paths, bins = bins_of(span, front.select(_neighbours_apart(span.paths)), sonar, absorption, self.tolerance)
-            origin, stop = start + span.first / fs, stop_frequency(sonar.antialias)
-            here = replace(span, first=span.first - low)
-            add_segment(out, here, paths, elements, bins, origin=origin, stop=stop, method=method)
+        for span, within in zip(plan.stretches, sounding, strict=False):
+            paths = front.select(_neighbours_apart(span.paths))
+            if paths.count > FEW or not still:
+                self.add(out, low, span, paths, reception)
+            else:
+                known = content(paths) + content(replace(span, paths=span.paths[:0]))
+                few = _FewPaths(known, within, span, paths)
+                out[:, within[0] - low : within[1] - low] += sound_of_few(few, self, reception)
         return out, low, plan.outside
+
+    def add(self, out: npt.NDArray[Any], begin: int, span: Segment, paths: ArrayPaths, reception: Reception) -> None:
+        """Add the pressure of the paths of a stretch to out (sensor, sample), from a sample of the window on."""
+        sonar, method = reception.sonar, (self.width, self.oversampling, self.precision, self.tolerance)
+        paths, bins = bins_of(span, paths, sonar, reception.absorption, self.tolerance)
+        origin, stop = reception.start + span.first / sonar.sampling_frequency, stop_frequency(sonar.antialias)
+        here = replace(span, first=span.first - begin)
+        add_segment(out, here, paths, reception.elements, bins, origin=origin, stop=stop, method=method)

@@ -36,6 +36,7 @@ class Reception(NamedTuple):
     start: float  # s: the first sample, by the clock of the arrivals
     samples: int
     whole: bool = True  # False: signals may begin later and end sooner, where there is silence in all that is left out
+    still: bool = False  # True: the array does not move, and may hear few paths again as they are
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +82,7 @@ def layout(
     coherent echoes apart, whose pulses are differentiated. tolerance: of its peak, what a pulse may still be at the
     ends of a segment.
     """
-    elements, sonar, _, start, samples, _ = reception
+    elements, sonar, _, start, samples, *_ = reception
     if samples < 1:
         raise ValueError("a window needs at least one sample")
     fs = sonar.sampling_frequency

@@ -18,7 +18,7 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.auto_synthesis import AutoSynthesis
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.signals.gridded.nodes import chebyshev, interpolation, nodes_for
-from sonarsynth.signals.gridded_synthesis import deposit_error
+from sonarsynth.signals.gridded_synthesis import deposit_error, sound_of_few
 from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
@@ -537,3 +537,26 @@ def test_the_same_bits_every_time() -> None:
     hears = hearing(of, SONAR, FACES, absorption)
     a, b = (GriddedSynthesis().signals(of, SNAPS, hears).pressure for _ in range(2))
     np.testing.assert_array_equal(a, b)
+
+
+def test_few_paths_that_differ_in_anything_are_heard_anew() -> None:
+    array = some_of(FACES, 60)
+    of, method = target_at(15.0, 3, 14, refracted=True), GriddedSynthesis()
+    hears = hearing(of, SONAR, array, absorption)._replace(still=True)
+    one = np.ones(len(of.delay))
+    for change in (
+        {"delay": of.delay + 1e-8},
+        {"amplitude": of.amplitude * np.where(np.arange(len(one)) == 1, 1.001, 1.0)},
+        {"radius": of.radius * 0.9},
+        {"phase": 0.01 * one},
+        {"doppler": 1e-4 * one},
+        {"delay_std": 1e-6 * one},
+        {"expansion": replace(of.expansion, delay=1.01 * of.expansion.delay)},
+        {"occluded": np.repeat(np.arange(1 + array.count // 8)[None] == 0, len(one), axis=0).astype(np.uint8)},
+    ):
+        first = method.signals(of, SNAPS, hears).pressure
+        other = method.signals(replace(of, **change), SNAPS, hears).pressure
+        assert not np.array_equal(first, other)
+        sound_of_few.cache_clear()
+        np.testing.assert_array_equal(method.signals(replace(of, **change), SNAPS, hears).pressure, other)
+        np.testing.assert_array_equal(method.signals(of, SNAPS, hears).pressure, first)
