@@ -275,13 +275,14 @@ def face_reach(front: Wavefronts, elements: Elements) -> Floats:
 def steered_spread(front: Wavefronts, rows: Ints | slice) -> float:
     """Bound (s) on how much sooner or later some paths meet any hydrophone than one front from among them, which meets
     the array centre when they do."""
-    aperture, far = front.aperture, np.array([np.ptp(along[rows]) for along in front.direction.T])
-    late = front.expansion.delay[rows]
+    aperture, curvature, late = front.aperture, front.curvature[rows], front.expansion.delay[rows]
     spread = 2.0 * (aperture / front.sound_speed + float(np.abs(late).sum(axis=1).max()))
-    if float(front.curvature[rows].max()) * aperture > 0.5:
+    if float(curvature.max()) * aperture > 0.5:
         return spread
+    direction = front.direction.T if isinstance(rows, slice) else np.take(front.direction.T, rows, axis=1)
+    far = [np.ptp(along) for along in direction]
     # |R d - q| - R varies with d by at most 2 |q|, with 1/R by at most |q|^2
-    apart = 2.0 * aperture * float(np.linalg.norm(far)) + aperture**2 * float(np.ptp(front.curvature[rows]))
+    apart = 2.0 * aperture * float(np.linalg.norm(far)) + aperture**2 * float(np.ptp(curvature))
     return min(spread, apart / front.sound_speed + float(sum(np.ptp(term) for term in late.T)))
 
 

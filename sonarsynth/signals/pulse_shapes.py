@@ -129,8 +129,8 @@ def shape_modes(
 
 def _times(weight: Floats, factor: Any, more: Floats, waves: Any) -> tuple[Floats, Any]:
     """The product of weight (path, given) @ factor (given, bin) and more (path, other) @ waves (other, bin)."""
-    both = weight[:, :, None] * more[:, None, :]
-    return both.reshape(len(both), -1), (factor[:, None] * waves).reshape(both.shape[1] * both.shape[2], -1)
+    both = np.multiply(weight.T[:, None], more.T, order="C")  # paths in the inner loop
+    return both.reshape(-1, len(weight)).T, (factor[:, None] * waves).reshape(len(both) * both.shape[1], -1)
 
 
 def _absorbed(loss: Floats, decay: Floats, tolerance: float) -> tuple[Floats, Floats]:

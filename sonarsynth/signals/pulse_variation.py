@@ -166,7 +166,7 @@ def rest(front: Wavefronts, paths: Ints, variation: PulseVariation, tolerance: f
 
 def pulses(front: Wavefronts, paths: Ints, over: ResidualVariation, variation: PulseVariation) -> tuple[Floats, Floats]:
     """Weights (pulse, mode) of the pulses of paths, with what some of them change by, and how loud (pulse,) each is."""
-    weight, loud = [front.modes[paths]], [np.abs(front.amplitude[paths])]
+    weight, loud = [np.take(front.modes, paths, axis=0)], [np.abs(np.take(front.amplitude, paths))]
     for change, size in zip(over.which, over.size, strict=True):
         weight.append(front.modes[over.paths] @ variation.onto[change])
         loud.append(np.abs(front.amplitude[over.paths]) * size)

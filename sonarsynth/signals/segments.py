@@ -96,12 +96,13 @@ def layout(
     audible = ~silent & (late > start) & (early < start + (samples - 1) / fs)
     stretches: list[Segment] = []
     waveforms, kind = [s.waveform for s in snaps], 2 * front.coherent + ~arrivals.direct
+    begin, end = early + before - plain[0], late - after + plain[1]
     for waveform in dict.fromkeys(waveforms):
         same = np.array([w == waveform for w in waveforms])[arrivals.snap] & audible
         for number in range(4):
             rows = np.flatnonzero(same & (kind == number))
-            for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
-                sooner, later = longer[:, chosen].max(axis=1)
+            for chosen in _runs(rows, begin, end):
+                sooner, later = np.take(longer, chosen, axis=1).max(axis=1)
                 delay, spread = front.delay[chosen] - start, steered_spread(front, chosen)
                 first = int(np.floor((delay.min() - sooner - spread) * fs)) - GUARD
                 length = fast_length(int(np.ceil((delay.max() + later + spread) * fs)) + GUARD + 1 - first)

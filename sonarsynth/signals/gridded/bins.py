@@ -134,6 +134,8 @@ def _shaped(front: ArrayPaths) -> bool:
 def _changing(front: ArrayPaths, highest: Floats, tolerance: float) -> ArrayPaths:
     """Paths without what their pulses change by over the aperture, up to the highest frequency (1,), where that is
     nothing beside the loudest."""
+    if not (front.expansion.phase.shape[1] or front.expansion.delay_variance.shape[1]):
+        return front
     loud = np.abs(front.amplitude)
     turn = np.linalg.norm(front.expansion.largest("phase") * loud)
     spread = np.linalg.norm(front.expansion.largest("delay_variance") * loud) * float(blur_exponent(highest)[0])

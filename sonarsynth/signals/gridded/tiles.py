@@ -77,6 +77,7 @@ class _Probes(NamedTuple):
 
     points: Floats  # (point, xyz)
     size: Floats  # (xyz) m: half of the box
+    far: Floats  # (xyz) m: no hydrophone is farther from the array centre
 
 
 @lru_cache(maxsize=16)
@@ -85,7 +86,7 @@ def _probes(elements: Elements, near: bool) -> _Probes:
     axes = [np.unique([a, b]) for a, b in zip(low, high, strict=True)]
     corners = np.stack([g.ravel() for g in np.meshgrid(*axes, indexing="ij")], axis=1)
     points = elements.position if near else np.concatenate([corners, 0.5 * (low + high)[None]])
-    return _Probes(points, 0.5 * (high - low))
+    return _Probes(points, 0.5 * (high - low), np.maximum(np.abs(low), np.abs(high)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +103,8 @@ class _Views:
 
 
 def _views(front: Wavefronts, aim: TileSettings) -> _Views:
-    elements = aim.elements
-    near = bool(front.curvature.max() * np.linalg.norm(np.abs(elements.position).max(axis=0)) > 0.8)
-    probes = _probes(elements, near)
+    far = float(np.linalg.norm(_probes(aim.elements, False).far))
+    probes = _probes(aim.elements, near := bool(front.curvature.max() * far > 0.8))
     gradient = aperture_gradient(front, probes.points)
     bend = slopes(front, gradient, aim.weights[0] * aim.highest, aim.highest)
     amplitude = np.multiply(np.abs(front.amplitude), front.expansion.amplitude_degrees.T, order="C")
@@ -171,7 +171,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     modes, sizes = np.zeros((0, 0)), PLAIN
     if views.front.modes.shape[1]:
         modes, sizes = main_modes(*pulses(views.front, paths, over, aim.changes))
-    farther = views.front.attenuation * float(slope @ np.abs(aim.elements.position).max(axis=0))  # dB
+    farther = views.front.attenuation * float(slope @ probes.far)  # dB
     degrees = np.take(views.amplitude, paths, axis=1).sum(axis=1)
     shares = tuple((degrees / max(float(degrees.sum()), 1e-300)).tolist())
     extent = _Extent(
@@ -191,9 +191,9 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
 def _drift(front: Wavefronts, aim: TileSettings) -> Floats:
     """Half range (xyz, rad) of the phase that is left over a face, along each axis of the box, the largest of fronts:
     du_j/dq_i is -(e_i - u_i u)_j k/n; and of what absorption varies by (Np). inf about the source."""
-    size = _probes(aim.elements, False).size
+    _, size, far = _probes(aim.elements, False)
     k = front.curvature
-    nearest = 1.0 - k * float(np.linalg.norm(np.abs(aim.elements.position).max(axis=0)))
+    nearest = 1.0 - k * float(np.linalg.norm(far))
     if not nearest.min() > 0.2:
         return np.full(3, np.inf)
     scale = np.pi * aim.highest * aim.elements.face / front.sound_speed * k / nearest
