@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -100,18 +100,6 @@ class ArrayPaths(Wavefronts):
     coherent_fraction: Floats  # (path,) and
     height_delay_std: Floats  # (path,) s: of `facet_pulses.rough_factor`
     centre: float  # Hz, where the amplitudes hold
-
-
-def content(table: Any) -> tuple[Any, ...]:
-    """All that a table of columns, or a part of a layout, holds: to compare it by."""
-    return tuple(
-        (value.shape, value.tobytes())
-        if isinstance(value, np.ndarray)
-        else content(value)
-        if isinstance(value, Columns)
-        else value
-        for value in vars(table).values()
-    )
 
 
 def array_paths(

@@ -16,7 +16,7 @@ from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import stop_frequency
-from sonarsynth.signals.array_paths import ArrayPaths, array_paths, content, reach
+from sonarsynth.signals.array_paths import ArrayPaths, array_paths, reach
 from sonarsynth.signals.direct_sum import UnroundedSynthesis, attenuation
 from sonarsynth.signals.gridded.bins import bins_of
 from sonarsynth.signals.gridded.deposit import add_segment
@@ -76,7 +76,7 @@ def _sounding(plan: Layout, front: ArrayPaths, sampling_frequency: float, sample
 class _FewPaths:
     """Few paths of a stretch, the same as others where all that is known of them is: in each frame of a still snap."""
 
-    content: tuple[Any, ...]
+    known: tuple[Any, ...]
     within: tuple[int, int]  # of the window: the first sample where they are heard, and the one after the last
     span: Segment = field(compare=False)
     paths: ArrayPaths = field(compare=False)
@@ -190,7 +190,9 @@ class GriddedSynthesis(UnroundedSynthesis):
             if paths.count > FEW or not still:
                 self.add(out, low, span, paths, reception)
             else:
-                known = content(paths) + content(replace(span, paths=span.paths[:0]))
+                tables = paths.but(expansion=None), paths.expansion, replace(span, paths=span.paths[:0])
+                held = [value for table in tables for value in vars(table).values()]
+                known = tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in held)
                 few = _FewPaths(known, within, span, paths)
                 out[:, within[0] - low : within[1] - low] += sound_of_few(few, self, reception)
         return out, low, plan.outside
