@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import sonarsynth as ss
+from sonarsynth.planning.notes import target_notes
 
 
 def warnings(distance: float, law: ss.Kirchhoff | ss.MirrorLobe) -> str:
@@ -100,3 +101,30 @@ def test_a_body_that_stands_before_the_snap_is_noted_in_the_frames_that_have_no_
     assert line.startswith("ball: ") and "in 1 of 3 frames examined (first: frame 1)" in line
     located = [np.isfinite(ss.render(recipe, frame)["source_estimates/time"].values[0]) for frame in range(3)]
     assert located == [True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("shape", "law", "why"),
+    [
+        (ss.Cylinder(radius=0.01, length=1.0), ss.MirrorLobe(), "for `shape.edge` is left out"),
+        (ss.Cylinder(radius=0.1, length=1.0, edge=5e-3), ss.MirrorLobe(), "as `shape.edge` says"),
+        (ss.Sphere(radius=0.3, edge=0.1), ss.Kirchhoff(), "for the wavelength, by scene.sonar.band.high"),
+        (ss.Sphere(radius=0.3, edge=0.1), ss.MirrorLobe(), ""),
+    ],
+)
+def test_what_very_many_facets_cost_is_said_with_the_field_that_makes_them(
+    shape: ss.Cylinder | ss.Sphere, law: ss.Kirchhoff | ss.MirrorLobe, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(target_notes, "MANY_FACETS", 20_000)
+    body = ss.Target(name="needle", shape=shape, motion=ss.Still(position=(12.0, 0.0, -5.0)), scattering=law)
+    world = ss.World(
+        environment=ss.Environment(depth=20.0, sound_speed=ss.Isovelocity(speed=1540.0)),
+        targets=(body,),
+        sources=(ss.SnappingShrimp(name="rock", position=(3.0, 6.0)),),
+    )
+    plan = ss.plan(ss.Recipe(scene=ss.Scene(world=world)), [])
+    said = [line for line in plan.warnings if "facets up to" in line]
+    assert len(said) == bool(why)
+    for line in said:
+        assert line.startswith(f"needle: {len(plan.scene.meshes[0].faces)} facets up to ") and why in line
+        assert " s of one core and " in line and line.endswith(" of memory")

@@ -27,6 +27,7 @@ from sonarsynth.planning.notes.source_notes import (
     unlocated,
 )
 from sonarsynth.planning.notes.target_notes import (
+    facet_notes,
     focus_notes,
     hiding_notes,
     law_notes,
@@ -82,7 +83,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         some = noted(looks)
         lines += unlocated(scene) or lobe_notes(some) + direction_notes(some) + assumed_speed_notes(some)
     for look in noted(looks):
-        lines += hiding_notes(look) + mirror_notes(look) + overlap_notes(look)
+        lines += facet_notes(plan, look) + hiding_notes(look) + mirror_notes(look) + overlap_notes(look)
         lines += focus_notes(look) if plan.products & OF_BEAMS else []
         lines += _extent(look.scene, look.profile)
         lines += _cut(look.scene, look.profile.uniform)

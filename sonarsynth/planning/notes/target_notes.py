@@ -8,12 +8,14 @@ import numpy as np
 
 from sonarsynth.casting.ray_casting import occluded
 from sonarsynth.columns import alike
-from sonarsynth.conventions import Floats, direction, evenly
+from sonarsynth.conventions import Floats, direction, evenly, format_bytes
 from sonarsynth.equations.arrays.apertures import defocus_spread, focus_delay, live_gain
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.geometry.surfaces import longest_edge
 from sonarsynth.labels.views import box_in_view
 from sonarsynth.planning.measured.sampled_frames import SampledScene
+from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import extreme_waveforms
 from sonarsynth.products import View
 from sonarsynth.ranging.range_profiles import aperture_moments
@@ -27,6 +29,8 @@ from sonarsynth.targets.overlaps import overlap, sphere_round
 from sonarsynth.targets.shapes import Box
 from sonarsynth.targets.target import Target
 
+MANY_FACETS = 200_000
+"""Facets of a body over which what they cost is said: a frame takes seconds."""
 FRAMES = 64
 """Frames of a sequence that bodies are compared in, at most; first and last among them."""
 LOSS_BEAMS, LOSS_BINS = 11, 64
@@ -47,6 +51,25 @@ def law_notes(look: SampledScene) -> list[str]:
     for target, law, body in targets:
         notes = (*body.mesh.notes, *off_origin(target, body.mesh), *law.validity(body))
         lines += [f"{target.name}: {line}" for line in notes]
+    return lines
+
+
+def facet_notes(plan: Plan, look: SampledScene) -> list[str]:
+    """Which bodies have very many facets, what these cost, and which field says how long they are."""
+    lines, seconds = [], sum(stage.seconds for stage in plan.stages)
+    for target, mesh in zip(look.scene.world.targets, look.scene.meshes, strict=True):
+        count, longest = len(mesh.faces), 1e3 * longest_edge((mesh.vertices, mesh.faces))
+        if count <= MANY_FACETS:
+            continue
+        why = "as `shape.edge` says" if target.shape.edge else "short as the body is thin, for `shape.edge` is left out"
+        if count > len(mesh_of(target.shape).faces):
+            why = "cut for the wavelength, by scene.sonar.band.high"
+        elif target.shape.plain is not None and not target.shape.edge:
+            why = "as its file, `shape.path`, has them"
+        lines.append(
+            f"{target.name}: {count} facets up to {longest:.3g} mm long, {why}: a frame takes about {seconds:.2g} s of "
+            f"one core and {format_bytes(plan.memory_bytes)} of memory"
+        )
     return lines
 
 
