@@ -21,7 +21,7 @@ from sonarsynth.environment.noise.directions import (
     SurfaceDirections,
 )
 from sonarsynth.equations.noise.filters import response
-from sonarsynth.equations.noise.lattice_coherence import lag_covariance
+from sonarsynth.equations.noise.lattice_coherence import MARGIN, CovarianceMap
 from sonarsynth.equations.noise.wave_directions import quadrature
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import Signals
@@ -60,8 +60,9 @@ def direct_coherence(directions: NoiseDirections, apart: Floats, k: float, pose:
 @pytest.mark.parametrize(("directions", "worst"), [(IsotropicDirections(), 1e-5), (SurfaceDirections(), 1e-5)])
 def test_coherence_is_the_closed_form_of_cron_and_sherman(directions: NoiseDirections, worst: float) -> None:
     k, pitch = 2.0 * np.pi * 25e3 / C, 49.53e-3
-    toward, weight = quadrature(directions.intensity, directions.edges, 2.0 * k)
-    found = lag_covariance(toward @ LEVEL, weight, (k * pitch, k * pitch), 0.0, (26, 26))
+    reach = 26 * k * pitch
+    toward, weight = quadrature(directions.intensity, directions.edges, 1.5 * reach + MARGIN)
+    found = CovarianceMap.of(toward @ LEVEL, weight, reach).at_lags(k * pitch, 0.0, (26, 26))
     x = k * pitch * np.arange(1, 26)
     if directions.kind == "isotropic":
         across, up = np.sin(x) / x, np.sin(x) / x
@@ -74,6 +75,25 @@ def test_coherence_is_the_closed_form_of_cron_and_sherman(directions: NoiseDirec
     assert found[0, 0] == pytest.approx(1.0, abs=1e-6)
     np.testing.assert_allclose(found[1:26, 0], across, atol=worst)
     np.testing.assert_allclose(found[0, 1:26], up, atol=worst)
+
+
+@pytest.mark.parametrize("frequency", [5e3, 85e3])
+def test_one_map_of_covariances_holds_those_of_faces_at_all_lower_frequencies(frequency: float) -> None:
+    """Its waves and their sum were worked out anew for each of hundreds of frequencies: planning took half a minute."""
+    k, most, pitch, face, directions = (
+        2.0 * np.pi * frequency / C,
+        2.0 * np.pi * 90e3 / C,
+        0.03,
+        0.025,
+        BottomDirections(),
+    )
+    toward, weight = quadrature(directions.intensity, directions.edges, 1.5 * most * 0.325 + MARGIN)
+    wave = toward @ TILTED.turn_to_body(np.eye(3))
+    found = CovarianceMap.of(wave, weight, most * 0.325).at_lags(k * pitch, k * face, (10, 8))
+    heard = weight * np.prod(np.sinc(0.5 * k * face * wave[:, 1:] / np.pi) ** 2, axis=1)
+    for m, n in ((0, 0), (1, -1), (9, 7), (-4, 0)):
+        exact = np.sum(heard * np.exp(1j * k * pitch * (m * wave[:, 1] + n * wave[:, 2])))
+        assert abs(found[m, n] - exact) < 1e-5
 
 
 ARRAY_GAIN = {  # dB, beams of elevation 0, -5, +20 deg at 25, 50 and 85 kHz

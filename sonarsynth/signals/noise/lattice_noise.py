@@ -12,7 +12,7 @@ from scipy.fft import fft2, ifft2, next_fast_len
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.environment.noise.directions import NoiseDirections
 from sonarsynth.equations.noise.complex_normals import complex_normals
-from sonarsynth.equations.noise.lattice_coherence import lag_covariance, periodic_powers
+from sonarsynth.equations.noise.lattice_coherence import MARGIN, CovarianceMap, periodic_powers
 from sonarsynth.equations.noise.wave_directions import quadrature
 from sonarsynth.receiver import Elements
 
@@ -20,7 +20,7 @@ TORUS = (1.0, 1.15, 1.4)
 """Sizes of the torus that are tried, over twice that of the lattice: the first that errs little enough is taken."""
 GOOD, FAIR = 5e-3, 0.05
 """Error of coherence that is little enough; and the largest that is put up with."""
-ROUNDS = 8
+ROUNDS = 10
 STEP = 0.75
 """rad: how much the phase over the lattice may change from one frequency that is worked out to the next."""
 POWERS = 1 << 28
@@ -107,29 +107,24 @@ def _powers(
     used = lattice.used(lags)
     away = np.hypot(*np.meshgrid(*(np.fft.fftfreq(2 * lag, 0.5 / lag) for lag in lags), indexing="ij")) * lattice.pitch
     powers, worst = np.empty((frequency.size, *used.shape), np.float32), 0.0
-    reach, turned = max(lattice.extent, lattice.pitch * min(lags)), _turn(np.array(lattice.up))
-    half = abs(lattice.up[0]) < 1e-9  # what comes from behind is as what comes from before
-    for n, f in enumerate(frequency.tolist()):
-        k = 2.0 * np.pi * f / lattice.sound_speed
-        toward, weight = _waves(directions, _rounded(k * (reach + lattice.face)), half)
-        turn = k * lattice.pitch
-        toward = toward @ turned
-        back = 0.5 if half else toward[:, 0] < 0.0
-        weight = weight * (1.0 - back * (1.0 - lattice.behind**2))
-        covariance = lag_covariance(toward, weight, (turn, turn), k * lattice.face, lags)
+    reach = max(lattice.extent, lattice.pitch * min(lags))
+    wave_numbers = 2.0 * np.pi * frequency / lattice.sound_speed
+    covariances = _covariances(directions, lattice, float(wave_numbers.max() * (reach + lattice.face)))
+    for n, k in enumerate(wave_numbers.tolist()):
+        covariance = covariances.at_lags(k * lattice.pitch, k * lattice.face, lags)
         spectrum, error = periodic_powers(np.where(away <= reach, covariance, 0.0), used, ROUNDS)
         powers[n], worst = spectrum, max(worst, error)
     return powers, worst
 
 
-def _rounded(degree: float) -> float:
-    """A degree, or a little more: so that few quadratures do for all frequencies."""
-    return float(2.0 ** (np.ceil(6.0 * np.log2(degree)) / 6.0))
-
-
 @lru_cache(maxsize=2)
-def _waves(directions: NoiseDirections, degree: float, half: bool) -> tuple[Floats, Floats]:
-    return quadrature(directions.intensity, directions.edges, degree, half)
+def _covariances(directions: NoiseDirections, lattice: Lattice, reach: float) -> CovarianceMap:
+    """Covariances of noise as the sonar hears it, up to a phase of `reach` (rad) from sensor to sensor."""
+    half = abs(lattice.up[0]) < 1e-9  # what comes from behind is as what comes from before
+    toward, weight = quadrature(directions.intensity, directions.edges, reach + MARGIN, half)
+    toward = toward @ _turn(np.array(lattice.up))
+    back = 0.5 if half else toward[:, 0] < 0.0
+    return CovarianceMap.of(toward, weight * (1.0 - back * (1.0 - lattice.behind**2)), reach)
 
 
 def _turn(up: Floats) -> Floats:
