@@ -239,6 +239,12 @@ def evenly(count: int, limit: int) -> list[int]:
     return sorted({int(n) for n in np.linspace(0, count - 1, min(limit, count)).round()})
 
 
+def scattered(count: int, among: int, first: float = 0.0) -> Ints:
+    """At most `count` of the numbers 0 to among - 1, ascending, all over them and in no step: by golden ratio, the
+    first of them at `first` of 1."""
+    return np.unique((np.mod(np.arange(count) * 0.6180339887498949 + first, 1.0) * among).astype(int))
+
+
 def counted(number: int, noun: str) -> str:
     """A number of things: "1 frame", "2 frames"."""
     return f"{number} {noun}" + ("" if number == 1 else "s")

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints, evenly
+from sonarsynth.conventions import Floats, Ints, evenly, scattered
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
 from sonarsynth.planning.measured.sampled_arrivals import pressures
@@ -170,8 +170,7 @@ def _mean(rows: dict[int, tuple[Pressures, float, float]]) -> float:
 
 def spread(live: Ints, count: int) -> Ints:
     """So many of the live hydrophones, spread by golden ratio, ascending; not those that a planner measures at."""
-    turns = np.mod((np.arange(count) + 0.23) * 0.6180339887498949, 1.0)
-    return np.unique(live[np.floor(turns * len(live)).astype(int)])
+    return live[scattered(count, len(live), 0.142)]
 
 
 def signal_point(plan: Plan, stage: str, knob: str, setting: str, error: float, seconds: float, **more: Any) -> Point:

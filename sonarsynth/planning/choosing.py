@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints, evenly
+from sonarsynth.conventions import Floats, Ints, evenly, scattered
 from sonarsynth.description.method import Demand
 from sonarsynth.planning.choices import OF_BEAMS, OWN_VIEW, Choices
 from sonarsynth.planning.measured.image_errors import SAFETY, beamformer
@@ -282,8 +282,7 @@ class PerSensorReference:
 def heard_at(elements: Elements, most: int = HEARD_AT) -> Ints:
     """Live hydrophones spread through an array, by golden ratio, ascending."""
     live = np.flatnonzero(elements.gain)
-    count = min(most, len(live))
-    return np.unique(live[np.floor(np.mod((np.arange(count) + 0.5) * 0.6180339887498949, 1.0) * len(live)).astype(int)])
+    return live[scattered(min(most, len(live)), len(live), 0.309017)]
 
 
 def _with_outermost(elements: Elements) -> Ints:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.conventions import azimuth_elevation, direction
+from sonarsynth.conventions import azimuth_elevation, direction, scattered
 from sonarsynth.environment.sea import Profile
 from sonarsynth.environment.sound_speed import mean_gradient
 from sonarsynth.equations.arrays.spherical_wave import envelope_peak, tangent_plane
@@ -18,9 +18,9 @@ from sonarsynth.geometry.motion import Hover, Track, pose, velocity
 from sonarsynth.planning.notes.source_notes import OBLIQUE, oblique_error
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
-from sonarsynth.ranging.location.locating import _few
+from sonarsynth.ranging.location.locating import FEW
 from sonarsynth.ranging.location.refraction import first_rays
-from sonarsynth.ranging.location.source_position import ACCEPTED, UNRESOLVED
+from sonarsynth.ranging.location.source_position import ACCEPTED, SILENT, UNRESOLVED
 from sonarsynth.ranging.location.triggered import Triggered
 from sonarsynth.receiver import Band, PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.state import Receiver, Survey, Trigger
@@ -47,7 +47,7 @@ def locate(
 def test_sensors_of_the_first_fit_are_all_over_the_array(columns, rows):
     """As wide and as high as it is, whatever its rows and columns: those of one row tell no direction."""
     q = elements(PlanarLattice(columns=columns, rows=rows, pitch=0.05)).position
-    few = q[_few(len(q))]
+    few = q[scattered(FEW, len(q))]
     assert len(few) <= 64
     assert np.all(few[:, 1:].std(axis=0) > 0.9 * q[:, 1:].std(axis=0))
     assert abs(np.corrcoef(few[:, 1:].T)[0, 1]) < 0.25  # of 64 by chance: 0.13
@@ -76,6 +76,17 @@ def test_an_array_of_which_every_second_sensor_stands_in_one_line():
     assert found.reason[0] == ACCEPTED
     assert found.azimuth[0] == pytest.approx(0.3, abs=1e-3)
     assert found.elevation[0] == pytest.approx(-0.2, abs=1e-4)
+
+
+def test_what_is_fainter_than_the_converter_rounds_is_no_pulse():
+    """Counts here and there before a snap, in a record that is silent besides: it was looked at with all sensors."""
+    source, step = 12.0 * direction(0.3, -0.2), 1e-3
+    heard = hear_direct(ROMANIS, source)
+    first = int((12.0 / C - 2.5e-3 - heard.start) * RATE)
+    counts = np.zeros_like(heard.pressure)
+    counts[::3, first : first + 40] = step
+    found = locate(replace(heard, pressure=heard.pressure + counts, quantum=step), ROMANIS, source, snaps=2)
+    assert found.reason.tolist() == [ACCEPTED, SILENT]
 
 
 def test_a_planar_array_hears_what_is_behind_it_in_front():

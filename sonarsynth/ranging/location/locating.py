@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Floats, Ints, scattered
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, robust_wave, spherical_wave, wavefront_delays
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
@@ -24,6 +23,7 @@ from sonarsynth.ranging.location.candidates import (
     when_heard,
 )
 from sonarsynth.ranging.location.pulse_times import AlignedPulse, Pulse
+from sonarsynth.ranging.location.sensor_delays import unlocatable
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
     ARRAY,
@@ -40,16 +40,14 @@ from sonarsynth.ranging.location.source_position import (
 from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.state import Receiver
 
+FEW = 64
+"""Sensors that the first fit is made of where it errs by under 0.01 periods of the band centre; else all."""
 ROUNDS = 4
 """Alignments of the sensors on the wavefront, at most; each improves the last, and the lags left settle the fit."""
 ASIDE = 1e-3
 """Of half a window that is cut out about a pulse: where one is farther aside of its pulse than that, all are cut anew.
 Cut aside of its pulse, a tail shifts it by 1 % of that: 16 ns, or 1.5 degrees, of a pulse of 3 kHz along the array.
 """
-FEW = 64
-"""Sensors that the first fit is made of where it errs by under 0.01 periods of the band centre; else all."""
-GOLDEN = 0.6180339887498949
-"""Steps of this part of an array of any rows and columns pick sensors all over it, and not those of one row."""
 CLEAR = 3e4
 """Energy of a pulse at a sensor over that of the noise in a bin, above which so few sensors are tried."""
 UNHEARD = 1e-3
@@ -68,18 +66,6 @@ PERIODS_OFF = 1 / 6
 taken a whole period early or late, and the pulse to come from a grating lobe."""
 MAX_LAG = 0.15
 """A pulse whose lags exceed this share of a period (root mean square, band centre) is not one wavefront."""
-
-
-@lru_cache(maxsize=16)
-def unlocatable(elements: Elements) -> str | None:
-    """Why an array can locate nothing; None where it can."""
-    live = elements.position[elements.gain != 0]
-    if len(live) < 3:
-        return f"{len(live)} live hydrophone{'s' * (len(live) != 1)}: a direction needs three that are not in line"
-    spread = np.linalg.svd(live - live.mean(axis=0), compute_uv=False)
-    if not spread[1] > 1e-6 * spread[0]:
-        return "the live hydrophones are in one line or in one place: they cannot tell a direction"
-    return None
 
 
 def locate(
@@ -107,29 +93,30 @@ def locate(
         return as_estimates([], snaps, BAND)
     if not signals.pressure.shape[1] or not snaps:
         return as_estimates([], snaps)
-    live = elements.gain != 0
-    half = pulse_times.transit(elements, sonar.assumed_sound_speed) + 2 * pulse_times.half_length(sonar.band)
-    width = int(2 * half * signals.sampling_frequency) | 1
-    loud = loudness(signals, live, width)
-    rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
-    quiet = quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
-    knowledge = SonarKnowledge(
-        elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, reflected
-    )
-    track, candidates = loud.track.copy(), Candidates(knowledge)
+    short, rate = pulse_times.half_length(sonar.band), signals.sampling_frequency
+    half = pulse_times.transit(elements, sonar.assumed_sound_speed) + 2 * short
+    width = int(2 * half * rate) | 1
+    live, flank = elements.gain != 0, int(2 * short * rate)
+    loud, count = loudness(signals, live, width, flank), int(live.sum())
+    rounding = pulse_times.rounding(signals, loud.peak, short)
+    quiet = quiet_bin(loud.quiet, count, sonar.band, short)
+    least = QUIET * max(loud.quiet, count * rounding * rate / (2 * short))
+    sea = bottom, gradient, rounding, quiet, on_bottom, kink, reflected
+    known = SonarKnowledge(elements, sonar, receiver.pose, *sea)
+    track, candidates = loud.track.copy(), Candidates(known)
 
     def look(heard: Signals, centre: float, power: float) -> Candidate:
-        own = when_heard(knowledge, receiver.track, centre)
+        own = when_heard(known, receiver.track, centre)
         return Candidate(centre, power, candidate(heard, own, centre, half, None if bend is None else bend(own.pose)))
 
     for _ in range(4 * snaps):
         top = _loudest(track, candidates, signals, snaps)
-        if top is None or not track[top] > QUIET * loud.quiet:
+        if top is None or not track[top] > least:
             break
-        candidates.found.append(look(signals, signals.start + top / signals.sampling_frequency, float(track[top])))
+        candidates.found.append(look(signals, signals.start + top / rate, float(track[top])))
         track[max(top - width, 0) : top + width + 1] = 0.0
     if snaps > 1:
-        candidates.look_beside(signals, receiver.track, width, QUIET * loud.quiet, look)
+        candidates.look_beside(signals, receiver.track, width, flank, least, look)
     return as_estimates(candidates.rows, snaps)
 
 
@@ -185,12 +172,39 @@ def fit_pulse(
     it is refused, of REASONS. velocity (sensor, xyz): m/s, sonar frame; quiet as `SonarKnowledge` has it.
 
     Envelope peaks of the sensors give eq. 6 in closed form, then the sphere, robustly; then the sensors are aligned
-    and their lags measured coherently, until these settle.
+    and their lags measured coherently, until these settle: of few sensors first, where these hear it clearly.
     """
-    first = _first_wave(signals, elements, sonar, centre, half, velocity, quiet)
+    first = _first_wave(signals, elements, sonar, centre, half, quiet)
     if first is None:
         return UNFIT
-    (wave, off, rows), c, q, rest = first, sonar.assumed_sound_speed, elements.position, elements
+    wave, off, rows = first
+    if not isinstance(rows, slice):
+        heard = _excerpt(signals, rows, wave.time, half + pulse_times.half_length(sonar.band))
+        own = velocity[rows] if velocity.any() else velocity
+        settled = _aligned(heard, elements.select(rows), sonar, wave, own, quiet)
+        wave = wave if isinstance(settled, int) else settled[0]
+    aligned = _aligned(signals, elements, sonar, wave, velocity, quiet)
+    if isinstance(aligned, int):
+        return aligned
+    wave, pulse, elements, longer = aligned
+    if not np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum()) < MAX_LAG / sonar.band.centre:
+        return UNFIT
+    if pulse.one_tone(SHARED) and not off < PERIODS_OFF / sonar.band.centre:
+        return UNRESOLVED
+    if pulse_times.cuts_tails(sonar.band) or pulse_times.null_in_band(elements, sonar, wave.direction):
+        some, longer = rows if quiet < UNHEARD * pulse.noise else slice(None), longer * pulse_times.LONGER
+        heard = _excerpt(signals, some, wave.time, half + longer * pulse_times.half_length(sonar.band))
+        window = _in_window(heard, elements.select(some), sonar, wave, longer, pulse.noise_to_signal)
+        pulse = replace(pulse, longer=window[1])
+    return wave, pulse, elements
+
+
+def _aligned(
+    signals: Signals, elements: Elements, sonar: Sonar, wave: Wavefront, velocity: Floats, quiet: float
+) -> tuple[Wavefront, Pulse, Elements, float] | int:
+    """As `fit_pulse`, from a wavefront that sensors are aligned on; and in how many times as long a window as a snap's
+    the pulse was measured."""
+    c, q, rest = sonar.assumed_sound_speed, elements.position, elements
     aligned, longer, expected = None, 1.0, _times(wave, q, c)
     for _ in range(ROUNDS):
         if velocity.any():
@@ -211,29 +225,19 @@ def fit_pulse(
         wave, last, expected = better, expected, _times(better, q, c)
         if np.abs(expected - last).max() < pulse_times.FLOOR:  # lags err by more without noise; the next by far less
             break
-    rms = np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum())
-    if not rms < MAX_LAG / sonar.band.centre:
-        return UNFIT
-    if pulse.one_tone(SHARED) and not off < PERIODS_OFF / sonar.band.centre:
-        return UNRESOLVED
-    if pulse_times.cuts_tails(sonar.band) or pulse_times.null_in_band(elements, sonar, wave.direction):
-        some, longer = rows if quiet < UNHEARD * pulse.noise else slice(None), longer * pulse_times.LONGER
-        cut, start = pulse_times.excerpt(signals, wave.time, half + longer * pulse_times.half_length(sonar.band))
-        heard, own = replace(signals, pressure=np.ascontiguousarray(cut[some]), start=start), elements.select(some)
-        pulse = replace(pulse, longer=_in_window(heard, own, sonar, wave, longer, pulse.noise_to_signal)[1])
-    return wave, pulse, elements
+    return wave, pulse, elements, longer
 
 
 def _first_wave(
-    signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, velocity: Floats, quiet: float
+    signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, quiet: float
 ) -> tuple[Wavefront, float, Ints | slice] | None:
     """Wavefront through the envelope peaks of the sensors, as of `fit_pulse`, the standard error (s) of its times, root
     mean square over the sensors, and which sensors it is of; None where none fits."""
     c, (cut, start), settled = sonar.assumed_sound_speed, pulse_times.excerpt(signals, centre, half), pulse_times.FLOOR
-    some = cut[_few(elements.count)]
-    energy = float(np.einsum("ij,ij->", some, some)) / (len(some) * signals.sampling_frequency)
+    few = scattered(FEW, elements.count) if elements.count >= 2 * FEW else slice(None)
+    energy = float(np.square(cut[few]).sum(axis=1).mean()) / signals.sampling_frequency
     clear = energy * 2.0 * pulse_times.half_length(sonar.band) > CLEAR * quiet
-    for rows in (_few(elements.count), slice(None)) if clear else (slice(None),):
+    for rows in (few, slice(None)) if clear else (slice(None),):
         q, live = elements.position[rows], elements.gain[rows] != 0
         delay, height = pulse_times.envelope_peaks(cut[rows], signals.sampling_frequency, sonar.band)
         loud = height**2 * live  # who hears more counts more
@@ -245,17 +249,13 @@ def _first_wave(
                 break
     else:
         return None
-    if velocity.any():
-        passing = _times(wave, q, c)
-        q = q + (passing - wave.time)[:, None] * velocity[rows]
-        wave = spherical_wave(passing, q, c, loud, wave.direction, wave.curvature)
-    return None if wave is None else (wave, off, rows)
+    return wave, off, rows
 
 
-@lru_cache(maxsize=16)
-def _few(count: int) -> Ints | slice:
-    """Some `FEW` of so many sensors, all over the array; all where that is no more than half of them."""
-    return np.unique((np.arange(FEW) * GOLDEN % 1.0 * count).astype(int)) if count >= 2 * FEW else slice(None)
+def _excerpt(signals: Signals, some: Ints | slice, centre: float, half: float) -> Signals:
+    """What some sensors hear within `half` (s) of `centre` (s)."""
+    cut, start = pulse_times.excerpt(signals, centre, half)
+    return replace(signals, pressure=np.ascontiguousarray(cut[some]), start=start)
 
 
 def _whole(

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Literal
+
+import numpy as np
 
 from sonarsynth.conventions import depth
 from sonarsynth.description import description
@@ -14,6 +16,18 @@ from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location.locating_method import LocatingMethod
 from sonarsynth.receiver import Band, Elements
 from sonarsynth.state import Receiver, Survey
+
+
+@lru_cache(maxsize=16)
+def unlocatable(elements: Elements) -> str | None:
+    """Why an array can locate nothing; None where it can."""
+    live = elements.position[elements.gain != 0]
+    if len(live) < 3:
+        return f"{len(live)} live hydrophone{'s' * (len(live) != 1)}: a direction needs three that are not in line"
+    spread = np.linalg.svd(live - live.mean(axis=0), compute_uv=False)
+    if not spread[1] > 1e-6 * spread[0]:
+        return "the live hydrophones are in one line or in one place: they cannot tell a direction"
+    return None
 
 
 @description
@@ -57,7 +71,6 @@ class SensorDelays(LocatingMethod):
 
     def locates_nothing(self, elements: Elements, band: Band) -> str:
         """As `LocatingMethod.locates_nothing`."""
-        from sonarsynth.ranging.location.locating import unlocatable
         from sonarsynth.ranging.location.pulse_times import LONGEST_HALF, half_length
 
         if half_length(band) > LONGEST_HALF:
@@ -72,7 +85,7 @@ class SensorDelays(LocatingMethod):
         return f"{then} (scene.processing.locating.on_bottom)"
 
     def locate(self, signals: Signals, receiver: Receiver, survey: Survey, snaps: int) -> SourceEstimates:
-        """See `LocatingMethod`. An array that cannot locate gives NaN rows (`locating.unlocatable` says why)."""
+        """See `LocatingMethod`. An array that cannot locate gives NaN rows (`unlocatable` says why)."""
         from sonarsynth.ranging.location.locating import locate
         from sonarsynth.ranging.location.refraction import bending
 

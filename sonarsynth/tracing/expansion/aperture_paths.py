@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Floats, Ints, scattered
 from sonarsynth.equations.kernels.row_products import row_products
 from sonarsynth.products import ArrayExpansion
 from sonarsynth.products.array_expansion import aperture_terms
@@ -156,8 +156,7 @@ def _spread(point: Floats) -> Ints:
     if len(point) <= 2 * SAMPLES:
         return np.arange(len(point))
     extreme = np.concatenate([point.argmin(axis=0), point.argmax(axis=0)])
-    golden = np.floor(np.mod(np.arange(SAMPLES) * 0.6180339887498949, 1.0) * len(point)).astype(int)
-    return np.unique(np.concatenate([extreme, golden]))
+    return np.unique(np.concatenate([extreme, scattered(SAMPLES, len(point))]))
 
 
 @dataclass(frozen=True, eq=False)
