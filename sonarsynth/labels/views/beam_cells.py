@@ -45,8 +45,7 @@ class Cells(NamedTuple):
     level: Floats  # (row, 2) the same of parts, by the sine of elevation
     azimuth: Floats  # (column, direction) rad
     across: Floats  # (column, direction, xy) cosine and sine of azimuth
-    sine: Floats  # (row, direction) of elevation
-    cosine: Floats  # (row, direction) of elevation
+    slope: Floats  # (row, direction) tangent of elevation
 
 
 @lru_cache(maxsize=4)
@@ -74,8 +73,7 @@ def cells_of(beams: BeamGrid) -> Cells:
         level=np.hstack([low, PARTS / height]),
         azimuth=azimuth,
         across=np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1),
-        sine=sine,
-        cosine=np.sqrt(1.0 - sine**2),
+        slope=sine / np.sqrt(1.0 - sine**2),
     )
 
 
@@ -106,16 +104,14 @@ def _mark(
     lowest, highest = max(int((low - bottom) * parts), 0), min(int((high - bottom) * parts), PARTS - 1)
     for strip in range(max(int((west - left) * strips), 0), min(int((east - left) * strips), STRIPS - 1) + 1):
         for n in range(cells.part[strip * PARTS + lowest], cells.part[strip * PARTS + highest + 1]):
-            bit = np.uint64(1) << np.uint64(n & 63)
-            if covered[place, n >> 6] & bit:
-                continue
-            x, y = cells.cosine[row, n] * cells.across[column, n, 0], cells.cosine[row, n] * cells.across[column, n, 1]
-            z, within = cells.sine[row, n], (west <= cells.azimuth[column, n]) & (cells.azimuth[column, n] <= east)
+            x, y, z = cells.across[column, n, 0], cells.across[column, n, 1], cells.slope[row, n]
             a = x * planes[0, 0] + y * planes[0, 1] + z * planes[0, 2]
             b = x * planes[1, 0] + y * planes[1, 1] + z * planes[1, 2]
-            if within & (min(a, b, x * planes[2, 0] + y * planes[2, 1] + z * planes[2, 2]) >= 0.0):
-                covered[place, n >> 6] |= bit
-                added += 1
+            inside = min(a, b, x * planes[2, 0] + y * planes[2, 1] + z * planes[2, 2]) >= 0.0
+            inside &= (west <= cells.azimuth[column, n]) & (cells.azimuth[column, n] <= east)
+            word, bit = covered[place, n >> 6], np.uint64(inside) << np.uint64(n & 63)
+            covered[place, n >> 6] = word | bit
+            added += (bit & ~word) > np.uint64(0)
     return added
 
 
@@ -127,7 +123,7 @@ def _look(
     """Mark the directions that meet triangles (facet, 3) of points (vertex, xyz) with boxes (facet, 4) rad in bits
     (cell of a window, word), and count them (row, column); and write body, facet and distance (row, column), NaN as yet
     for none, where beams meet them before anything else. window: its first row and column, and how many columns."""
-    rows, columns, directions = len(cells.sine), len(cells.azimuth), cells.sine.shape[1]
+    rows, columns, directions = len(cells.slope), len(cells.azimuth), cells.slope.shape[1]
     planes, centre, azimuth, elevation = np.empty((3, 3)), np.zeros(3), cells.beam[0], cells.beam[1]
     largest = 0.0
     for n in range(len(corners)):
@@ -196,6 +192,6 @@ def _window(cells: Cells, boxes: list[Floats]) -> tuple[tuple[int, int], tuple[i
     def cell(axis: int, angle: float, most: int) -> int:
         return min(max(math.floor((angle - cells.first[axis]) / cells.step[axis]), 0), most - 1)
 
-    rows, columns = len(cells.sine), len(cells.azimuth)
+    rows, columns = len(cells.slope), len(cells.azimuth)
     first = cell(1, low, rows), cell(0, west, columns)
     return first, (cell(1, high, rows) + 1, cell(0, east, columns) + 1)
