@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sonarsynth.conventions import counted
+from sonarsynth.conventions import counted, evenly
 from sonarsynth.detection import by_kind, detections_of, from_rows, views
 from sonarsynth.evaluation.detectors.detector_scores import DetectorReport
 from sonarsynth.evaluation.detectors.true_objects import category_names, true_objects
@@ -23,7 +23,7 @@ MOST: Final = 200
 def threshold_lines(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     """What a threshold reaches in frames that were built, in words, with a warning where that is all there is to find;
     nothing without images or objects."""
-    used = frames[np.linspace(0, len(frames) - 1, min(len(frames), MOST)).astype(int)]
+    used = frames[evenly(len(frames), MOST)]
     objects = true_objects(tree, used)
     if "image" not in tree.children or not len(objects):
         return []
