@@ -14,7 +14,7 @@ from sonarsynth.equations.arrays.spherical_wave import plane_wave, spherical_wav
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import REASONS, EnergyImage
 from sonarsynth.ranging import IsovelocityPlacing, RefractedPlacing, SensorDelays
-from sonarsynth.ranging.location.sensor_delays import unlocatable
+from sonarsynth.ranging.location.locating_method import unlocatable
 from sonarsynth.receiver import BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
 from sonarsynth.state import Receiver, Survey
 from tests.heard import add_noise, cloud_of, hear_direct, hear_echoes, silence

@@ -22,8 +22,8 @@ from sonarsynth.ranging.location.candidates import (
     quiet_bin,
     when_heard,
 )
+from sonarsynth.ranging.location.locating_method import unlocatable
 from sonarsynth.ranging.location.pulse_times import AlignedPulse, Pulse
-from sonarsynth.ranging.location.sensor_delays import unlocatable
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
     ARRAY,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from sonarsynth.description.method import FrameSize, Method, returned_rows
@@ -47,3 +49,15 @@ class LocatingMethod(Method):
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`."""
         return 8e-6 * size.sensors
+
+
+@lru_cache(maxsize=16)
+def unlocatable(elements: Elements) -> str | None:
+    """Why an array can locate nothing; None where it can."""
+    live = elements.position[elements.gain != 0]
+    if len(live) < 3:
+        return f"{len(live)} live hydrophone{'s' * (len(live) != 1)}: a direction needs three that are not in line"
+    spread = np.linalg.svd(live - live.mean(axis=0), compute_uv=False)
+    if not spread[1] > 1e-6 * spread[0]:
+        return "the live hydrophones are in one line or in one place: they cannot tell a direction"
+    return None

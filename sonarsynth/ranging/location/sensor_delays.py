@@ -3,31 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 from typing import Literal
-
-import numpy as np
 
 from sonarsynth.conventions import depth
 from sonarsynth.description import description
 from sonarsynth.description.method import UNSTATED, Demand
 from sonarsynth.environment.sound_speed import kink, mean_gradient
 from sonarsynth.products import Signals, SourceEstimates
-from sonarsynth.ranging.location.locating_method import LocatingMethod
+from sonarsynth.ranging.location.locating_method import LocatingMethod, unlocatable
 from sonarsynth.receiver import Band, Elements
 from sonarsynth.state import Receiver, Survey
-
-
-@lru_cache(maxsize=16)
-def unlocatable(elements: Elements) -> str | None:
-    """Why an array can locate nothing; None where it can."""
-    live = elements.position[elements.gain != 0]
-    if len(live) < 3:
-        return f"{len(live)} live hydrophone{'s' * (len(live) != 1)}: a direction needs three that are not in line"
-    spread = np.linalg.svd(live - live.mean(axis=0), compute_uv=False)
-    if not spread[1] > 1e-6 * spread[0]:
-        return "the live hydrophones are in one line or in one place: they cannot tell a direction"
-    return None
 
 
 @description

@@ -12,7 +12,7 @@ from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.ranging import IsovelocityPlacing, Peaks, SensorDelays
 from sonarsynth.ranging.clouds import point_cloud
-from sonarsynth.ranging.location.sensor_delays import unlocatable
+from sonarsynth.ranging.location.locating_method import unlocatable
 from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.receiver import POINT, Band, BeamGrid, LowPass, PlanarLattice, PositionTable, Sonar, elements
 from sonarsynth.scattering.boundaries import BoundarySite, WindySurface
