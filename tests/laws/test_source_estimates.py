@@ -230,7 +230,7 @@ def test_a_tone_that_lasts_errs_by_what_is_predicted_or_is_none(lasts: float) ->
     deviation, sonar = lasts / 2.355, Sonar(array=WIDE, assumed_sound_speed=C, sound_speed_error=0.0)
     heard, off, errors = elements(WIDE), {0.0: [], 1e-3: []}, []
     random = np.random.default_rng(5)
-    for noise in 8 * (0.0, 1e-3, 1e-3):
+    for noise in 8 * tuple(off):
         source = random.uniform(6.0, 25.0) * direction(random.uniform(-0.45, 0.45), random.uniform(-0.6, -0.2))
         distance, way = np.linalg.norm(source), np.linalg.norm(source - heard.position, axis=1)
         samples = 2 * int((4.0 * deviation + 2e-3) * RATE)
@@ -251,7 +251,7 @@ def test_a_tone_that_lasts_errs_by_what_is_predicted_or_is_none(lasts: float) ->
     if lasts > 2e-3:
         assert not off[0.0] and not off[1e-3]
         return
-    assert len(off[0.0]) == 8 and len(off[1e-3]) >= 6  # of 1 ms about half tell no period from the next
+    assert len(off[0.0]) == 8 and len(off[1e-3]) >= 4
     assert 0.6 < np.sqrt(np.mean(np.square(off[1e-3]))) < 1.5
     assert np.max(np.abs(off[0.0])) < 2.0 and np.max([row[:2] for row in errors if len(row)]) < 2e-6
 

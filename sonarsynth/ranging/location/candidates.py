@@ -70,17 +70,14 @@ class PowerTrack:
     peak: float  # Pa: the largest |pressure|
 
 
-def loudness(signals: Signals, live: Bools, length: int, flank: int) -> PowerTrack:
-    """Power at live sensors in a sliding window of `length` samples, its flanks at either end so long, in quiet, and
-    the peak.
+def loudness(signals: Signals, live: Bools, length: int) -> PowerTrack:
+    """Power at live sensors in a sliding window of `length` samples, in quiet, and the peak.
 
-    For the flanks it is loudest where a pulse is in the middle. The quiet power is the tenth part from below of short
-    means: a snap and its echoes fill no more of the signals.
+    The quiet power is the tenth part from below of short means: a snap and its echoes fill no more of the signals.
     """
     every = 0, signals.pressure.shape[1]
     power, peak = heard_power(signals, *every) if live.all() else power_and_peak(signals.pressure, live, *every)
-    track = uniform_filter1d(power, min(length - flank, len(power)), mode="constant")
-    track = uniform_filter1d(track, min(flank, len(power)), mode="constant")
+    track = uniform_filter1d(power, min(length, len(power)), mode="constant")
     tenth = len(power) // 10
     quiet = np.sort(uniform_filter1d(power, min(16, len(power))))[tenth]  # NumPy's `partition` takes ten times as long
     return PowerTrack(np.maximum(track, 0.0), float(max(quiet, 0.0)), peak)
@@ -147,11 +144,11 @@ class Candidates:
         return sum(row.reason in (ACCEPTED, RANGE) for row in self.rows)
 
     def look_beside(
-        self, signals: Signals, track: Track | None, width: int, flank: int, least: float,
+        self, signals: Signals, track: Track | None, width: int, least: float,
         look: Callable[[Signals, float, float], Candidate],
     ) -> None:  # fmt: skip
         """Add pulses that are heard within `width` samples of a louder one, and are louder than `least` (Pa2): by
-        `look` at the signals without that one. flank: as of `loudness`."""
+        `look` at the signals without that one."""
         elements, sonar, rate = self.known.elements, self.known.sonar, signals.sampling_frequency
         loudest = max((candidate.power for candidate in self.found), default=0.0)
         for candidate in tuple(self.found):
@@ -168,7 +165,7 @@ class Candidates:
             middle = round((row.time - signals.start) * rate)
             first = max(middle - 2 * width, 0)
             cut = replace(rest, pressure=np.ascontiguousarray(rest.pressure[:, first : middle + 2 * width]))
-            heard = loudness(cut, elements.gain != 0, width, flank).track
+            heard = loudness(cut, elements.gain != 0, width).track
             beside = heard[max(middle - width - first, 0) : middle + width + 1 - first]
             top = int(beside.argmax())
             if beside[top] > least:

@@ -96,13 +96,13 @@ def locate(
     short, rate = pulse_times.half_length(sonar.band), signals.sampling_frequency
     half = pulse_times.transit(elements, sonar.assumed_sound_speed) + 2 * short
     width = int(2 * half * rate) | 1
-    live, flank = elements.gain != 0, int(2 * short * rate)
-    loud, count = loudness(signals, live, width, flank), int(live.sum())
+    loud, count = loudness(signals, elements.gain != 0, width), int(np.count_nonzero(elements.gain))
     rounding = pulse_times.rounding(signals, loud.peak, short)
     quiet = quiet_bin(loud.quiet, count, sonar.band, short)
     least = QUIET * max(loud.quiet, count * rounding * rate / (2 * short))
-    sea = bottom, gradient, rounding, quiet, on_bottom, kink, reflected
-    known = SonarKnowledge(elements, sonar, receiver.pose, *sea)
+    known = SonarKnowledge(
+        elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, reflected
+    )
     track, candidates = loud.track.copy(), Candidates(known)
 
     def look(heard: Signals, centre: float, power: float) -> Candidate:
@@ -116,7 +116,7 @@ def locate(
         candidates.found.append(look(signals, signals.start + top / rate, float(track[top])))
         track[max(top - width, 0) : top + width + 1] = 0.0
     if snaps > 1:
-        candidates.look_beside(signals, receiver.track, width, flank, least, look)
+        candidates.look_beside(signals, receiver.track, width, least, look)
     return as_estimates(candidates.rows, snaps)
 
 
