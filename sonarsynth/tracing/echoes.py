@@ -239,14 +239,12 @@ def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:
 def _ways_to_facets(array: FacetPaths, snap: Emission) -> TransmitPaths:
     """Ways from a snap to the lit side of facets that no body hides; of facets in one place, the first body's."""
     medium, bodies, facets = array.context.medium, array.context.bodies, array.facets
-    row = np.arange(len(facets.facet))
-    if not array.lit:
-        row = may_face_receiver(facets, snap.position, array.propagation.bounces, medium)
+    bounces, row = array.propagation.bounces, np.arange(len(facets.facet))
+    row = row if array.lit else may_face_receiver(facets, snap.position, bounces, medium)
     start = alike(snap.position, len(row))
     paths = array.propagation.checked_paths(medium.profile, medium.depth, start, rows_of(facets.point, row))
-    paths = paths.select(picked(usable(paths)))
-    if not array.lit:
-        paths = paths.select(picked(facets.lit(row[paths.pair], paths.arrival)))
+    lit = array.lit or facets.lit(row[paths.pair], paths.arrival)
+    paths = paths.select(picked(usable(paths) & lit))
     bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
     out = TransmitPaths.of(paths, bounced, row[paths.pair], snap, float(medium.profile.at(depth(snap.position))))
     out = out.select(picked(out.spreading != 0.0)).merged()

@@ -88,10 +88,9 @@ class FacetPaths:
     def settled(self, leg: Ints) -> tuple[ReceivePaths, Bools]:
         """Those of some legs (row,) that a hydrophone sees, with the hydrophones that bodies hide them from, and which
         (row,) these are."""
-        in_sight = np.ones(len(leg), bool)
-        if not self.legs.open.any():
+        doubtful, in_sight = self.legs.open[leg] > 0, np.ones(len(leg), bool)
+        if not doubtful.any():
             return self.legs.select(leg), in_sight
-        doubtful = self.legs.open[leg] > 0
         number, row = np.unique(leg[doubtful], return_inverse=True)
         pending = self.legs.select(number)
         starts = self.facets.starts(pending.row, pending.departure)
@@ -199,8 +198,10 @@ def _facing(
     as well, which of them (facet,) have that."""
     position = context.receiver.pose.position
     facets = facets.select(may_face_receiver(facets, position, propagation.bounces, context.medium, slack))
-    lit = _lit(facets, lights, context.medium) if lights else None
-    return (facets, lit) if lit is None or propagation.bounces else (facets.select(lit), None)
+    if not lights:
+        return facets, None
+    lit = np.unique(np.concatenate([may_face_receiver(facets, light, 0, context.medium) for light in lights]))
+    return (facets, lit) if propagation.bounces else (facets.select(lit), None)
 
 
 def _hidden(facets: Facets, bodies: tuple[PlacedTarget, ...], places: list[Floats]) -> Bools:
@@ -214,11 +215,6 @@ def _in_front(surface: Scatterers, rows: Ints, receiver: Receiver, slack: float,
     """Those of some elements (row,) that the array may see and some of these places light, as of `in_front`."""
     eye, *seen_by = surface.pose.to_body([receiver.pose.position, *lights])
     return np.asarray(in_front(rows, surface.position, surface.normal, eye, slack, np.reshape(seen_by, (-1, 3))))
-
-
-def _lit(facets: Facets, lights: list[Floats], medium: Medium) -> Ints:
-    """Those (facet,) that direct rays from some places (xyz) may light."""
-    return np.unique(np.concatenate([may_face_receiver(facets, light, 0, medium) for light in lights]))
 
 
 def bending(medium: Medium, propagation: Propagation, receiver: Receiver) -> Medium:
