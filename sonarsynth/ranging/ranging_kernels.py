@@ -7,11 +7,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.compiling import compiled
-
-TURNS = 64
-"""Bins that sines and cosines are turned to from one."""
-TINY = 1e-100
-"""s: angles over frequency whose sine is themselves, and whose products with others are numbers."""
+from sonarsynth.equations.kernels.phasors import face_response, sine
 
 
 @compiled(fastmath=True, forceinline=True)
@@ -70,9 +66,11 @@ def cut_out(pressure: Any, arrival: Any, half: int, gain: Any) -> Any:
         sample = np.floor(arrival[q])
         first, fraction = int(sample) - half, arrival[q] - sample
         c, s = np.cos(4 * np.pi / half * fraction), np.sin(4 * np.pi / half * fraction)
-        begin, end = max(1, -first), min(2 * half, samples - first)
-        for i in range(begin, end):
-            cut[q, i] = pressure[q, first + i] * gain[q]
+        begin = max(1, -first)
+        end = max(min(2 * half, samples - first), begin)
+        row, heard, factor = cut[q, begin:end], pressure[q, first + begin : first + end], gain[q]
+        for i in range(end - begin):  # of slices: many at once
+            row[i] = heard[i] * factor
         low, high = int(np.ceil(0.25 * half + fraction)), int(np.floor(1.75 * half + fraction))  # flat from low to high
         for i in range(begin, min(low, end)):
             cut[q, i] *= 0.5 - 0.5 * (cosine[i] * c + sine[i] * s)
@@ -81,53 +79,29 @@ def cut_out(pressure: Any, arrival: Any, half: int, gain: Any) -> Any:
     return cut
 
 
-@compiled
+@compiled(fastmath={"contract"})
 def turned(spectrum: Any, delay: Any, first: float, spacing: float) -> Any:
     """spectrum * exp(+i 2 pi f delay): (sensor, bin) at f = first + spacing * bin (Hz), delay (sensor,) s."""
-    sensors, bins = spectrum.shape
-    shifted = np.empty((sensors, bins), np.complex128)
-    for q in range(sensors):
-        phasor = np.exp(2j * np.pi * first * delay[q])
-        step = np.exp(2j * np.pi * spacing * delay[q])
-        for k in range(bins):
-            shifted[q, k] = spectrum[q, k] * phasor
-            phasor *= step
+    shifted = np.empty(spectrum.shape, np.complex128)
+    for q in range(len(shifted)):
+        row, out = spectrum[q], shifted[q]
+        for k in range(len(out)):
+            turns = 2.0 * (first + k * spacing) * delay[q]
+            out[k] = row[k] * complex(sine(turns + 0.5), sine(turns))
     return shifted
 
 
-@compiled(fastmath=True, forceinline=True)
-def _face_response(across: float, up: float, first: float, spacing: float, turns: Any, response: Any) -> None:
-    """Fill response (bin,) of one direction, as of `face_responses`; turns (4, bin): room for some bins at a time."""
-    y, z = np.pi * across, np.pi * up
-    y, z = y if abs(y) > TINY else 0.0, z if abs(z) > TINY else 0.0
-    many, (sa, ca, sb, cb) = min(turns.shape[1], len(response)), (0.0, 1.0, 0.0, 1.0)
-    sine_y, cosine_y = np.sin(spacing * y), np.cos(spacing * y)
-    sine_z, cosine_z = np.sin(spacing * z), np.cos(spacing * z)
-    for k in range(many):
-        turns[0, k], turns[1, k], turns[2, k], turns[3, k] = sa, ca, sb, cb
-        sa, ca = sa * cosine_y + ca * sine_y, ca * cosine_y - sa * sine_y
-        sb, cb = sb * cosine_z + cb * sine_z, cb * cosine_z - sb * sine_z
-    sy, cy, sz, cz = np.sin(first * y), np.cos(first * y), np.sin(first * z), np.cos(first * z)
-    for low in range(0, len(response), many):
-        f = first + low * spacing
-        for k in range(min(many, len(response) - low)):
-            x, w = (f + k * spacing) * y, (f + k * spacing) * z
-            over_y = sy * turns[1, k] + cy * turns[0, k] if x != 0.0 else 1.0
-            over_z = sz * turns[3, k] + cz * turns[2, k] if w != 0.0 else 1.0
-            response[low + k] = over_y * over_z / ((x if x != 0.0 else 1.0) * (w if w != 0.0 else 1.0))
-        sy, cy, sz, cz = sy * ca + cy * sa, cy * ca - sy * sa, sz * cb + cz * sb, cz * cb - sz * sb
-
-
-@compiled(forceinline=True)
+@compiled(fastmath={"contract"}, forceinline=True)
 def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int) -> Any:
     """sinc(f across) sinc(f up): (row, bin) at f = first + spacing * bin (Hz); across, up (row,) s: face times sine/c.
 
-    `apertures.element_directivity` of many directions at evenly spaced frequencies. The sines follow by turning,
-    which keeps the relative precision of a small one.
+    `apertures.element_directivity` of many directions at evenly spaced frequencies.
     """
-    response, turns = np.empty((len(across), bins)), np.empty((4, TURNS))
+    response = np.empty((len(across), bins))
     for i in range(len(across)):
-        _face_response(across[i], up[i], first, spacing, turns, response[i])
+        row = response[i]
+        for k in range(bins):
+            row[k] = face_response((first + k * spacing) * across[i], (first + k * spacing) * up[i])
     return response
 
 
@@ -144,10 +118,10 @@ def match(beams: Any, across: Any, up: Any, first: float, spacing: float, share:
     """Multiply beams (beam, bin) by `face_responses`, over their root mean square by share (bin,), and by matched
     (bin,), and write them into wider (beam, more bins), with zeros beyond, as well."""
     bins = beams.shape[1]
-    face, turns = np.empty(bins, np.float32), np.empty((4, TURNS))
-    share, matched = share.astype(np.float32), matched.astype(np.complex64)
+    face, share, matched = np.empty(bins, np.float32), share.astype(np.float32), matched.astype(np.complex64)
     for b in range(len(beams)):
-        _face_response(across[b], up[b], first, spacing, turns, face)
+        for k in range(bins):
+            face[k] = face_response((first + k * spacing) * across[b], (first + k * spacing) * up[b])
         scale = np.float32(1.0 / np.sqrt(_mean_square(face, share)))
         for k in range(bins):
             wider[b, k] = beams[b, k] * (face[k] * scale * matched[k])
