@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from cmath import rect
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy.typing as npt
 
 from sonarsynth.compiling import compiled
 from sonarsynth.conventions import Bools, Complexes, Floats, Ints
+from sonarsynth.equations.kernels.phasors import face_response, sine
 
 RIM_STEP = 0.35
 """rad at the rim of the aperture between two tables of the pattern: the nearest one errs by 0.1 rad rms at most."""
@@ -43,33 +43,30 @@ def turn(angle: float, step: float, phasors: Complexes) -> None:
         phasor *= turned
 
 
-@compiled
+@compiled(fastmath={"contract"})
 def path_spectra(
-    amplitude: Floats, phase: Floats, delay: Floats, loss: Floats, delay_std: Floats, sine: Floats, frequency: Floats,
+    amplitude: Floats, phase: Floats, delay: Floats, loss: Floats, delay_std: Floats, face: Floats, frequency: Floats,
     relative: Floats,
 ) -> Complexes:  # fmt: skip
     """Spectra (path, bin) of paths as an element of the array hears them, over that of the snap at 1 m.
 
-    phase rad; delay s; loss dB where relative (bin,) is 1; delay_std s; sine (path, 2): those of the direction along y
+    phase rad; delay s; loss dB where relative (bin,) is 1; delay_std s; face (path, 2): sines of the direction along y
     and z times the side of the square face over the sound speed (s).
     """
-    bins, spacing = len(frequency), frequency[1] - frequency[0] if len(frequency) > 1 else 0.0
-    spectrum, steepest = np.empty((len(amplitude), bins), np.complex128), np.abs(relative).max()
+    bins, steepest = len(frequency), np.abs(relative).max()
+    spectrum, gain = np.empty((len(amplitude), bins), np.complex128), np.empty(bins)
     for e in range(len(amplitude)):
         decay, half = math.log(10.0) / 20.0 * loss[e], 0.5 * (2.0 * math.pi * delay_std[e]) ** 2
-        small = abs(decay) * steepest + half * frequency[-1] ** 2 < SMALL
-        y, z, late = math.pi * sine[e, 0], math.pi * sine[e, 1], -2.0 * math.pi * delay[e]
-        across, by_y = rect(1.0, frequency[0] * y), rect(1.0, spacing * y)
-        up, by_z = rect(1.0, frequency[0] * z), rect(1.0, spacing * z)
-        phasor, turned = rect(1.0, phase[e] + frequency[0] * late), rect(1.0, spacing * late)
+        small, out = abs(decay) * steepest + half * frequency[-1] ** 2 < SMALL, spectrum[e]
+        for k in range(bins):
+            x = -decay * relative[k] - half * frequency[k] * frequency[k]
+            gain[k] = 1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0)) if small else math.exp(x)
+        y, z, first, late = face[e, 0], face[e, 1], phase[e] / math.pi, 2.0 * delay[e]
         for k in range(bins):
             f = frequency[k]
-            x = -decay * relative[k] - half * f * f
-            gain = 1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0)) if small else math.exp(x)
-            gain *= across.imag / (f * y) if abs(f * y) > 1e-6 else 1.0
-            gain *= up.imag / (f * z) if abs(f * z) > 1e-6 else 1.0
-            spectrum[e, k] = amplitude[e] * gain * phasor
-            across, up, phasor = across * by_y, up * by_z, phasor * turned
+            turns = first - f * late
+            size = amplitude[e] * gain[k] * face_response(f * y, f * z)
+            out[k] = complex(size * sine(turns + 0.5), size * sine(turns))
     return spectrum
 
 
