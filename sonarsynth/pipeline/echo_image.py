@@ -71,7 +71,7 @@ def _received(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> Received
     if image is None or signals is None or estimates is None or beams is None:
         return None
     elements, sonar, supports = known_elements(plan, frame), plan.scene.sonar, plan.windows.supports
-    some = np.arange(elements.count) % max(elements.count // 64, 1) == 0
+    some = np.arange(elements.count) % max(elements.count // 16, 1) == 0
     every = 0, signals.pressure.shape[1]
     loudest = power_and_peak(signals.pressure, some & (elements.gain != 0), *every)[1]
     focus, direct = plan.choices.beamforming.focus, beamformed.signals

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -81,7 +80,7 @@ def _placed(
         shift = -delay[:, None] * (placer.velocity + np.cross(placer.spin, source))
         solution = solution.as_array_moves(source, shift)
     late = window.late if row == 0 else np.hypot(window.late, np.hypot(snaps.time_error[0], snaps.time_error[row]))
-    echoes = replace(echoes, delay_error=np.hypot(echoes.delay_error, late))
+    echoes = echoes.but(delay_error=np.hypot(echoes.delay_error, late))
     echoes = _with_defocus(echoes, solution.range, window)
     error = range_error(solution, echoes, snaps, window.sonar, row)
     if not placer.profile.uniform:
@@ -115,8 +114,7 @@ def _with_defocus(echoes: PickedEchoes, distance: Floats, window: ReceivedWindow
         defocus_spread(np.sqrt(np.maximum(np.sum(axis @ moments * axis, axis=1), 0.0)), curvature, wavenumber)
         for axis in (port, up)
     )
-    return replace(
-        echoes,
+    return echoes.but(
         azimuth_error=np.minimum(np.hypot(echoes.azimuth_error, across / np.maximum(level, 0.1)), np.pi),
         elevation_error=np.minimum(np.hypot(echoes.elevation_error, along), np.pi),
     )
@@ -135,8 +133,7 @@ def _with_bending(
     arc = 0.5 * distance * np.abs(gradient) / float(profile.at(own))
     port = arc * (direction(echoes.azimuth + 0.5 * np.pi, np.zeros(len(beam))) @ up)
     upward = arc * (direction(echoes.azimuth, echoes.elevation + 0.5 * np.pi) @ up)
-    return replace(
-        echoes,
+    return echoes.but(
         azimuth_error=np.minimum(
             np.hypot(echoes.azimuth_error, port / np.maximum(np.cos(echoes.elevation), 0.1)), np.pi
         ),
@@ -151,7 +148,7 @@ def _at_true_directions(echoes: PickedEchoes, velocity: Floats, window: Received
     azimuth, elevation = azimuth_elevation(
         true_directions(heard, velocity / c, plane_normal(live, c / window.sonar.band.centre))
     )
-    return replace(echoes, azimuth=azimuth, elevation=elevation)
+    return echoes.but(azimuth=azimuth, elevation=elevation)
 
 
 def true_directions(beam: Floats, mach: Floats, normal: Floats | None) -> Floats:
