@@ -68,8 +68,10 @@ def label_points(
     labels["facet"][rows] = arrivals.facet[loudest]
     labels["origin"][rows] = _origins(arrivals, loudest, beam[rows], listening, band)
     echo = np.flatnonzero(labels["target"] >= 0)
-    near = _from_targets(attributed, echo, cloud.position[echo].astype(float), moment, listening)
-    labels["true_range"][echo], labels["distance"][echo] = near
+    if len(echo):
+        middle = attributed.clock + float(late[echo].mean())
+        near = _from_targets(attributed, echo, cloud.position[echo].astype(float), middle, moment, listening)
+        labels["true_range"][echo], labels["distance"][echo] = near
     return PointLabels(**labels)
 
 
@@ -108,21 +110,21 @@ def _spread(elements: Elements) -> Floats:
 
 
 def _from_targets(
-    attributed: Attribution, points: Ints, places: Floats, moment: WorldState, listening: SonarTiming
+    attributed: Attribution, points: Ints, places: Floats, middle: float, moment: WorldState, listening: SonarTiming
 ) -> tuple[Floats, Floats]:
     """Range (point,) of where the echoes of points were made, and distance (point,) of the places (point, xyz) that the
-    sonar gives them from the target, where sound met it and the array (m)."""
+    sonar gives them from the target, where sound met it and the array (m); middle (s): of when they are heard."""
     arrivals, rows, owner = attributed.arrivals, attributed.rows, attributed.owner[points]
-    delay, made, shares = arrivals.delay[rows], rows_of(arrivals.point, rows), (attributed.share, attributed.first)
-    times = np.stack([delay, delay - arrivals.radius[rows] / arrivals.sound_speed], axis=1)
-    heard, met = kernels.means(points, *shares, times).T
-    ranges, distance = np.empty((2, len(points)))
+    sonar, delay = listening.track.later(middle), arrivals.delay[rows]
+    away = rows_of(arrivals.point, rows) - sonar.pose.position - np.outer(delay - middle, sonar.velocity)
+    columns = delay, delay - arrivals.radius[rows] / arrivals.sound_speed, np.sqrt(np.einsum("px,px->p", away, away))
+    heard, met, ranges = kernels.means(points, attributed.share, attributed.first, np.stack(columns, axis=1)).T
+    late, distance = heard - middle, np.empty(len(points))
+    place = turned(sonar.pose.turn_to_world(places), sonar.spin, late)
+    place += sonar.pose.position + np.outer(late, sonar.velocity)
     for group in np.unique(owner):
-        at, middle, then = owner == group, float(heard[owner == group].mean()), float(met[owner == group].mean())
-        sonar, placed = listening.track.later(middle), moment.bodies[attributed.target[group]].later(then)
-        away = np.linalg.norm(made - sonar.pose.position - np.outer(delay - middle, sonar.velocity), axis=1)
-        ranges[at] = kernels.means(points[at], *shares, away[:, None])[:, 0]
-        array = sonar.pose.position + np.outer(heard[at] - middle, sonar.velocity)
-        place = array + turned(sonar.pose.turn_to_world(places[at]), sonar.spin, heard[at] - middle)
-        distance[at] = surface_distances(placed, place - np.outer(met[at] - then, placed.velocity))
+        at = np.flatnonzero(owner == group)
+        then = float(met[at].mean())
+        placed = moment.bodies[attributed.target[group]].later(then)
+        distance[at] = surface_distances(placed, place[at] - np.outer(met[at] - then, placed.velocity))
     return ranges, distance

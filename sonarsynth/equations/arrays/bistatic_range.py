@@ -53,12 +53,11 @@ def bistatic_range(excess_path: npt.ArrayLike, beam: npt.ArrayLike, source: npt.
         r = x * (2 * b + x) / (2 * d)
         from_source = unit(r[..., None] * u - position)
         by_path = (x * x + 2 * b * h * (b + x)) / (2 * d * d)  # (L - r)/d without its cancellation
-        sine = np.linalg.norm(np.cross(u, s), axis=-1)
         return BistaticRange(
             range=r,
             one_plus_cos=1 / by_path,
             by_path=by_path,
-            by_angle=-r * b * sine / d,
+            by_angle=-r * b * np.sqrt(h * np.maximum(2.0 - h, 0.0)) / d,  # sin psi
             by_source=by_path[..., None] * (s + from_source),
         )
 
