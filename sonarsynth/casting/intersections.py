@@ -144,22 +144,32 @@ def over_horizon(direction: Floats, slope: float, facet: int, normal: Floats, ho
 
 @compiled
 def off_facets(
-    facet: Ints, direction: Floats, distance: Floats, centroid: Floats, normal: Floats, horizon: Floats,
-    offset: float, centre: Floats, size: float, origin: Floats, far: Floats, ray: Ints,
-) -> int:  # fmt: skip
-    """Write those of rays (ray,) from the middles of facets, moved off them by `offset` (m), in directions of length
-    one, up to distances (m), that may meet the mesh again: where they begin, directions and lengths, in its unit; and
-    which they are. Returns how many. centre (xyz) and size (m): of its sphere."""
-    count = 0
-    for i in range(len(facet)):
-        if over_horizon(direction[i], 0.0, facet[i], normal, horizon):
-            continue
+    rows: Ints, place: Floats, centroid: Floats, normal: Floats, horizon: Floats, offset: float, centre: Floats,
+    size: float, facet: Ints, origin: Floats, heading: Floats, far: Floats, ray: Ints,
+) -> tuple[int, int]:  # fmt: skip
+    """Write those of facets (row,) on whose outer side a place (xyz) is, facet (row,); and of the rays to it from their
+    middles, moved off them by `offset` (m), those that may meet the mesh again: where they begin, directions and
+    lengths, in its unit, and which of these facets they are of. Returns how many of each. centre (xyz) and size (m): of
+    its sphere."""
+    faced = count = 0
+    for f in rows:
+        square, beside, way = 0.0, offset, heading[count]
         for x in range(3):
-            origin[count, x] = (centroid[facet[i], x] + offset * normal[facet[i], x] - centre[x]) / size
-            direction[count, x] = direction[i, x]
-        far[count], ray[count] = distance[i] / size, i
+            way[x] = place[x] - centroid[f, x] - offset * normal[f, x]
+            square, beside = square + way[x] ** 2, beside + way[x] * normal[f, x]
+        if not beside > 0.0:
+            continue
+        facet[faced], ray[count] = f, faced
+        faced += 1
+        if over_horizon(way, 0.0, f, normal, horizon):
+            continue
+        distance = math.sqrt(square)
+        for x in range(3):
+            origin[count, x] = (centroid[f, x] + offset * normal[f, x] - centre[x]) / size
+            way[x] /= distance
+        far[count] = distance / size
         count += 1
-    return count
+    return faced, count
 
 
 @compiled

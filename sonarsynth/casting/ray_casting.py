@@ -203,18 +203,19 @@ def first_hit(mesh: Mesh, origin: Floats, direction: Floats) -> tuple[Ints, Floa
     return facet, distance * ready.size
 
 
-def met_again(mesh: Mesh, facet: Ints, offset: float, direction: Floats, distance: Floats) -> Bools:
-    """Whether rays (ray,) from the middles of facets, moved off them by `offset` (m), in directions (ray, xyz), of
-    length one, in the frame of the mesh, meet it again within distances (ray,) m."""
+def faced_from(mesh: Mesh, rows: Ints, offset: float, place: Floats) -> tuple[Ints, Bools]:
+    """Those of facets (row,) on whose outer side a place (xyz), in the frame of the mesh, is; and whether rays to it
+    from their middles, moved off them by `offset` (m), meet the mesh again."""
     from sonarsynth.casting import intersections
 
-    ready, met = casting_mesh(mesh), np.zeros(len(facet), bool)
-    origin, heading, far, ray = np.empty_like(direction), direction.copy(), np.empty(len(facet)), np.empty_like(facet)
-    of_facets = mesh.centroid, mesh.normal, ready.horizon, offset, ready.centre, ready.size
-    count = intersections.off_facets(facet, heading, distance, *of_facets, origin, far, ray)
+    ready, count = casting_mesh(mesh), len(rows)
+    (origin, heading), far, (facet, ray) = np.empty((2, count, 3)), np.empty(count), np.empty((2, count), np.int64)
+    of_mesh = mesh.centroid, mesh.normal, ready.horizon, offset, ready.centre, ready.size
+    faced, count = intersections.off_facets(rows, place, *of_mesh, facet, origin, heading, far, ray)
+    met = np.zeros(faced, bool)
     if count:
         met[ray[:count]] = ready.within(origin[:count], heading[:count], far[:count], any_hit=True)[0] >= 0
-    return met
+    return facet[:faced], met
 
 
 def occluded(

@@ -8,13 +8,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import OFFSET, met_again, occluded
+from sonarsynth.casting.ray_casting import OFFSET, faced_from, occluded
 from sonarsynth.columns import alike, picked
 from sonarsynth.conventions import Bools, Floats, Int32s, Ints
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.labels.views import view_kernels
 from sonarsynth.labels.views.box_in_view import facet_boxes, whole_box
 from sonarsynth.products import Paths
 from sonarsynth.propagation import Propagation
@@ -108,14 +107,10 @@ def _visible(
 def _leaving(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], rows: Ints, to: Floats) -> tuple[Ints, Bools]:
     """Those of facets (row,) on whose outer side a place (xyz), world, is, and which of them no body hides from it."""
     mesh, pose, offset, others = body.mesh, body.pose, _offset(body), _between(body, bodies, to)
-    facet, towards, distance = np.empty(len(rows), np.int64), np.empty((len(rows), 3)), np.empty(len(rows))
-    own = mesh.centroid, mesh.normal, offset, pose.to_body(to)
-    count = view_kernels.leaving(rows, *own, facet, towards, distance)
-    facet = facet[:count]
-    hidden = met_again(mesh, facet, offset, towards[:count], distance[:count])
+    facet, hidden = faced_from(mesh, rows, offset, pose.to_body(to))
     if others:
         start = pose.to_world(mesh.centroid[facet] + offset * mesh.normal[facet])
-        hidden |= occluded(others, start, alike(to, count))
+        hidden |= occluded(others, start, alike(to, len(facet)))
     return facet, ~hidden
 
 

@@ -187,27 +187,6 @@ def box_of_part_ahead(corners: Floats, face: Ints, box: Floats) -> None:
 
 
 @compiled
-def leaving(
-    rows: Ints, centroid: Floats, normal: Floats, offset: float, to: Floats, facet: Ints, towards: Floats,
-    distance: Floats,
-) -> int:  # fmt: skip
-    """Write those of facets (row,) on whose outer side a place `to` (xyz) is: which, facet (row,), and directions of
-    length one, towards (row, xyz), from their middles, moved off by `offset` (m), to it, and distances (row,) m; all in
-    the frame of the body. Returns how many."""
-    count = 0
-    for f in rows:
-        x = to[0] - centroid[f, 0] - offset * normal[f, 0]
-        y = to[1] - centroid[f, 1] - offset * normal[f, 1]
-        z = to[2] - centroid[f, 2] - offset * normal[f, 2]
-        if normal[f, 0] * x + normal[f, 1] * y + normal[f, 2] * z + offset > 0.0:
-            far = math.sqrt(x * x + y * y + z * z)
-            facet[count], distance[count] = f, far
-            towards[count, 0], towards[count, 1], towards[count, 2] = x / far, y / far, z / far
-            count += 1
-    return count
-
-
-@compiled
 def bounds_of_whole(boxes: Floats, azimuth: float, elevation: float, inner: Bools, out: Floats) -> None:
     """Bounds (4,) of those of boxes (facet, 4) that are wholly within +-azimuth and +-elevation, in `out`: NaN of
     none; and write which."""
