@@ -80,7 +80,7 @@ def test_a_trigger_errs_as_it_says() -> None:
     method, random = Triggered(time_error=3e-6, position_error=0.02), np.random.default_rng(3)
     receiver = Receiver(Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi)), elements(Romanis()))
     snap = Emission(np.array([1.0, 0.5, -4.0]), 0.25, LogarithmicBubble(), None)
-    told = [method.told((snap,), receiver, lambda: random)[0] for _ in range(400)]
+    told = [method.told((snap,), receiver, random)[0] for _ in range(400)]
     off = np.array([(t.position - snap.position) / 0.02 for t in told])
     late = np.array([t.time for t in told]) - 0.25
     assert np.std(off) == pytest.approx(1.0, abs=0.08) and abs(np.mean(off)) < 0.1

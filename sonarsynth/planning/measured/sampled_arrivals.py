@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -91,7 +90,7 @@ def receiver_of(plan: Plan, frame: Frame, subarray: Subarray | None = None) -> R
 
 def survey_of(plan: Plan, frame: Frame) -> Survey:
     """What the sonar knows of the water of a frame, and what a trigger tells it."""
-    random = partial(stream, frame.seed, "trigger", frame.key, frame.step)
+    random = stream(frame.seed, "trigger", frame.key, frame.step)
     told = plan.scene.processing.locating.told(frame.moment.snaps, receiver_of(plan, frame), random)
     return Survey(plan.scene.world.environment.depth, plan.profile, told)
 

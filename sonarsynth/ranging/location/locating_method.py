@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -11,8 +10,6 @@ from sonarsynth.description.method import FrameSize, Method, returned_rows
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.receiver import Band, Elements
 from sonarsynth.state import Emission, Receiver, Survey, Trigger
-
-RandomStream = Callable[[], np.random.Generator]
 
 
 class LocatingMethod(Method):
@@ -30,10 +27,10 @@ class LocatingMethod(Method):
         estimates: SourceEstimates = returned_rows(self, "locate", found, SourceEstimates, "time", (), wide, snaps)
         return estimates
 
-    def told(self, snaps: tuple[Emission, ...], receiver: Receiver, random: RandomStream) -> tuple[Trigger, ...]:
+    def told(self, snaps: tuple[Emission, ...], receiver: Receiver, random: np.random.Generator) -> tuple[Trigger, ...]:
         """What a trigger tells the sonar of the emissions of a frame, loudest first; nothing, unless it has one.
 
-        random: gives a stream of its own in each frame, which takes longer to begin than all else here.
+        random: a stream of its own in each frame.
         """
         return ()
 

@@ -12,7 +12,7 @@ from sonarsynth.description import description
 from sonarsynth.description.method import FrameSize
 from sonarsynth.environment.sound_speed import mean_gradient
 from sonarsynth.products import Signals, SourceEstimates
-from sonarsynth.ranging.location.locating_method import LocatingMethod, RandomStream
+from sonarsynth.ranging.location.locating_method import LocatingMethod
 from sonarsynth.state import Emission, Receiver, Survey, Trigger
 
 
@@ -28,11 +28,11 @@ class Triggered(LocatingMethod):
     position_error: PositiveMetres = 0.01
     """Standard error of each coordinate of the place that it is told."""
 
-    def told(self, snaps: tuple[Emission, ...], receiver: Receiver, random: RandomStream) -> tuple[Trigger, ...]:
+    def told(self, snaps: tuple[Emission, ...], receiver: Receiver, random: np.random.Generator) -> tuple[Trigger, ...]:
         """As `LocatingMethod.told`: with errors that are drawn."""
         from sonarsynth.signals.filtered_pulse import envelope_delay, snap_levels
 
-        off, late = random().standard_normal((len(snaps), 4)), [envelope_delay(s.waveform, receiver.sonar) for s in snaps]
+        off, late = random.standard_normal((len(snaps), 4)), [envelope_delay(s.waveform, receiver.sonar) for s in snaps]
         away = np.array([np.linalg.norm(s.position - receiver.pose.position) for s in snaps])
         loudest = np.argsort(20.0 * np.log10(away) - snap_levels(snaps), kind="stable").tolist()
         return tuple(
