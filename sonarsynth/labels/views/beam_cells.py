@@ -71,9 +71,9 @@ def cells_of(beams: BeamGrid) -> Cells:
         part=np.searchsorted(part[order], np.arange(STRIPS * PARTS + 1)),
         strip=np.hstack([left, STRIPS / width]),
         level=np.hstack([low, PARTS / height]),
-        azimuth=azimuth,
-        across=np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1),
-        slope=sine / np.sqrt(1.0 - sine**2),
+        azimuth=azimuth.astype(np.float32),
+        across=np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1).astype(np.float32),
+        slope=(sine / np.sqrt(1.0 - sine**2)).astype(np.float32),
     )
 
 
