@@ -79,7 +79,7 @@ def cut_out(pressure: Any, arrival: Any, half: int, gain: Any) -> Any:
     return cut
 
 
-@compiled(fastmath={"contract"})
+@compiled(fastmath={"contract"}, forceinline=True)
 def turned(spectrum: Any, delay: Any, first: float, spacing: float) -> Any:
     """spectrum * exp(+i 2 pi f delay): (sensor, bin) at f = first + spacing * bin (Hz), delay (sensor,) s."""
     shifted = np.empty(spectrum.shape, np.complex128)

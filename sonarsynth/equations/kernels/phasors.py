@@ -70,7 +70,7 @@ def sine(t: float) -> float:
     x, odd = rest * rest, abs(whole - 2.0 * np.rint(0.5 * whole))
     series = SINE[4] + x * (SINE[5] + x * (SINE[6] + x * (SINE[7] + x * SINE[8])))
     series = SINE[0] + x * (SINE[1] + x * (SINE[2] + x * (SINE[3] + x * series)))
-    return (1.0 - 2.0 * odd) * rest * series
+    return float((1.0 - 2.0 * odd) * rest * series)
 
 
 @compiled(fastmath={"contract"}, forceinline=True)
