@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.kernels.placing import distances
 from sonarsynth.equations.rays.ray_solutions import mean_slowness, water
+from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.planning.measured.ray_bending import unlike_straight
 from sonarsynth.planning.measured.sampled_frames import SampledScene
@@ -23,6 +24,7 @@ from sonarsynth.propagation import Straight
 from sonarsynth.receiver import Band, RangeGrid, Sonar
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame, Scene
+from sonarsynth.scattering.scatterers import AT_REST
 from sonarsynth.signals.filtered_pulse import snap_levels
 
 MARGIN = 0.1e-3
@@ -215,16 +217,15 @@ def _span(frame: Frame, sonar: Sonar, profile: Profile, bottom_depth: float, bou
     snaps = frame.moment.snaps
     if not snaps:
         return _ArrivalInterval(0.0, 0.0, 0.0, np.nan, np.nan, 0.0)
-    direct = np.array(
-        [s.time + float(_straight_time(profile, bottom_depth, s.position[None], array)[0]) for s in snaps]
-    )
+    straight = partial(_straight_time, profile, bottom_depth)
+    direct = np.array([s.time + float(straight(AT_REST.pose, s.position[None], array)[0]) for s in snaps])
     earliest, late_echo = np.full(len(snaps), np.inf), [-np.inf] * len(snaps)
     blocks = [(body, facets) for body in frame.moment.bodies for facets in in_blocks(len(body.mesh.faces))]
     for body, facets in blocks:
-        points = body.pose.to_world(body.mesh.centroid[facets])
-        back = _straight_time(profile, bottom_depth, points, array)
+        points = body.mesh.centroid[facets]
+        back = straight(body.pose, points, array)
         for n, snap in ((n, snap) for n, snap in enumerate(snaps) if snap.illuminates):
-            echo = snap.time + _straight_time(profile, bottom_depth, points, snap.position) + back
+            echo = snap.time + straight(body.pose, points, snap.position) + back
             earliest[n] = min(earliest[n], echo.min(initial=np.inf))
             late_echo[n] = max(late_echo[n], echo.max(initial=-np.inf))
     echoes = bool(np.isfinite(earliest).any())
@@ -286,11 +287,12 @@ def _disturbed(span: _ArrivalInterval, start: float, stop: float) -> bool:
     return any(first < span.clock + stop and last > span.clock + start for first, last in span.others)
 
 
-def _straight_time(profile: Profile, bottom_depth: float, points: Floats, place: Floats) -> Floats:
-    """Travel time (point,) along straight lines from points (point, xyz) to a place (xyz): distance times the mean
-    slowness between them."""
-    distance = distances(points, place)
+def _straight_time(profile: Profile, bottom_depth: float, pose: Pose, points: Floats, place: Floats) -> Floats:
+    """Travel time (point,) along straight lines from points (point, xyz) of a body at a pose to a place (xyz) in the
+    world: distance times the mean slowness between them."""
+    distance = distances(points, pose.to_body(place))
     if profile.uniform:
         return np.asarray(distance / profile.speed[0])
-    ends = depth(points), np.broadcast_to(depth(place), len(points))
+    down = -(points @ pose.rotation[2] + pose.position[2])
+    ends = down, np.broadcast_to(depth(place), len(points))
     return np.asarray(distance * mean_slowness(water(profile.depth, profile.speed, bottom_depth), *ends))

@@ -137,7 +137,7 @@ class Layout:
         rows = [frames[frame][array.key] if frame in frames else fill for frame in self.region(shard)]
         if array.chunk == 1:
             return [row[None] for row in rows]
-        return [np.stack(rows[first : first + array.chunk]) for first in range(0, len(rows), array.chunk)]
+        return [np.array(rows[first : first + array.chunk]) for first in range(0, len(rows), array.chunk)]
 
 
 @lru_cache(maxsize=8)

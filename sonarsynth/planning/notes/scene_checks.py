@@ -83,8 +83,7 @@ def _water(scene: Scene) -> Profile:
 def _check_profile(scene: Scene, profile: Profile) -> None:
     """The sound speed must be that of water, somewhere above the bottom, and change at a rate that rays can follow."""
     path = ("scene", "world", "environment", "sound_speed")
-    measured = scene.world.environment.sound_speed.measured
-    slowest, fastest = IN_WATER if measured else (SLOWEST, FASTEST)
+    slowest, fastest = IN_WATER if scene.world.environment.sound_speed.measured else (SLOWEST, FASTEST)
     odd = np.flatnonzero(~((profile.speed >= slowest) & (profile.speed <= fastest)))
     if len(odd):
         feet = IN_WATER[0] <= 0.3048 * profile.speed[odd[0]] <= IN_WATER[1]
@@ -94,18 +93,14 @@ def _check_profile(scene: Scene, profile: Profile) -> None:
             + (": is it in feet per second?" if feet else ""),
         )
     if profile.depth[0] > scene.world.environment.depth:
-        raise FieldError(
-            path,
-            f"is given from {profile.depth[0]:g} m down, below the bottom at {scene.world.environment.depth:g} m",
-        )
+        line = f"is given from {profile.depth[0]:g} m down, below the bottom at {scene.world.environment.depth:g} m"
+        raise FieldError(path, line)
     steep = np.flatnonzero(np.abs(np.diff(profile.speed)) > STEEPEST * np.diff(profile.depth))
     jumps = steep[np.diff(profile.depth)[steep] > 0]
     if len(jumps):
         at, below = profile.depth[jumps[0]], profile.depth[jumps[0] + 1]
-        raise FieldError(
-            path,
-            f"changes by more than {STEEPEST:g} m/s per metre between {at:.12g} and {below:.12g} m",
-        )
+        line = f"changes by more than {STEEPEST:g} m/s per metre between {at:.12g} and {below:.12g} m"
+        raise FieldError(path, line)
 
 
 def _check_plain(scene: Scene, number: int) -> None:
@@ -118,35 +113,28 @@ def _check_plain(scene: Scene, number: int) -> None:
     if not _box_in_water(body, bottom_depth):
         size = float(np.ptp(plain.box, axis=0).max())
         name = f"target '{body.name}', {f'{size:.3g} m long {target.shape.read_as}'.strip()},"
-        _check_depth(
-            ("scene", "world", "targets", number, "motion"), name, _places(body), bottom_depth, "the first frame"
-        )
+        path = ("scene", "world", "targets", number, "motion")
+        _check_depth(path, name, _places(body), bottom_depth, "the first frame")
 
 
 def check_shrimp(scene: Scene) -> None:
     """Every source must be in the water, and its pulse one that can be made and heard."""
     bottom_depth = scene.world.environment.depth
     for i, source in enumerate(scene.sources):
+        path = ("scene", "world", "sources", i)
         position = source.checked_position(bottom_depth, scene.trajectory.start)
         if not np.abs(position).max() <= FARTHEST:
-            raise FieldError(
-                ("scene", "world", "sources", i, "position"), f"is more than {FARTHEST:g} m from the origin"
-            )
+            raise FieldError((*path, "position"), f"is more than {FARTHEST:g} m from the origin")
         down = -float(position[2])
         if not 0 <= down <= bottom_depth:
-            raise FieldError(
-                ("scene", "world", "sources", i, "position"),
-                f"depth {down:.12g} m is outside the water (0 to {bottom_depth:g} m)",
-            )
+            raise FieldError((*path, "position"), f"depth {down:.12g} m is outside the water (0 to {bottom_depth:g} m)")
         if late := [time for time in source.times if not abs(time) <= LATEST]:
-            raise FieldError(
-                ("scene", "world", "sources", i, source.times_field),
-                f"{late[0]:g} s is more than {LATEST:g} s from the instant of a frame",
-            )
+            line = f"{late[0]:g} s is more than {LATEST:g} s from the instant of a frame"
+            raise FieldError((*path, source.times_field), line)
         try:
             _check_pulse(source, bottom_depth, scene.sonar)
         except ValueError as error:
-            raise FieldError(("scene", "world", "sources", i, source.pulse_field), str(error)) from None
+            raise FieldError((*path, source.pulse_field), str(error)) from None
     if (chorus := scene.world.chorus) is not None:
         try:
             shrimp = SnappingShrimp(position=(0.0, 0.0), snap=chorus.snap, source_level=chorus.level)
@@ -158,15 +146,15 @@ def check_shrimp(scene: Scene) -> None:
 def check_frame(scene: Scene, frame: Frame) -> None:
     """The array and every body must be in the water, no snap inside a body or the array, and a hydrophone must hear."""
     _check_hearing(scene, frame)
-    bottom_depth = scene.world.environment.depth
-    hydrophones = frame.sonar_pose.to_world(elements(scene.sonar.array).position)
-    when = f"frame {frame.index}"
+    array, bottom_depth, when = elements(scene.sonar.array), scene.world.environment.depth, f"frame {frame.index}"
     if not abs(frame.time) <= OLDEST:
-        raise FieldError(
-            ("scene", "trajectory"), f"{when} is {frame.time:.3g} s from the start of the motions: too far"
-        )
-    array = f"the array, {np.linalg.norm(np.ptp(hydrophones, axis=0)):.3g} m across,"
-    _check_depth(("scene", "trajectory", "sonar"), array, hydrophones, bottom_depth, when)
+        line = f"{when} is {frame.time:.3g} s from the start of the motions: too far"
+        raise FieldError(("scene", "trajectory"), line)
+    centre = frame.sonar_pose.position
+    if not _ball_in_water(centre, array.aperture, bottom_depth):
+        hydrophones = frame.sonar_pose.to_world(array.position)
+        name = f"the array, {np.linalg.norm(np.ptp(hydrophones, axis=0)):.3g} m across,"
+        _check_depth(("scene", "trajectory", "sonar"), name, hydrophones, bottom_depth, when)
     for i, body in enumerate(frame.moment.bodies):
         path = ("scene", "world", "targets", i, "motion")
         if not _box_in_water(body, bottom_depth):
@@ -174,18 +162,16 @@ def check_frame(scene: Scene, frame: Frame) -> None:
         if scene.physics.doppler:
             _check_speed(scene, frame, i)
             _check_met(scene, frame, i)
-        if enclosed(body, frame.sonar_pose.position[None])[0]:
+        if _apart(body, centre, array.aperture):
+            continue
+        if enclosed(body, centre[None])[0]:
             raise FieldError(path, f"target '{body.name}' contains the sonar at {when}, or touches it")
-        if (sensors := enclosed(body, hydrophones)).any():
-            raise FieldError(
-                path, f"target '{body.name}' contains hydrophone {sensors.argmax()} at {when}, or touches it"
-            )
+        if (sensors := enclosed(body, frame.sonar_pose.to_world(array.position))).any():
+            line = f"target '{body.name}' contains hydrophone {sensors.argmax()} at {when}, or touches it"
+            raise FieldError(path, line)
     _check_snaps(scene, frame)
     for number, field in enumerate(frame.moment.scatterers):
-        scatterer_path = ("scene", "world", "scatterers", number)
-        _check_depth(
-            scatterer_path, "a scatterer", field.position, scene.world.environment.depth, f"frame {frame.index}"
-        )
+        _check_depth(("scene", "world", "scatterers", number), "a scatterer", field.position, bottom_depth, when)
 
 
 def _check_hearing(scene: Scene, frame: Frame) -> None:
@@ -196,8 +182,8 @@ def _check_hearing(scene: Scene, frame: Frame) -> None:
     if errors is None or errors.known == "none":
         return
     if not (gain * drawn_errors(errors, len(gain), frame.seed, frame.key).works).any():
-        path = ("scene", "sonar", "sensor_errors")
-        raise FieldError(path, f"every hydrophone is dead or stuck at frame {frame.index}")
+        line = f"every hydrophone is dead or stuck at frame {frame.index}"
+        raise FieldError(("scene", "sonar", "sensor_errors"), line)
 
 
 def _check_met(scene: Scene, frame: Frame, number: int) -> None:
@@ -239,25 +225,39 @@ def _fastest(track: Track, reach: float) -> float:
 def _check_snaps(scene: Scene, frame: Frame) -> None:
     """No source is at the centre of the array, at a hydrophone, or inside a target."""
     owners = [i for i, source in enumerate(scene.world.sources) for _ in source.times]
-    hydrophones = frame.sonar_pose.to_world(elements(scene.sonar.array).position)
+    array, centre = elements(scene.sonar.array), frame.sonar_pose.position
     slowest, bottom = float(_water(scene).speed.min()), scene.world.environment.depth
     for owner, snap in zip(owners, frame.moment.snaps, strict=True):
         path = ("scene", "world", "sources", owner, "position")
-        if np.linalg.norm(snap.position - frame.sonar_pose.position) < CLOSEST:
+        if (away := math.dist(snap.position, centre)) < CLOSEST:
             raise FieldError(path, f"is at the centre of the array at frame {frame.index}")
-        nearest = int(np.argmin(np.linalg.norm(hydrophones - snap.position, axis=1)))
-        if np.linalg.norm(hydrophones[nearest] - snap.position) < CLOSEST:
-            raise FieldError(path, f"is at hydrophone {nearest} of the array at frame {frame.index}")
+        if away < 2.0 * (array.aperture + CLOSEST):
+            distance = np.linalg.norm(frame.sonar_pose.to_world(array.position) - snap.position, axis=1)
+            if distance.min() < CLOSEST:
+                raise FieldError(path, f"is at hydrophone {distance.argmin()} of the array at frame {frame.index}")
         _check_depth(path, "a source", snap.position[None], bottom, f"frame {frame.index}")
         if scene.physics.doppler and math.hypot(*snap.velocity, *frame.sonar_velocity) > 0.4 * MAX_DOPPLER * slowest:
             raise FieldError(path, f"moves too fast for sound in water at frame {frame.index}")
         for body in frame.moment.bodies:
-            if enclosed(body, snap.position[None])[0]:
+            if not _apart(body, snap.position) and enclosed(body, snap.position[None])[0]:
                 raise FieldError(path, f"is inside target '{body.name}' at frame {frame.index}, or touches it")
 
 
+def _apart(body: PlacedTarget, place: Floats, radius: float = 0.0) -> bool:
+    """Whether a ball about a place (xyz), both in m, is so far from the ball round a body that they do not touch."""
+    return math.dist(body.pose.position, place) > 1.01 * (body.mesh.radius + radius) + CLOSEST
+
+
+def _ball_in_water(centre: Floats, radius: float, bottom_depth: float) -> bool:
+    """Whether all that is so near (m) to a place (xyz) m is in the water."""
+    down = -float(centre[2])
+    return radius <= down <= bottom_depth - radius and max(map(abs, centre.tolist())) + radius <= FARTHEST
+
+
 def _box_in_water(body: PlacedTarget, bottom_depth: float) -> bool:
-    """Whether the box round a body is in the water: then all of the body is."""
+    """Whether the ball or the box round a body is in the water: then all of the body is."""
+    if _ball_in_water(body.pose.position, body.mesh.radius, bottom_depth):
+        return True
     corners = body.box
     down = depth(corners)
     return bool(down.min() >= 0.0 and down.max() <= bottom_depth and np.abs(corners).max() <= FARTHEST)
