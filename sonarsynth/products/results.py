@@ -35,9 +35,11 @@ REASONS = (
     "outside_the_water",
     "may_be_an_echo",
     "range_unknown",
+    "cut_off",
 )
 """Why a row of `SourceEstimates` is not accepted: `SourceEstimates.reason` is an index. Of "range_unknown" the position
-alone is NaN: when and from where the pulse came is known; of all others nothing."""
+alone is NaN: when and from where the pulse came is known; of all others nothing. What cuts off is an end of the record.
+"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,12 +22,13 @@ from sonarsynth.ranging.location.candidates import (
     quiet_bin,
     when_heard,
 )
-from sonarsynth.ranging.location.locating_method import unlocatable
+from sonarsynth.ranging.location.locating_method import hearing_whole, unlocatable
 from sonarsynth.ranging.location.pulse_times import AlignedPulse, Pulse
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
     ARRAY,
     BAND,
+    CUT,
     RANGE,
     UNFIT,
     UNRESOLVED,
@@ -175,9 +176,9 @@ def fit_pulse(
     and their lags measured coherently, until these settle: of few sensors first, where these hear it clearly.
     """
     first = _first_wave(signals, elements, sonar, centre, half, quiet)
-    if first is None:
-        return UNFIT
-    wave, off, rows = first
+    if isinstance(first, int):
+        return first
+    wave, off, rows, elements = first
     if not isinstance(rows, slice):
         heard = _excerpt(signals, rows, wave.time, half + pulse_times.half_length(sonar.band))
         own = velocity[rows] if velocity.any() else velocity
@@ -230,9 +231,9 @@ def _aligned(
 
 def _first_wave(
     signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float, quiet: float
-) -> tuple[Wavefront, float, Ints | slice] | None:
+) -> tuple[Wavefront, float, Ints | slice, Elements] | int:
     """Wavefront through the envelope peaks of the sensors, as of `fit_pulse`, the standard error (s) of its times, root
-    mean square over the sensors, and which sensors it is of; None where none fits."""
+    mean square over the sensors, which sensors it is of, and those that hear it whole; or why it is refused."""
     c, (cut, start), settled = sonar.assumed_sound_speed, pulse_times.excerpt(signals, centre, half), pulse_times.FLOOR
     few = scattered(FEW, elements.count) if elements.count >= 2 * FEW else slice(None)
     energy = float(np.square(cut[few]).sum(axis=1).mean()) / signals.sampling_frequency
@@ -248,8 +249,9 @@ def _first_wave(
             if len(q) == elements.count or off < 0.01 / sonar.band.centre:
                 break
     else:
-        return None
-    return wave, off, rows
+        return UNFIT
+    whole = hearing_whole(signals, elements, _times(wave, elements.position, c), pulse_times.half_length(sonar.band))
+    return CUT if whole is None else (wave, off, rows, whole)
 
 
 def _excerpt(signals: Signals, some: Ints | slice, centre: float, half: float) -> Signals:
@@ -291,10 +293,8 @@ def _times(wave: Wavefront, position: Floats, sound_speed: float) -> Floats:
 def _refit(
     pulse: Pulse, wave: Wavefront, elements: Elements, speed: float, extra: Floats | float, measured: float = 0.0
 ) -> Wavefront:
-    """The straight wave at `speed` (m/s) that is left when delays `extra` (sensor,) in s are taken away.
-
-    measured: the speed (m/s) that `wave` was fitted with, where it is another.
-    """
+    """The straight wave at `speed` (m/s) that is left when delays `extra` (sensor,) in s are taken away; measured: the
+    speed (m/s) that `wave` was fitted with, where it is another."""
     q = elements.position
     delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, measured or speed) + wave.residual - extra
     return spherical_wave(delay, q, speed, pulse.weight, wave.direction, wave.curvature) or wave

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
+from sonarsynth.conventions import Floats
 from sonarsynth.description.method import FrameSize, Method, returned_rows
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.receiver import Band, Elements
 from sonarsynth.state import Emission, Receiver, Survey, Trigger
+
+WHOLE = 0.5
+"""Share of the live sensors that must have all of a pulse in the record, or it is not located. Where fewer had, 10
+sources of 48 random scenes were put 1.7 m beside their places, in the median, which is 25 predicted errors."""
 
 
 class LocatingMethod(Method):
@@ -61,3 +67,15 @@ def unlocatable(elements: Elements) -> str | None:
     if not spread[1] > 1e-6 * spread[0]:
         return "the live hydrophones are in one line or in one place: they cannot tell a direction"
     return None
+
+
+def hearing_whole(signals: Signals, elements: Elements, times: Floats, half: float) -> Elements | None:
+    """Elements of which those are dead that have not all of a pulse in the record, `half` (s) to either side of `times`
+    (sensor,) in s; None where that leaves less than `WHOLE` of them, or none that tell a direction."""
+    stop = signals.start + (signals.pressure.shape[1] - 1) / signals.sampling_frequency
+    whole = (times - half >= signals.start) & (times + half <= stop) | (elements.gain == 0.0)
+    if whole.all():
+        return elements
+    left = replace(elements, gain=np.where(whole, elements.gain, 0.0))
+    few = np.count_nonzero(left.gain) < WHOLE * np.count_nonzero(elements.gain)
+    return None if few or unlocatable(left) else left

@@ -46,7 +46,7 @@ LEFT = 0.05
 """Of what a longer window changes of a time, what it leaves: 0.001 to 0.1 were seen, 0.05 root mean square."""
 LEFT_OF_IMAGE = 0.3
 """The same where the longer window holds a reflection that the other does not: 0.05 to 0.7."""
-ACCEPTED, SILENT, ARRAY, BAND, UNFIT, UNRESOLVED, OUTSIDE, ECHO, RANGE = range(len(REASONS))
+ACCEPTED, SILENT, ARRAY, BAND, UNFIT, UNRESOLVED, OUTSIDE, ECHO, RANGE, CUT = range(len(REASONS))
 
 
 @dataclass(frozen=True, eq=False)
