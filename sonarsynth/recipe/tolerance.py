@@ -24,7 +24,8 @@ class Accuracy:
     range_m: Annotated[Number, Gt(0)] = 0.01
     """Error of ranges by the method that turns delays into places, in m."""
     image_db: Annotated[Number, Gt(0), Le(10)] = 0.1
-    """Error of the energy in a beam, in dB: root mean square over those within 20 dB of the brightest."""
+    """Error of the energy in a beam, in dB: root mean square over those within 20 dB of the brightest, and over frames;
+    it is measured in three, and single ones may err by half as much again."""
     speckle: Annotated[Number, Ge(1e-4), Le(10)] = 0.1
     """Error of the contrast of reverberation at a hydrophone, <I^2>/<I>^2, by few scatterers in place of many: it
     decides how many there are. Their energy has no error from that."""

@@ -51,7 +51,7 @@ def beamformer(plan: Plan, indices: Sequence[int]) -> tuple[Any, float]:
 
     def error(method: Any) -> float:
         if method.exact() not in exact:
-            signals = (_signals_of_frame(plan, index) for index in indices)
+            signals = (signals_of_frame(plan, index) for index in indices)
             beams = (exact_beams(plan, method, *sample) for sample in signals if sample is not None)
             exact[method.exact()] = [frame for frame in beams if frame is not None]
         return max((frame.error(plan, method) for frame in exact[method.exact()]), default=0.0)
@@ -77,7 +77,7 @@ def exact_beams(plan: Plan, method: Any, signals: Signals, start: float, stop: f
     return ExactBeams(signals, start, stop, row, column, snapshots.unit * exact)
 
 
-def _signals_of_frame(plan: Plan, index: int) -> tuple[Signals, float, float] | None:
+def signals_of_frame(plan: Plan, index: int) -> tuple[Signals, float, float] | None:
     """Signals of a frame without noise, and its echo window; None where no snap or no echo is heard."""
     plan = plan.at(index)
     frame = plan.recipe.frame(index)[1]
