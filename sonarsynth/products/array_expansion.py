@@ -158,7 +158,7 @@ class ArrayExpansion(Columns):
 
 def stacked(blocks: Sequence[Any]) -> Any:
     """Rows of all blocks, one after the other; columns that some of them lack are 0."""
-    if blocks[0].ndim == 2:
+    if len({block.shape[1:] for block in blocks}) > 1:
         width = max(block.shape[1] for block in blocks)
         lacking = [np.zeros((len(block), width - block.shape[1]), block.dtype) for block in blocks]
         blocks = [np.hstack(pair) if pair[1].shape[1] else pair[0] for pair in zip(blocks, lacking, strict=True)]

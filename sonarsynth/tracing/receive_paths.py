@@ -134,7 +134,7 @@ def apart(row: Ints, travel_time: Floats, arrival: Floats) -> Bools:
     """Which rays (ray,) do not coincide with the one before, of the same row: one from a point on the bottom does with
     the one from its image there."""
     first = np.ones(len(row), bool)
-    same = np.flatnonzero(np.diff(row) == 0)
+    same = np.flatnonzero(row[1:] == row[:-1])
     same = same[np.abs(travel_time[1 + same] - travel_time[same]) < COINCIDENCE_TIME]
     first[1 + same] = (np.abs(arrival[1 + same] - arrival[same]) >= 1e-9).any(axis=1)
     return first

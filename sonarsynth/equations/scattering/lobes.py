@@ -64,12 +64,10 @@ def lobe_amplitude(
     """
     from sonarsynth.equations.scattering import lobes_kernels
 
-    vector_shape = np.broadcast_shapes(np.shape(incident), np.shape(scattered), np.shape(normal), (*np.shape(area), 1))
-    (a, b, n), shape = _rows(incident, scattered, np.broadcast_to(normal, (*vector_shape[:-1], 3)))
-    size = np.broadcast_to(area, shape).reshape(a.shape[:2])
-    out = np.empty(a.shape[:2])
-    lobes_kernels.amplitudes(a, b, n, size, slope_lobe(a, b, n, slope), share, albedo / np.pi, beyond, out)
-    return out.reshape(shape)
+    (a, b, n, size), shape = _rows(incident, scattered, normal, np.asarray(area)[..., None])
+    lobe = slope_lobe(a, b, n, slope)
+    lobes_kernels.amplitudes(a, b, n, size[..., 0], lobe, share, albedo / np.pi, beyond, lobe)
+    return lobe.reshape(shape)
 
 
 def _rows(*vectors: Floats) -> tuple[list[Floats], tuple[int, ...]]:

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonarsynth.casting import folded_rays
-from sonarsynth.casting.cones import CLOSED, UNKNOWN, classify_cones
+from sonarsynth.casting.cones import CLOSED, EMPTY, UNKNOWN, classify_cones
 from sonarsynth.casting.ray_casting import enclosing, occluded
 from sonarsynth.columns import picked
 from sonarsynth.conventions import Bools, Floats, Ints, depth
@@ -32,8 +32,8 @@ def hidden(
 
     bounces, turning (ray,): their reflections from surface and bottom, and turning points; facets: the body (ray,) and
     the facet of it (ray,) in whose middle rays start, where they do (`ray_casting.occluded`). Straight rays and
-    reflections in uniform water are exact, of most of these by what they do before they are reflected; bent rays are
-    followed by chords within `SAGITTA_TOLERANCE`, but only where no narrow cone that holds them tells.
+    reflections in uniform water are exact; bent rays are followed by chords within `SAGITTA_TOLERANCE`, but only where
+    no narrow cone that holds them tells (`classify_rays`).
     """
     blocked = np.zeros(len(start), bool)
     if not bodies or not len(start):
@@ -42,14 +42,9 @@ def hidden(
         return occluded(bodies, start, end, *facets)
     times, turns = (np.zeros(len(start), np.int64) if of is None else of for of in (bounces, turning))
     ray = start, end, departure, length, np.zeros(len(start))
-    if medium.profile.uniform:
-        slope, reach, _ = _cones(bodies, medium, *ray, times, turns)
-        sure, to = np.isfinite(slope), np.where(times[:, None] > 0, start + reach[:, None] * departure, end)
-        blocked[sure] = occluded(bodies, start[sure], to[sure], *(None if of is None else of[sure] for of in facets))
-        left = np.flatnonzero(~sure)
-    else:
-        verdict = classify_rays(bodies, medium, *ray, bounces=times, turning=turns, facets=facets)
-        blocked[verdict == CLOSED], left = True, np.flatnonzero(verdict >= UNKNOWN)
+    verdict = classify_rays(bodies, medium, *ray, bounces=times, turning=turns, facets=facets)
+    blocked[verdict == CLOSED] = True
+    left = np.flatnonzero(verdict >= UNKNOWN)
     blocked[left] = _along_chords(bodies, medium, start[left], end[left], departure[left], length[left])
     return blocked
 
@@ -59,23 +54,24 @@ def classify_rays(
     spread: Floats, *, bounces: Ints, turning: Ints, facets: tuple[Ints | None, Ints | None],
 ) -> Ints:  # fmt: skip
     """What is certain (ray,) of all rays to within `spread` (ray,) m of some ends, as of `classify_cones`: by cones
-    that hold what `hidden` looks at of them. NO_CONE where there is none: of reflected rays that may meet a body again.
+    that hold what `hidden` looks at of them, or by rays where they are straight so far. NO_CONE where there is none: of
+    reflected rays that may meet a body again.
 
     Arguments as of `hidden`, for the rays to the middle; those beside them, unfolded, end within `spread` of them and
     leave as straight rays to there would.
     """
-    cones = _cones(bodies, medium, start, end, departure, length, spread, bounces, turning)
+    limits = layer_curvatures(medium.profile), SAGITTA_TOLERANCE, medium.depth
+    cones = folded_rays.ray_cones(start, end, departure, length, spread, bounces, turning, *limits, *spheres(bodies))
     verdict, sure = np.full(len(start), NO_CONE), picked(np.isfinite(cones[0]))
     slope, reach, far = (column[sure] for column in cones)
     owner, facet = (None if of is None else of[sure] for of in facets)
-    verdict[sure] = classify_cones(bodies, start[sure], departure[sure], slope, reach, far, (owner, facet))
+    apex, axis = start[sure], departure[sure]
+    if medium.profile.uniform and not spread.any():
+        to = np.where(bounces[sure, None] > 0, apex + reach[:, None] * axis, end[sure])
+        verdict[sure] = np.where(occluded(bodies, apex, to, owner, facet), CLOSED, EMPTY)
+    else:
+        verdict[sure] = classify_cones(bodies, apex, axis, slope, reach, far, (owner, facet))
     return verdict
-
-
-def _cones(bodies: tuple[PlacedTarget, ...], medium: Medium, *rays: np.ndarray) -> tuple[Floats, Floats, Floats]:
-    """`folded_rays.ray_cones` of rays among bodies."""
-    limits = layer_curvatures(medium.profile), SAGITTA_TOLERANCE, medium.depth
-    return folded_rays.ray_cones(*rays, *limits, *spheres(bodies))
 
 
 def spheres(bodies: tuple[PlacedTarget, ...]) -> tuple[Floats, Floats]:
