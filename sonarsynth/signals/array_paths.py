@@ -64,9 +64,10 @@ class Wavefronts(Columns):
         return np.unpackbits(self.occluded, axis=1, count=1 + sensors)[:, 1:].astype(bool)
 
     def select(self, keep: Bools | Ints | Sequence[int] | slice) -> Self:
-        """As `Columns.select`; the same where these are all, in order."""
-        every = not isinstance(keep, slice) and len(keep) == self.count and np.array_equal(keep, np.arange(self.count))
-        return self if every else super().select(keep)
+        """As `Columns.select`; of rows that follow each other nothing is copied."""
+        if isinstance(keep, np.ndarray) and keep.dtype != bool and keep.size and (np.diff(keep) == 1).all():
+            keep = slice(int(keep[0]), int(keep[-1]) + 1)
+        return super().select(keep)
 
     def without_faint_shadows(self, tolerance: float, elements: Elements) -> Self:
         """The paths, of which the faintest that reach a part of the hydrophones now reach all or none, as is nearer.

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 
-from sonarsynth.conventions import Ints, Number
+from sonarsynth.conventions import Number
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize
 from sonarsynth.products import Arrivals, Signals
@@ -56,13 +56,6 @@ def deposit_error(method: GriddedSynthesis, bandwidth: float = np.inf) -> float:
     `GriddedSynthesis`)."""
     kernel = kernel_error(method.width, method.oversampling, bandwidth)
     return kernel + error_over_tolerance(bandwidth) * method.tolerance + ROUNDING[method.precision]
-
-
-def _neighbours_apart(paths: Ints) -> Ints:
-    """The paths in an order that puts neighbours, which arrive at nearly one time, apart: a sum that was just written
-    cannot be read at once, and deposits take a third more."""
-    places = np.arange(-(-paths.size // 8) * 8).reshape(8, -1).T.ravel()
-    return paths[places[places < paths.size]]
 
 
 def _sounding(plan: Layout, front: ArrayPaths, sampling_frequency: float, samples: int) -> list[tuple[int, int]]:
@@ -186,7 +179,7 @@ class GriddedSynthesis(UnroundedSynthesis):
         low, high = (0, samples) if whole else (min(low for low, _ in sounding), max(high for _, high in sounding))
         out = np.zeros((elements.count, high - low), self.precision)
         for span, within in zip(plan.stretches, sounding, strict=False):
-            paths = front.select(_neighbours_apart(span.paths))
+            paths = front.select(span.paths)
             if paths.count > FEW or not still:
                 self.add(out, low, span, paths, reception)
             else:
