@@ -21,7 +21,7 @@ HELD_BYTES: Final = 8
 TOGETHER: Final = 8
 """Frames at most that go through each stage together, so that its code and constants are in the caches for all but the
 first."""
-TOGETHER_BYTES: Final = 100e6
+TOGETHER_BYTES: Final = 160e6
 """Of memory at most that frames take that go through each stage together."""
 SHARD_COPIES: Final = 3
 """Times the bytes of a shard that a process takes to keep its frames and to write them; measured 2.3 to 2.9."""

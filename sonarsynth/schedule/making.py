@@ -57,7 +57,8 @@ def job_of(path: Folder, plan: Plan, build: str, frame_timeout: float | None = N
     limit = PATIENCE + 20 * predicted if frame_timeout is None else frame_timeout
     frames = min(BLOCK_SECONDS / max(predicted, 1e-6), plan.shard_frames)
     products = tuple(sorted(plan.products))
-    block, together = max(int(frames), 1), plan.frames_together
+    together = plan.frames_together
+    block = max(int(frames) // together * together or int(frames), 1)  # of whole groups
     return Job(str(path), plan.digest, products, build, limit, plan.shard_frames, block, together)
 
 

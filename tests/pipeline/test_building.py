@@ -109,6 +109,7 @@ def test_a_task_is_of_one_frame_where_they_are_long(small_plan: Plan) -> None:
 
     assert block(20.0) == block(2.0) == 1
     assert block(0.99) == 3
+    assert block(0.2) == small_plan.frames_together * (15 // small_plan.frames_together) > 0  # no group is cut
     assert block(1e-9) == 64
 
 
