@@ -20,7 +20,7 @@ from sonarsynth.labels.estimate_labels import Direct
 from sonarsynth.pipeline.echo_image import cloud_of, image_of, image_without_clock, range_image_of
 from sonarsynth.pipeline.frame_chorus import clear_values, frame_chorus, soundscape_values, with_chorus
 from sonarsynth.pipeline.frame_reverberation import frame_reverberation, scattered_paths, with_reverberation
-from sonarsynth.pipeline.handed_on import BeamformedFrame, TracedFrame
+from sonarsynth.pipeline.handed_on import BeamformedFrame, Sound, TracedFrame
 from sonarsynth.pipeline.labelled_estimates import emission_values, estimate_truth, heard_directly
 from sonarsynth.pipeline.labelling import band_of, expansion_error, frame_values, isolated_levels, point_labels
 from sonarsynth.pipeline.requested_rays import follow_rays
@@ -142,11 +142,12 @@ def trace_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> Trac
     return TracedFrame(frame, arrivals, truth, budget, levels_of_echoes, *others)
 
 
-def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
-    """Signals, source estimates, and the energy image of the echo window, as far as the products need them."""
+def beamform_frame(plan: Plan, index: int, traced: TracedFrame, sound: Sound | None = None) -> BeamformedFrame:
+    """Signals, source estimates, and the energy image of the echo window, as far as the products need them.
+    sound: as `prepared_sound` has it, if at hand."""
     plan = plan.at(index)
     parts = SoundParts(plan)
-    recorded = synthesise(plan, traced, parts)
+    recorded = synthesise(plan, traced, parts, sound)
     mark_stage("synthesise")
     isolated = None
     if "signals" in plan.products:
@@ -184,10 +185,12 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
     return BeamformedFrame(signals, estimates, image, imaged, beams)
 
 
-def synthesise(plan: Plan, traced: TracedFrame, recorder: Recorder = NO_RECORDER) -> Signals:
+def synthesise(
+    plan: Plan, traced: TracedFrame, recorder: Recorder = NO_RECORDER, sound: Sound | None = None
+) -> Signals:
     """Pressure at each hydrophone: echoes and direct snap, reverberation, chorus, ambient noise, converter."""
     plan = plan.at(traced.frame.index)
-    signals = frame_signals(plan, traced.frame, traced.arrivals, recorder)
+    signals = frame_signals(plan, traced.frame, traced.arrivals, recorder, sound)
     recorder("paths", signals)
     signals = with_reverberation(plan, traced.frame, signals, traced.reverberation)
     recorder("reverberation", signals)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from sonarsynth.conventions import Floats
@@ -10,6 +11,9 @@ from sonarsynth.products import Arrivals, BeamSpectra, Echoes, EnergyImage, Link
 from sonarsynth.products.pulse_arrivals import ReverberationArrivals
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.chorus.chorus_arrivals import ChorusArrivals
+
+Sound = dict[int, Callable[[], Signals]]
+"""What gives the signals of each target, numbered as in `Recorder.echo`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@ and the converter. The array is one, or cut into subarrays to each of which path
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any, Final
@@ -13,6 +14,7 @@ import numpy.typing as npt
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, depth
 from sonarsynth.description.method import returned
 from sonarsynth.geometry.motion import pose, velocity
+from sonarsynth.pipeline.handed_on import Sound
 from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.planning import Plan, arrivals_of, behind_baffle, context_of, frame_start
 from sonarsynth.planning.measured.sampled_arrivals import reception_of
@@ -21,7 +23,7 @@ from sonarsynth.products import Arrivals, Kind, Signals
 from sonarsynth.randomness import stream
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.sensor_errors import DrawnErrors, SensorState, drawn_errors
-from sonarsynth.receiver.subarrays import Subarray, subarrays
+from sonarsynth.receiver.subarrays import subarrays
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import add_noise, channel_errors, convert
 from sonarsynth.signals.electronics import ElectronicNoise
@@ -51,21 +53,33 @@ class Recorder:
 NO_RECORDER: Final = Recorder()
 
 
-def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals, recorder: Recorder = NO_RECORDER) -> Signals:
+def prepared_sound(plan: Plan, frame: Frame, arrivals: Arrivals) -> Sound:
+    """What `frame_signals` then sums at the hydrophones; none where the plan cuts the array into subarrays.
+
+    Before that all is small: done for some frames, one after the other, it stays in the caches of a core.
+    """
+    sound = {} if plan.choices.subarrays > 1 else _by_target(plan, frame, arrivals, true_elements(plan, frame))
+    mark_stage("synthesise")
+    return sound
+
+
+def frame_signals(
+    plan: Plan, frame: Frame, arrivals: Arrivals, recorder: Recorder = NO_RECORDER, sound: Sound | None = None
+) -> Signals:
     """Pressure at each hydrophone, at its true place, before noise and converter.
 
-    arrivals: paths of the frame to the whole array. Where the plan cuts the array into subarrays, paths are traced
-    again to each, and `outside` is that of the subarray that loses most. In a scene that has more than echoes, the
-    echoes of each target are made apart, which its signal to noise needs, and added. Raises ValueError for anything
-    outside the water.
+    arrivals: paths of the frame to the whole array; sound: what `prepared_sound` has of these, if at hand. Where the
+    plan cuts the array into subarrays, paths are traced again to each, and `outside` is that of the subarray that loses
+    most. In a scene that has more than echoes, the echoes of each target are made apart, which its signal to noise
+    needs, and added. Raises ValueError for anything outside the water.
     """
     sensors, start, rate = true_elements(plan, frame), frame_start(plan, frame), plan.scene.sonar.sampling_frequency
     if plan.choices.subarrays == 1:
-        heard, outside = _by_target(plan, frame, arrivals, sensors)
+        heard, outside = _summed(sound or _by_target(plan, frame, arrivals, sensors))
     else:
         heard, outside = dict[int, Signals](), 0
         for part in subarrays(sensors, plan.choices.subarrays):
-            of_part, lost = subarray_signals(plan, frame, part)
+            of_part, lost = _summed(_by_target(plan, frame, arrivals_of(plan, frame, part), part.elements))
             for target, signals in of_part.items():
                 if target not in heard:
                     heard[target] = Signals(_silence(plan, sensors), start, rate, 0.0, 0, 0)
@@ -91,34 +105,45 @@ def _add(total: Signals, signals: Signals, sensor: Ints | slice = slice(None)) -
     total.pressure[sensor, first : first + signals.pressure.shape[1]] += signals.pressure
 
 
-def _by_target(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> tuple[dict[int, Signals], int]:
-    """Signals by target, numbered as in `Recorder.echo` (one number in a scene that has nothing but echoes, else each
-    of the stretch of the window that it sounds in), and how many arrivals the window cuts."""
+def _by_target(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> Sound:
+    """The sound of each target, numbered as in `Recorder.echo`: one number in a scene that has nothing but echoes, else
+    each of the stretch of the window that it sounds in."""
     if not plan.scene.sound_parts:
-        signals = array_signals(plan, frame, arrivals, sensors)
-        return {NO_TARGET: signals}, signals.outside
+        return {NO_TARGET: _prepared(plan, frame, arrivals, sensors)}
     owner = np.where(arrivals.kind == Kind.REVERBERATION, SCATTERERS, arrivals.target)
-    heard = {
-        number: array_signals(plan, frame, arrivals.select(np.flatnonzero(owner == number)), sensors, whole=False)
+    return {
+        number: _prepared(plan, frame, arrivals.select(np.flatnonzero(owner == number)), sensors, whole=False)
         for number in np.union1d(owner, NO_TARGET).tolist()
     }
+
+
+def _summed(sound: Sound) -> tuple[dict[int, Signals], int]:
+    """Signals by target, and how many arrivals the window cuts."""
+    heard = {target: signals() for target, signals in sound.items()}
     return heard, sum(signals.outside for signals in heard.values())
 
 
-def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> tuple[dict[int, Signals], int]:
-    """As `_by_target`, of one part of the array and of paths that are traced to it."""
-    return _by_target(plan, frame, arrivals_of(plan, frame, part), part.elements)
+def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> Signals:
+    """Pressure at hydrophones, of arrivals that are expanded over all of them; the baffle weakens sound from behind."""
+    return _prepared(plan, frame, arrivals, sensors)()
 
 
-def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements, *, whole: bool = True) -> Signals:
-    """Pressure at hydrophones, of arrivals that are expanded over all of them; the baffle weakens sound from behind.
-    whole: as of `Reception`."""
+def _prepared(
+    plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements, *, whole: bool = True
+) -> Callable[[], Signals]:
+    """What gives `array_signals`, prepared as far as the method can. whole: as of `Reception`."""
     reception = reception_of(plan, frame)._replace(elements=sensors, whole=whole, still=not frame.sonar_velocity.any())
     method, heard = plan.choices.synthesis, behind_baffle(arrivals, plan.scene.sonar)
-    made = method.signals(heard, frame.moment.snaps, reception)
-    samples = (reception.samples,) if whole else np.shape(getattr(made, "pressure", 0))[1:]
-    refused = plan.scene.sonar.converter is not None  # NaN, without a look at all samples here
-    signals: Signals = returned(method, "signals", made, (sensors.count, *samples), "pressure", unknown=refused)
+    prepare: Any = getattr(method, "prepared", partial(partial, method.signals))
+    make = prepare(heard, frame.moment.snaps, reception)
+
+    def signals() -> Signals:
+        made = make()
+        samples = (reception.samples,) if whole else np.shape(getattr(made, "pressure", 0))[1:]
+        refused = plan.scene.sonar.converter is not None  # NaN, without a look at all samples here
+        checked: Signals = returned(method, "signals", made, (sensors.count, *samples), "pressure", unknown=refused)
+        return checked
+
     return signals
 
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from sonarsynth import pipeline, planning, store
+from sonarsynth.pipeline.synthesis import prepared_sound
 from sonarsynth.planning import Plan, choices_from
 from sonarsynth.recipe import reading
 from sonarsynth.schedule import worker_status
@@ -127,9 +128,15 @@ def _label(plan: Plan, frame: int, paths: Any) -> Any:
     return layout_of(plan).check(pipeline.silent_frame(plan, frame))
 
 
-def _beamform(plan: Plan, frame: int, traced: pipeline.TracedFrame) -> Any:
+def _prepare(plan: Plan, frame: int, traced: pipeline.TracedFrame) -> Any:
+    """What was traced, and its sound."""
+    return traced, prepared_sound(plan.at(frame), traced.frame, traced.arrivals)
+
+
+def _beamform(plan: Plan, frame: int, before: tuple[pipeline.TracedFrame, Any]) -> Any:
     """What was traced with what was heard; values, where that is the last stage."""
-    both = traced, pipeline.beamform_frame(plan, frame, traced)
+    traced, sound = before
+    both = traced, pipeline.beamform_frame(plan, frame, traced, sound)
     return both if len(stages_of(plan.products)) == 3 else _values(plan, frame, both)
 
 
@@ -148,7 +155,7 @@ Step = Callable[[Plan, int, Any], Any]
 """A part of a stage: of the plan, the number of a frame and what the step before made of it, what this one makes."""
 STAGES: Final[Mapping[str, Sequence[Step]]] = {
     "trace": (_trace, _label),
-    "beamform": (_beamform,),
+    "beamform": (_prepare, _beamform),
     "range": (_range, _values),
 }
 """Steps of each stage, in order."""

@@ -261,20 +261,6 @@ def face_reach(front: Wavefronts, elements: Elements) -> Floats:
     return np.asarray(0.5 * elements.face / front.sound_speed * (y + z))
 
 
-def steered_spread(front: Wavefronts, rows: Ints | slice) -> float:
-    """Bound (s) on how much sooner or later some paths meet any hydrophone than one front from among them, which meets
-    the array centre when they do."""
-    aperture, curvature, late = front.aperture, front.curvature[rows], front.expansion.delay[rows]
-    spread = 2.0 * (aperture / front.sound_speed + float(np.abs(late).sum(axis=1).max()))
-    if float(curvature.max()) * aperture > 0.5:
-        return spread
-    direction = front.direction.T if isinstance(rows, slice) else np.take(front.direction.T, rows, axis=1)
-    far = [np.ptp(along) for along in direction]
-    # |R d - q| - R varies with d by at most 2 |q|, with 1/R by at most |q|^2
-    apart = 2.0 * aperture * float(np.linalg.norm(far)) + aperture**2 * float(np.ptp(curvature))
-    return min(spread, apart / front.sound_speed + float(sum(np.ptp(term) for term in late.T)))
-
-
 def reference_of(front: Wavefronts, middle: Floats, phase: Floats, variance: Floats) -> Wavefronts:
     """The front that a tile of paths is steered to, from the middle (column,) of their directions, curvatures,
     absorption and delay terms, and the change over the aperture that it takes."""

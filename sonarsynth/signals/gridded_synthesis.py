@@ -3,6 +3,7 @@ domain."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Annotated, Any, Final, Literal
@@ -19,7 +20,7 @@ from sonarsynth.receiver import stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths, array_paths, reach
 from sonarsynth.signals.direct_sum import UnroundedSynthesis, attenuation
 from sonarsynth.signals.gridded.bins import bins_of
-from sonarsynth.signals.gridded.deposit import add_segment
+from sonarsynth.signals.gridded.deposit import Waves, add, prepared
 from sonarsynth.signals.gridded.tiles import FEW
 from sonarsynth.signals.pulse_variation import from_the_sharpest
 from sonarsynth.signals.segments import GUARD, Layout, Reception, Segment, layout
@@ -74,13 +75,21 @@ class _FewPaths:
     span: Segment = field(compare=False)
     paths: ArrayPaths = field(compare=False)
 
+    @staticmethod
+    def of(span: Segment, within: tuple[int, int], paths: ArrayPaths) -> _FewPaths:
+        """Those of a stretch."""
+        tables = paths.but(expansion=None), paths.expansion, replace(span, paths=span.paths[:0])
+        held = [value for table in tables for value in vars(table).values()]
+        known = tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in held)
+        return _FewPaths(known, within, span, paths)
+
 
 @lru_cache(maxsize=4)
 def sound_of_few(few: _FewPaths, method: GriddedSynthesis, reception: Reception) -> npt.NDArray[Any]:
     """Pressure (sensor, sample) of few paths, where they are heard."""
     first, stop = few.within
     out = np.zeros((reception.elements.count, stop - first), method.precision)
-    method.add(out, first, few.span, few.paths, reception)
+    add(out, first, method.waves(few.span, few.paths, reception))
     return out
 
 
@@ -155,45 +164,56 @@ class GriddedSynthesis(UnroundedSynthesis):
         self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
     ) -> tuple[npt.NDArray[Any], int]:
         """As `UnroundedSynthesis.pressure`: silence, and stretches of it that hold whole pulses."""
-        pressure, _, outside = self._heard(arrivals, snaps, reception._replace(whole=True))
+        pressure, _, outside = self._sound(arrivals, snaps, reception._replace(whole=True))()
         return pressure, outside
 
     def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
         """As `SignalSynthesis.signals`."""
-        pressure, first, outside = self._heard(arrivals, snaps, reception)
-        rate = reception.sonar.sampling_frequency
-        start = reception.start + first / rate
-        return Signals(pressure.astype(np.float32, copy=False), start, rate, 0.0, 0, outside)
+        return self.prepared(arrivals, snaps, reception)()
 
-    def _heard(
+    def prepared(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Callable[[], Signals]:
+        """As `SignalSynthesis.signals`, but for the sums at the hydrophones."""
+        sound, rate = self._sound(arrivals, snaps, reception), reception.sonar.sampling_frequency
+
+        def signals() -> Signals:
+            pressure, first, outside = sound()
+            start = reception.start + first / rate
+            return Signals(pressure.astype(np.float32, copy=False), start, rate, 0.0, 0, outside)
+
+        return signals
+
+    def _sound(
         self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
-    ) -> tuple[npt.NDArray[Any], int, int]:
-        """Pressure (sensor, sample), the sample of the window where it begins, and the number of arrivals that the
-        window cuts."""
+    ) -> Callable[[], tuple[npt.NDArray[Any], int, int]]:
+        """What gives the pressure (sensor, sample), the sample of the window where it begins, and the number of
+        arrivals that the window cuts."""
         elements, sonar, absorption, _, samples, whole, still = reception
-        fs = sonar.sampling_frequency
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
         front = from_the_sharpest(front, stop_frequency(sonar.antialias))
         plan = layout(arrivals, front, snaps, reception, tolerance=0.01 * self.tolerance)
-        sounding = _sounding(plan, front, fs, samples)
+        sounding = _sounding(plan, front, sonar.sampling_frequency, samples)
         low, high = (0, samples) if whole else (min(low for low, _ in sounding), max(high for _, high in sounding))
-        out = np.zeros((elements.count, high - low), self.precision)
+        parts: list[Waves | _FewPaths] = []
         for span, within in zip(plan.stretches, sounding, strict=False):
             paths = front.select(span.paths)
-            if paths.count > FEW or not still:
-                self.add(out, low, span, paths, reception)
-            else:
-                tables = paths.but(expansion=None), paths.expansion, replace(span, paths=span.paths[:0])
-                held = [value for table in tables for value in vars(table).values()]
-                known = tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in held)
-                few = _FewPaths(known, within, span, paths)
-                out[:, within[0] - low : within[1] - low] += sound_of_few(few, self, reception)
-        return out, low, plan.outside
+            few = still and paths.count <= FEW
+            parts.append(_FewPaths.of(span, within, paths) if few else self.waves(span, paths, reception))
 
-    def add(self, out: npt.NDArray[Any], begin: int, span: Segment, paths: ArrayPaths, reception: Reception) -> None:
-        """Add the pressure of the paths of a stretch to out (sensor, sample), from a sample of the window on."""
+        def sound() -> tuple[npt.NDArray[Any], int, int]:
+            out = np.zeros((elements.count, high - low), self.precision)
+            for part in parts:
+                if isinstance(part, _FewPaths):
+                    first, stop = part.within
+                    out[:, first - low : stop - low] += sound_of_few(part, self, reception)
+                else:
+                    add(out, low, part)
+            return out, low, plan.outside
+
+        return sound
+
+    def waves(self, span: Segment, paths: ArrayPaths, reception: Reception) -> Waves:
+        """The waves of the paths of a stretch."""
         sonar, method = reception.sonar, (self.width, self.oversampling, self.precision, self.tolerance)
         paths, bins = bins_of(span, paths, sonar, reception.absorption, self.tolerance)
         origin, stop = reception.start + span.first / sonar.sampling_frequency, stop_frequency(sonar.antialias)
-        here = replace(span, first=span.first - begin)
-        add_segment(out, here, paths, reception.elements, bins, origin=origin, stop=stop, method=method)
+        return prepared(span, paths, reception.elements, bins, origin=origin, stop=stop, method=method)

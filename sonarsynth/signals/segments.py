@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from math import dist
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from sonarsynth.equations.noise.filters import SUPPORT_TOLERANCE
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
-from sonarsynth.signals.array_paths import ArrayPaths, delay_and_gain, face_reach, reach, steered_spread
+from sonarsynth.signals.array_paths import ArrayPaths, Wavefronts, delay_and_gain, face_reach, reach
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, pulse_support, silencing_blur
 from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
@@ -22,6 +23,8 @@ FAST = (16, 18, 20, 24, 27, 30)
 """Lengths of segments are these times powers of two: fast to transform, and so few that cached spectra of pulses are
 used again."""
 
+
+NOWHERE = np.zeros((0, 3))
 
 GUARD = 4
 """Samples of silence at either end of a segment: half of the widest kernel that interpolates it at hydrophones."""
@@ -103,7 +106,7 @@ def layout(
             rows = np.flatnonzero(same & (kind == number))
             for chosen in _runs(rows, begin, end):
                 sooner, later = np.take(longer, chosen, axis=1).max(axis=1)
-                delay, spread = front.delay[chosen] - start, steered_spread(front, chosen)
+                delay, spread = front.delay[chosen] - start, steered_spread(front, ends_of(front, chosen))
                 first = int(np.floor((delay.min() - sooner - spread) * fs)) - GUARD
                 length = fast_length(int(np.ceil((delay.max() + later + spread) * fs)) + GUARD + 1 - first)
                 stretches.append(Segment(chosen, waveform, number > 1, first, length, float(sooner), float(later)))
@@ -172,3 +175,29 @@ def _runs(rows: Ints, early: Floats, late: Floats) -> Iterator[Ints]:
     silent = early[order[1:]] > np.maximum.accumulate(late[order])[:-1]
     for run in np.split(order, np.flatnonzero(silent) + 1):
         yield np.sort(run)
+
+
+def ends_of(front: Wavefronts, paths: Ints, points: Floats = NOWHERE, gradient: Floats = NOWHERE) -> Floats:
+    """The smallest and the largest (2, column) of some paths: direction, curvature, absorption, delay terms; and
+    slownesses at points (point, xyz), to which delay terms add -c times their gradient (xyz, point, term)."""
+    from sonarsynth.signals.gridded.variation_kernels import extremes
+
+    late, lean = front.expansion.delay, np.zeros((0, 3, 0))
+    if late.size and points.size:
+        slopes = -front.sound_speed * gradient[:, :, : late.shape[1]]
+        lean = np.einsum("et,ipt->pie", late[paths], slopes, order="C")
+    ends: Floats = extremes(front.direction, front.curvature, front.loss, late, lean, paths, points)
+    return ends
+
+
+def steered_spread(front: Wavefronts, ends: Floats) -> float:
+    """Bound (s) on how much sooner or later paths with such ends (`ends_of`) meet any hydrophone than one front from
+    among them, which meets the array centre when they do."""
+    aperture, (low, high) = front.aperture, ends[:, : 5 + front.expansion.delay.shape[1]].tolist()
+    late = list(zip(low[5:], high[5:], strict=True))
+    spread: float = 2.0 * (aperture / front.sound_speed + sum(max(-a, b) for a, b in late))
+    if high[3] * aperture > 0.5:
+        return spread
+    # |R d - q| - R varies with d by at most 2 |q|, with 1/R by at most |q|^2
+    apart = 2.0 * aperture * dist(low[:3], high[:3]) + aperture**2 * (high[3] - low[3])
+    return min(spread, float(apart / front.sound_speed + sum(b - a for a, b in late)))

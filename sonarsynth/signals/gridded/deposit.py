@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +15,9 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.kernels.fourier_sums import waves
 from sonarsynth.equations.noise import filters
 from sonarsynth.receiver import Elements
-from sonarsynth.signals.array_paths import NEPER, Wavefronts, delay_and_gain, steered_spread, tilt
+from sonarsynth.signals.array_paths import NEPER, Wavefronts, delay_and_gain, tilt
 from sonarsynth.signals.gridded.bins import Bins, highest_heard
-from sonarsynth.signals.gridded.interpolation import to_sensors
+from sonarsynth.signals.gridded.interpolation import Axes, to_sensors
 from sonarsynth.signals.gridded.low_rank import face_pairs, spectral_quantiles, term_products
 from sonarsynth.signals.gridded.spectral_factors import (
     Kernel,
@@ -33,10 +35,25 @@ from sonarsynth.signals.segments import GUARD, Segment
 
 LARGEST = 1 << 20
 """Most numbers in a deposit grid or a field: nodes, or paths by themselves, are taken in groups of so many."""
+HELD = 1 << 17
+"""Most numbers of a field that waves are made of before they are asked for."""
 
 
-def add_segment(
-    out: npt.NDArray[Any],
+class Wave(NamedTuple):
+    """What sounds at the nodes of a tile."""
+
+    pressure: npt.NDArray[Any]  # (reference, node, sample) at twice the sampling rate
+    begin: Ints  # (reference,) its first sample of the window
+    late: Floats  # (reference, sensor) samples at twice the sampling rate
+    gain: Floats  # (reference, sensor)
+    axes: Axes | None
+    stage: Stage
+
+
+Waves = Callable[[], Iterable[Wave]]
+
+
+def prepared(
     segment: Segment,
     front: Wavefronts,
     elements: Elements,
@@ -45,8 +62,8 @@ def add_segment(
     origin: float,
     stop: float,
     method: tuple[int, float, str, float],
-) -> None:
-    """Add to out (sensor, sample) the pressure of paths in a stretch, which begins at `origin` (s).
+) -> Waves:
+    """What gives the waves of paths in a stretch, which begins at `origin` (s); few are made at once.
 
     stop (Hz) is the stop edge of the filter; method is width, oversampling, precision and tolerance of
     `GriddedSynthesis`.
@@ -73,15 +90,30 @@ def add_segment(
     stage = Stage(aim, bins, origin, segment, grid, oversampling, wave, dtype, tails)
     front = Wavefronts(**{name: getattr(front, name) for name in Wavefronts.__dataclass_fields__})  # no more is needed
     front = _in_parts(front.without_faint_shadows(0.1 * tolerance, elements), elements.count)
-    for tile in tiles(front, aim) if front.count else ():
-        paths = tile.reference if tile.alone else front.select(_neighbours_apart(tile.paths))
-        most = max(1, LARGEST // (len(tile.nodes(elements)) * samples))
-        if not tile.alone or paths.count <= most:
-            _add_tile(out, tile, paths, stage)
+    chosen = tiles(front, aim) if front.count else []
+    later = partial(_waves, front, chosen, stage)
+    if sum(len(tile.nodes(elements)) * tile.reference.count for tile in chosen) * samples > HELD:
+        return later
+    made = tuple(later())
+    return lambda: made
+
+
+def add(out: npt.NDArray[Any], first: int, waves: Waves) -> None:
+    """Add waves to the pressure in out (sensor, sample), whose sample 0 is sample `first` of the window."""
+    for wave in waves():
+        _hear(out, first, wave)
+
+
+def _waves(front: Wavefronts, chosen: list[Tile], stage: Stage) -> Iterator[Wave]:
+    """The waves of all tiles, one by one."""
+    for tile in chosen:
+        if not tile.alone:
+            yield _wave(tile, front.select(_neighbours_apart(tile.paths)), stage)
             continue
-        for first in range(0, paths.count, most):
-            some = paths.select(np.arange(first, min(first + most, paths.count)))
-            _add_tile(out, replace(tile, paths=tile.paths[first : first + most], reference=some), some, stage)
+        most = max(1, LARGEST // (len(tile.nodes(stage.aim.elements)) * stage.segment.samples))
+        for first in range(0, tile.paths.size, most):
+            some = tile.reference.select(slice(first, first + most))
+            yield _wave(replace(tile, paths=tile.paths[first : first + most], reference=some), some, stage)
 
 
 def _neighbours_apart(paths: Ints) -> Ints:
@@ -113,8 +145,8 @@ def _on_grid(bins: Bins, highest: float, width: int, oversampling: float, dtype:
     return bins.cut(min(bins.frequency.size, circle // 2 - bins.first)), grid
 
 
-def _add_tile(out: npt.NDArray[Any], tile: Tile, paths: Wavefronts, stage: Stage) -> None:
-    """Add the pressure of a tile at the hydrophones to out (sensor, sample)."""
+def _wave(tile: Tile, paths: Wavefronts, stage: Stage) -> Wave:
+    """What sounds at the nodes of a tile."""
     reference, points = tile.reference, tile.nodes(stage.aim.elements)
     begin, length = _lasting(tile, paths, stage)
     stage = _shorter(stage, length)
@@ -123,15 +155,22 @@ def _add_tile(out: npt.NDArray[Any], tile: Tile, paths: Wavefronts, stage: Stage
     if reference.expansion.phase.any() or reference.expansion.delay_variance.any():
         some = field[:, :, stage.bins.first : stage.bins.first + stage.bins.frequency.size]
         some *= changed(reference, points, stage.bins.frequency)
-    wave = irfft(field, 2 * stage.segment.samples, axis=2, overwrite_x=True)
-    _hear(out, wave[:, :, : 2 * length], begin, tile, paths, stage)
+    wave = irfft(field, 2 * stage.segment.samples, axis=2, overwrite_x=True)[:, :, : 2 * length]
+    elements, rate = stage.aim.elements, stage.segment.samples * stage.bins.step
+    delay, gain = delay_and_gain(reference, elements.position)
+    gain *= elements.gain
+    if tile.alone:
+        gain *= paths.amplitude[:, None]
+        if paths.occluded.any():
+            gain *= ~paths.hidden(elements.count)
+    return Wave(wave, stage.segment.first + begin, 2.0 * rate * delay, gain, tile.axes, stage)
 
 
 def _lasting(tile: Tile, paths: Wavefronts, stage: Stage) -> tuple[Ints, int]:
     """Samples of the stretch where the paths of a tile begin (1,), or each (path,) where it is its own reference; and
     how many they last."""
     segment, rate = stage.segment, stage.segment.samples * stage.bins.step
-    centre, spread = paths.delay - stage.origin, 0.0 if tile.alone else steered_spread(paths, slice(None))
+    centre, spread = paths.delay - stage.origin, tile.spread
     early, wide = (centre, 0.0) if tile.alone else (centre.min(keepdims=True), float(np.ptp(centre)))
     spare = segment.samples if stage.tails else GUARD
     begin = np.maximum(((early - segment.before - spread) * rate).astype(int) - spare, 0)
@@ -139,22 +178,13 @@ def _lasting(tile: Tile, paths: Wavefronts, stage: Stage) -> tuple[Ints, int]:
     return begin, min(length, segment.samples)
 
 
-def _hear(
-    out: npt.NDArray[Any], wave: npt.NDArray[Any], begin: Ints, tile: Tile, paths: Wavefronts, stage: Stage
-) -> None:
-    """Add waves (reference, node, twice the samples) at the nodes of a tile to out (sensor, sample), from each
-    reference's sample `begin` (reference,) of the stretch on."""
+def _hear(out: npt.NDArray[Any], sample: int, some: Wave) -> None:
+    """Add a wave to out (sensor, sample), whose sample 0 is sample `sample` of the window."""
     from sonarsynth.signals.gridded.deposit_kernels import hear
 
-    elements, length = stage.aim.elements, wave.shape[2] // 2
-    delay, gain = delay_and_gain(tile.reference, elements.position)
-    gain *= elements.gain
-    if tile.alone:
-        gain *= paths.amplitude[:, None]
-        if paths.occluded.any():
-            gain *= ~paths.hidden(elements.count)
-    onto, column, weight = to_sensors(elements, tile.axes, stage.dtype)
-    late, first = 2.0 * stage.segment.samples * stage.bins.step * delay, stage.segment.first + begin
+    wave, begin, late, gain, axes, stage = some
+    length, first = wave.shape[2] // 2, begin - sample
+    onto, column, weight = to_sensors(stage.aim.elements, axes, stage.dtype)
     for n, whole in enumerate(wave):
         halves = whole.reshape(-1, length, 2).swapaxes(1, 2).reshape(-1, weight.shape[1] * 2 * length)
         field = (halves if onto is None else onto @ halves).reshape(-1, weight.shape[1], 2, length)

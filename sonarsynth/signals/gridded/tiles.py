@@ -16,6 +16,7 @@ from sonarsynth.signals.gridded.low_rank import PLAIN, Term, terms_for
 from sonarsynth.signals.gridded.nodes import MOST_NODES, SpectralQuantiles, nodes_for
 from sonarsynth.signals.pulse_shapes import main_modes
 from sonarsynth.signals.pulse_variation import PulseVariation, aperture_gradient, pulses, rest, slopes, steep
+from sonarsynth.signals.segments import ends_of, steered_spread
 
 MOST_TERMS = 24
 """A tile that needs more terms, of one mode of its pulses, is split."""
@@ -57,6 +58,7 @@ class Tile:
     deviation: tuple[float, float, float]  # half range of direction y and z, and of absorption (dB)
     changes: Ints  # (some,) which of the changes of pulses over the aperture count, beside the reference
     modes: Floats  # (mode, mode) turn of the modes of all paths to those of the tile; (0, 0) where there are none
+    spread: float  # s: no path meets a hydrophone sooner or later than its reference by more
     cost: float  # ns, predicted
 
     @property
@@ -91,10 +93,9 @@ def _probes(elements: Elements, near: bool) -> _Probes:
 
 @dataclass(frozen=True, eq=False)
 class _Views:
-    """What every tile that is tried looks at, computed once: a tile is the smallest and the largest of each column."""
+    """What every tile that is tried looks at, computed once."""
 
     front: Wavefronts
-    columns: Floats  # (path, column): direction, curvature, absorption, delay terms; slownesses at probes
     amplitude: Floats  # (degree, path) Pa: terms of each degree that it has over the aperture
     probes: _Probes
     gradient: Floats  # (xyz, point, term) of the aperture terms; empty where there are none
@@ -108,20 +109,7 @@ def _views(front: Wavefronts, aim: TileSettings) -> _Views:
     gradient = aperture_gradient(front, probes.points)
     bend = slopes(front, gradient, aim.weights[0] * aim.highest, aim.highest)
     amplitude = np.multiply(np.abs(front.amplitude), front.expansion.amplitude_degrees.T, order="C")
-    return _Views(front, _columns(front, probes.points, gradient), amplitude, probes, gradient, bend, near)
-
-
-def _columns(front: Wavefronts, probes: Floats, gradient: Floats) -> Floats:
-    """Columns of `_Views` of fronts; slownesses are -c times the gradient of delay: directions where rays are
-    straight."""
-    from sonarsynth.equations.kernels.unit_vectors import towards_sources
-
-    u, _ = towards_sources(front.direction, front.curvature, probes)
-    terms = front.expansion.delay
-    if terms.shape[1]:
-        u -= front.sound_speed * np.einsum("et,ipt->pie", terms, gradient[:, :, : terms.shape[1]])
-    columns = [front.direction, front.curvature[:, None], front.loss[:, None], terms, u.reshape(-1, front.count).T]
-    return np.concatenate(columns, axis=1)
+    return _Views(front, amplitude, probes, gradient, bend, near)
 
 
 class _Extent(NamedTuple):
@@ -148,19 +136,17 @@ class _Trial:
 
     tile: Tile
     extent: _Extent | None  # None for a path alone
-    ends: tuple[Floats, Floats]  # (column,) smallest and largest of the columns of its paths
+    ends: Floats  # (2, column) of its paths, with slownesses at the probes
 
 
 def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
-    from sonarsynth.signals.gridded.variation_kernels import extremes
-
-    low, high = extremes(views.columns, paths)
+    probes = views.probes
+    low, high = ends = ends_of(views.front, paths, probes.points, views.gradient)
     if paths.size == 1:
-        return _Trial(_alone(paths, views.front, aim), None, (low, high))
+        return _Trial(_alone(paths, views.front, aim), None, ends)
     over = rest(views.front, paths, aim.changes, 0.1 * aim.tolerance)
     reference = reference_of(views.front, 0.5 * (low + high), over.phase, over.delay_variance)
-    probes = views.probes
-    own = _columns(reference, probes.points, views.gradient)[0]
+    own, _ = ends_of(reference, np.zeros(1, int), probes.points, views.gradient)
     far = np.maximum(high - own, own - low)
     slope = far[-3 * len(probes.points) :].reshape(-1, 3).max(axis=0)
     _, dy, dz = slope.tolist()
@@ -184,8 +170,9 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
         modes=sizes,
     )
     axes, terms, cost = _cheapest(extent, aim)
-    tile = Tile(paths, reference, axes, terms, (dy, dz, loss + farther), over.which, modes, cost)
-    return _Trial(tile, extent, (low, high))
+    spread = steered_spread(views.front, ends)
+    tile = Tile(paths, reference, axes, terms, (dy, dz, loss + farther), over.which, modes, spread, cost)
+    return _Trial(tile, extent, ends)
 
 
 def _drift(front: Wavefronts, aim: TileSettings) -> Floats:
@@ -232,7 +219,8 @@ def _halves(trial: _Trial, views: _Views, aim: TileSettings) -> tuple[Ints, Ints
     weight = np.append(2.0 * np.pi * aim.highest / views.front.sound_speed * size, NEPER * aim.steepest)
     paths, (low, high) = trial.tile.paths, trial.ends
     axis = int(np.argmax((high - low)[: weight.size] * weight))
-    right = views.columns[paths, axis] > 0.5 * (low[axis] + high[axis])
+    column = (*views.front.direction.T, views.front.curvature, views.front.loss)[axis]
+    right = column[paths] > 0.5 * (low[axis] + high[axis])
     return (paths[~right], paths[right]) if right.any() else None
 
 
@@ -281,7 +269,7 @@ def _alone(paths: Ints, front: Wavefronts, aim: TileSettings) -> Tile:
     x, y, z = (nodes_for(p, aim.weights, ALONE * aim.tolerance) for p in (_drift(reference, aim) + bend).tolist())
     axes = (x, y, z) if 2 * x.nodes * y.nodes * z.nodes < aim.elements.count else None
     cost, modes = _cost_alone(paths.size, 0, aim), np.eye(reference.modes.shape[1])
-    return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.zeros(0, int), modes, cost)
+    return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.zeros(0, int), modes, 0.0, cost)
 
 
 def _best(trial: _Trial, views: _Views, aim: TileSettings, patient: bool) -> list[Tile]:
