@@ -244,7 +244,8 @@ def _step(job: Job, name: str, step: Step, before: StageResult, note: worker_sta
     wall, cpu = time.perf_counter(), time.thread_time()
     with pipeline.stage_timer() as laps:
         try:
-            note(before.frame, name, _limit(job, step, before.seconds.get(name, 0.0)))
+            begun = before.seconds.get(name, 0.0)
+            note(before.frame, name, _limit(job, step, begun), begun)
             value, failure = step(plan_of(job), before.frame, before.value), None
             _warm.add(step)
         except Exception as error:

@@ -64,8 +64,9 @@ def read(store: str, worker: str) -> Entry | None:
         return None
 
 
-Note = Callable[[int, str, float], None]
-"""Notes the frame and the stage that begin, and after how many seconds (0: none) this process ends."""
+Note = Callable[[int, str, float, float], None]
+"""Notes the frame and the stage that begin, or go on, after how many seconds (0: none) this process ends, and how many
+the stage has taken before."""
 
 
 @contextmanager
@@ -74,12 +75,12 @@ def diary(store: str) -> Iterator[Note]:
     stage is ended between its limit and `LATEST` times that."""
     out, ends = _mine(store), 0.0
     if out is None:
-        yield lambda frame, stage, limit: None
+        yield lambda frame, stage, limit, spent: None
         return
 
-    def note(frame: int, stage: str, limit: float) -> None:
+    def note(frame: int, stage: str, limit: float, spent: float) -> None:
         nonlocal ends
-        _write(out, json.dumps({"frame": frame, "stage": stage, "limit": limit}))
+        _write(out, json.dumps({"frame": frame, "stage": stage, "limit": limit + spent}))
         now = time.monotonic()
         if limit > 0 and not limit <= ends - now <= LATEST * limit:
             ends = now + LATER * limit

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
@@ -64,6 +64,11 @@ def _sounding(plan: Layout, front: ArrayPaths, sampling_frequency: float, sample
     apart = int(np.ceil(reach(front).max(initial=0.0) * sampling_frequency)) + 2 * GUARD
     ends = [(span.first - apart, span.first + span.samples + apart) for span in plan.stretches] or [(0, apart)]
     return [(min(max(low, 0), samples), min(max(high, 0), samples)) for low, high in ends]
+
+
+Summing = Callable[[], tuple[npt.NDArray[Any], int, int]]
+"""Gives the pressure (sensor, sample), the sample of the window where it begins, and the number of arrivals that the
+window cuts."""
 
 
 @dataclass(frozen=True)
@@ -169,24 +174,20 @@ class GriddedSynthesis(UnroundedSynthesis):
 
     def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
         """As `SignalSynthesis.signals`."""
-        return self.prepared(arrivals, snaps, reception)()
+        return self._signals(self._sound(arrivals, snaps, reception), reception)
 
     def prepared(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Callable[[], Signals]:
-        """As `SignalSynthesis.signals`, but for the sums at the hydrophones."""
-        sound, rate = self._sound(arrivals, snaps, reception), reception.sonar.sampling_frequency
+        """What gives the `signals`, with all made but for the sums at the hydrophones."""
+        if type(self).signals is not OWN_SIGNALS:
+            return partial(self.signals, arrivals, snaps, reception)
+        return partial(self._signals, self._sound(arrivals, snaps, reception), reception)
 
-        def signals() -> Signals:
-            pressure, first, outside = sound()
-            start = reception.start + first / rate
-            return Signals(pressure.astype(np.float32, copy=False), start, rate, 0.0, 0, outside)
+    def _signals(self, sound: Summing, reception: Reception) -> Signals:
+        (pressure, first, outside), rate = sound(), reception.sonar.sampling_frequency
+        start = reception.start + first / rate
+        return Signals(pressure.astype(np.float32, copy=False), start, rate, 0.0, 0, outside)
 
-        return signals
-
-    def _sound(
-        self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
-    ) -> Callable[[], tuple[npt.NDArray[Any], int, int]]:
-        """What gives the pressure (sensor, sample), the sample of the window where it begins, and the number of
-        arrivals that the window cuts."""
+    def _sound(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Summing:
         elements, sonar, absorption, _, samples, whole, still = reception
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
         front = from_the_sharpest(front, stop_frequency(sonar.antialias))
@@ -217,3 +218,7 @@ class GriddedSynthesis(UnroundedSynthesis):
         paths, bins = bins_of(span, paths, sonar, reception.absorption, self.tolerance)
         origin, stop = reception.start + span.first / sonar.sampling_frequency, stop_frequency(sonar.antialias)
         return prepared(span, paths, reception.elements, bins, origin=origin, stop=stop, method=method)
+
+
+OWN_SIGNALS: Final = GriddedSynthesis.signals
+"""One that is made of this, and makes its signals otherwise, prepares nothing."""

@@ -26,7 +26,7 @@ def test_the_last_stage_that_began_is_noted_until_its_task_ends(tmp_path: Path, 
     store = str(tmp_path / "s.zarr")
     with worker_status.diary(store) as note:
         for frame, stage in ((100_000, "beamform"), (7, "trace")):
-            note(frame, stage, 0.0)
+            note(frame, stage, 0.0, 0.0)
             assert worker_status.read(store, file.name) == worker_status.Entry(frame, stage, "", "")
     assert worker_status.read(store, file.name) is None
 
@@ -46,7 +46,7 @@ def test_a_limit_is_set_once_for_many_stages_and_never_ends_one_too_soon(
     with worker_status.diary(str(tmp_path / "s.zarr")) as note:
         for n in range(100):
             limit = 20.0 if n < 60 else 5.0
-            note(n, "trace", limit)
+            note(n, "trace", limit, 0.0)
             assert limit <= ends[0] - now <= worker_status.LATEST * limit
             now += 0.05
     assert events[-1] == "cancelled"
