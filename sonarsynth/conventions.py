@@ -240,8 +240,8 @@ def evenly(count: int, limit: int) -> list[int]:
 
 
 def scattered(count: int, among: int, first: float = 0.0) -> Ints:
-    """At most `count` of the numbers 0 to among - 1, ascending, all over them and in no step: by golden ratio, the
-    first of them at `first` of 1."""
+    """At most `count` of the numbers 0 to among - 1, ascending, spread over all of them without a fixed step: multiples
+    of the golden ratio modulo 1, of which the first is `first`."""
     return np.unique((np.mod(np.arange(count) * 0.6180339887498949 + first, 1.0) * among).astype(int))
 
 

@@ -56,7 +56,7 @@ NO_RECORDER: Final = Recorder()
 def prepared_sound(plan: Plan, frame: Frame, arrivals: Arrivals) -> Sound:
     """What `frame_signals` then sums at the hydrophones; none where the plan cuts the array into subarrays.
 
-    Before that all is small: done for some frames, one after the other, it stays in the caches of a core.
+    What is made before the sums is small: made for some frames, one after the other, it stays in the caches of a core.
     """
     sound = {} if plan.choices.subarrays > 1 else _by_target(plan, frame, arrivals, true_elements(plan, frame))
     mark_stage("synthesise")

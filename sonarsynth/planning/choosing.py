@@ -282,7 +282,7 @@ class PerSensorReference:
 def heard_at(elements: Elements, most: int = HEARD_AT) -> Ints:
     """Live hydrophones spread through an array, by golden ratio, ascending."""
     live = np.flatnonzero(elements.gain)
-    return live[scattered(min(most, len(live)), len(live), 0.309017)]
+    return live[scattered(min(most, len(live)), len(live), 0.309017)]  # half a step on: not the very first
 
 
 def _with_outermost(elements: Elements) -> Ints:

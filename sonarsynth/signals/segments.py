@@ -23,9 +23,8 @@ FAST = (16, 18, 20, 24, 27, 30)
 """Lengths of segments are these times powers of two: fast to transform, and so few that cached spectra of pulses are
 used again."""
 
-
 NOWHERE = np.zeros((0, 3))
-
+"""No point (point, xyz)."""
 GUARD = 4
 """Samples of silence at either end of a segment: half of the widest kernel that interpolates it at hydrophones."""
 
@@ -178,8 +177,9 @@ def _runs(rows: Ints, early: Floats, late: Floats) -> Iterator[Ints]:
 
 
 def ends_of(front: Wavefronts, paths: Ints, points: Floats = NOWHERE, gradient: Floats = NOWHERE) -> Floats:
-    """The smallest and the largest (2, column) of some paths: direction, curvature, absorption, delay terms; and
-    slownesses at points (point, xyz), to which delay terms add -c times their gradient (xyz, point, term)."""
+    """The smallest and the largest (2, column) of some paths: direction (xyz), curvature (1/m), absorption (dB), delay
+    terms (s); and at points (point, xyz) in m the unit vectors towards sources, to which delay terms add -c times their
+    gradient (xyz, point, term) per m."""
     from sonarsynth.signals.gridded.variation_kernels import extremes
 
     late, lean = front.expansion.delay, np.zeros((0, 3, 0))

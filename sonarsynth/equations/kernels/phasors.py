@@ -48,7 +48,7 @@ Spectra = npt.NDArray[np.complex64]
 SINE = tuple((-1.0) ** n * math.pi ** (2 * n + 1) / math.factorial(2 * n + 1) for n in range(9))
 """Series of sin(pi t) by odd powers of t, to 3e-14 for |t| up to 1/2."""
 TINY = 1e-150
-"""Angle whose sine is itself."""
+"""Half turns, of which the sine is pi times as much."""
 
 ZERO, HALF, TWO = np.float32(0.0), np.float32(0.5), np.float32(2.0)
 
@@ -64,7 +64,7 @@ STEERED = 4 * LANES
 
 @compiled(fastmath={"contract"}, forceinline=True)
 def sine(t: float) -> float:
-    """sin(pi t), without a branch or a call: of many numbers, eight at once."""
+    """sin(pi t), t in half turns, by its Taylor series, without a branch or a call: of many numbers, eight at once."""
     whole = np.rint(t)
     rest = t - whole
     x, odd = rest * rest, abs(whole - 2.0 * np.rint(0.5 * whole))
