@@ -110,8 +110,9 @@ def ray_cones(
         longest, shortest, n, rise = length[i] + spread[i], length[i] - spread[i], bounces[i], departure[i, 2]
         wide = spread[i] + curvature * longest * longest / 8.0
         straight = n == 0 and curvature * shortest * shortest <= 8.0 * sagitta
-        again, first = _meets(start[i], end[i], rise > 0.0, n, bottom, wide, centre, radius)
-        full = straight or again or (n > 0 and turning[i] > 0)
+        full, first = straight or (n > 0 and turning[i] > 0), 0.0
+        if not full:
+            full, first = _meets(start[i], end[i], rise > 0.0, n, bottom, wide, centre, radius)
         reach[i] = longest if full else min(first, longest)
         far[i] = 0.98 * (shortest if full else min(first - 2.0 * wide, shortest))
         angle = _subtended(spread[i], length[i]) + 0.5 * curvature * reach[i]

@@ -23,7 +23,7 @@ def nearest_first(bodies: tuple[PlacedTarget, ...], start: Floats) -> Iterator[t
     together = NEIGHBOURS if len(solid) > 1 else max(len(start), 1)
     for first in range(0, len(start), together):
         rows = slice(first, first + together)
-        middle = start[rows].mean(axis=0)
+        middle = start[rows].mean(axis=0) if len(solid) > 1 else start[0]
         away = [float(np.linalg.norm(centre - middle)) - radius for centre, radius in spheres]
         for nth in np.argsort(away, kind="stable"):
             yield rows, solid[nth]

@@ -26,7 +26,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from sonarsynth.columns import Columns, alike
+from sonarsynth.columns import Columns, alike, rows_of
 from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.kernels import moving_ends
@@ -123,7 +123,8 @@ def bounced_anew(paths: Bounced, z: Floats, before: Floats, after: Floats, mediu
     """Paths of which surface and bottom reflect what has another direction (path, xyz) at depths z (path,) m than was
     traced; centre (Hz): of the band."""
     rows = np.flatnonzero(paths.bounces)
-    rows = rows[(np.abs(after[rows] - before[rows]) > SAME).any(axis=1)]
+    turned = np.abs(np.subtract(rows_of(after, rows).T, rows_of(before, rows).T, order="C"))
+    rows = rows[(turned > SAME).any(axis=0)]
     if not len(rows):
         return paths
     counts = paths.surface[rows], paths.bottom[rows], centre

@@ -107,7 +107,7 @@ def echo_batches(
             strength = np.abs(amplitude) * factor[row]
             faint = np.sqrt(PRUNE_MARGIN * context.tolerances.negligible) / max(len(row), 1)
             heard = array.legs.open[owned_leg] < DOUBTFUL
-            batches.append(batch.select(picked(strength > faint * strength.max(initial=0.0, where=heard))))
+            batches.append(batch.select(picked(strength > faint * strength[heard].max(initial=0.0))))
     return batches
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -80,7 +81,7 @@ class _EchoBlock:
         few, pulses = rows_of(self.few, kept), self.pulses.select(kept)
         return _EchoBlock(self.array, groups, out, leg, factor, few, pulses, carried)
 
-    @property
+    @cached_property
     def strength(self) -> Floats:
         """(echo,) amplitude with the ways."""
         row, amplitude = _columns(self.groups, "row", "amplitude")

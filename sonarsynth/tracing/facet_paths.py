@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -200,7 +201,7 @@ def _facing(
     facets = facets.select(may_face_receiver(facets, position, propagation.bounces, context.medium, slack))
     if not lights:
         return facets, None
-    lit = np.unique(np.concatenate([may_face_receiver(facets, light, 0, context.medium) for light in lights]))
+    lit = reduce(np.union1d, [may_face_receiver(facets, light, 0, context.medium) for light in lights])
     return (facets, lit) if propagation.bounces else (facets.select(lit), None)
 
 

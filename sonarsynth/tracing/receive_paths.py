@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
 
@@ -59,7 +60,7 @@ class ReceivePaths(Columns):
     occluded: Bytes  # (leg, byte) as of `Arrivals`
     open: Ints  # (leg,) not 0: bodies hide it from hydrophones, not known yet which (`sensor_occlusion.Occlusion`)
 
-    @property
+    @cached_property
     def bounces(self) -> Ints:
         """(leg,) reflections from surface and bottom."""
         return np.asarray(self.surface + self.bottom)
@@ -96,7 +97,7 @@ class Facets(Columns):
         """Whether paths that arrive along (path, xyz) light facets (row of each): from their side, if they have one."""
         return np.asarray((dot(rows_of(self.normal, row), arrival) < 0) | self.sideless[row])
 
-    @property
+    @cached_property
     def sideless(self) -> Bools:
         """(facet,) which scatter all round: they have no normal."""
         x, y, z = self.normal.T
@@ -122,7 +123,7 @@ def concatenate(blocks: list[T]) -> T:
         return blocks.pop()
     kind, columns = type(blocks[0]), [dict(vars(block)) for block in blocks]
     blocks.clear()
-    return kind(**{name: np.concatenate([block.pop(name) for block in columns]) for name in list(columns[0])})
+    return kind(**{name: np.concatenate([block.pop(name) for block in columns]) for name in kind.__dataclass_fields__})
 
 
 def usable(paths: Paths) -> Bools:
@@ -136,7 +137,8 @@ def apart(row: Ints, travel_time: Floats, arrival: Floats) -> Bools:
     first = np.ones(len(row), bool)
     same = np.flatnonzero(row[1:] == row[:-1])
     same = same[np.abs(travel_time[1 + same] - travel_time[same]) < COINCIDENCE_TIME]
-    first[1 + same] = (np.abs(arrival[1 + same] - arrival[same]) >= 1e-9).any(axis=1)
+    turned = np.abs(np.subtract(rows_of(arrival, 1 + same).T, rows_of(arrival, same).T, order="C"))
+    first[1 + same] = (turned >= 1e-9).any(axis=0)
     return first
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,13 +70,12 @@ class TransmitPaths(Columns):
         first[1:] |= np.diff(self.delay_std) != 0
         if first.all():
             return self
-        number = np.cumsum(first) - 1
-        value = np.add.reduceat(self.spreading * self.boundary * np.exp(1j * self.phase), np.flatnonzero(first))
-        order = np.lexsort((self.bounces, number))
-        merged = self.select(order[np.flatnonzero(np.diff(number[order], prepend=-1))])  # by the fewest bounces
+        begin = np.flatnonzero(first)
+        value = np.add.reduceat(self.spreading * self.boundary * np.exp(1j * self.phase), begin)
+        merged = self.select(np.lexsort((self.bounces, np.cumsum(first)))[begin])  # by the fewest bounces
         return merged.but(boundary=np.abs(value) / merged.spreading, phase=np.angle(value + 0.0))
 
-    @property
+    @cached_property
     def bounces(self) -> Ints:
         """(way,) reflections from surface and bottom."""
         return np.asarray(self.surface + self.bottom)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Protocol, Self
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
-from sonarsynth.products.array_expansion import stacked
 from sonarsynth.state import Receiver
 from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
 
@@ -56,11 +55,12 @@ def variations(blocks: Sequence[FacetBlock]) -> tuple[list[Floats], float]:
     if 2 * sum(map(np.count_nonzero, rests)) > sum(map(len, rests)):  # most of all: to take them all costs less
         rests = [np.ones_like(rest) for rest in rests]
     for block, rest, (second, missed, counted, _) in zip(blocks, rests, of_blocks, strict=True):
+        terms = second
         if rest.any():
             more, missed[rest], counted[rest], _ = _fitted(block if rest.all() else block.select(rest), None)
-            every.append(stacked([second, more])[np.where(rest, len(rest) - 1 + np.cumsum(rest), np.arange(len(rest)))])
-        else:
-            every.append(second)
+            terms = np.zeros((len(rest), more.shape[1]))
+            terms[:, : second.shape[1]], terms[rest] = second, more
+        every.append(terms)
         worst = max(worst, float((counted * missed).max(initial=0.0)))
     return every, worst / loudest
 
