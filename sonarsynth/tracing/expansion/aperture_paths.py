@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, scattered
-from sonarsynth.equations.kernels.row_products import row_products
+from sonarsynth.equations.kernels.row_products import put_cubics
 from sonarsynth.products import ArrayExpansion
 from sonarsynth.products.array_expansion import aperture_terms
 from sonarsynth.state import Medium, Receiver
@@ -92,7 +91,7 @@ class ExpansionSource:
             first, last = np.searchsorted(members, (block.start, block.stop))
             rows = members[first:last] - block.start
             if isinstance(model, _FacetInterpolant):
-                samples.put(rows, model.at(legs.point[rows]))
+                model.put(samples, rows, legs.point)
             elif model is not None:  # of spheres there is what there is room for
                 samples.put(rows, {name: value[first:last] for name, value in model.known.items()})
         varying = [name for name in ("phase", "delay_variance") if self._varies(name)]
@@ -103,7 +102,9 @@ class ExpansionSource:
     def _varies(self, name: str) -> bool:
         """Whether a quantity of any leg does."""
         models = [model for _, model in self.families if model is not None]
-        return any(name in m.columns if isinstance(m, _FacetInterpolant) else getattr(m, name).any() for m in models)
+        return any(
+            name in m.coefficients if isinstance(m, _FacetInterpolant) else getattr(m, name).any() for m in models
+        )
 
 
 def aperture_paths(
@@ -165,18 +166,15 @@ class _FacetInterpolant:
 
     middle: Floats  # (xyz) m
     half: Floats  # (xyz) m
-    coefficients: Floats  # (cubic, value): of all that varies
-    columns: dict[str, slice]  # the values of each
+    coefficients: dict[str, Floats]  # (cubic, value): of each that varies
     error: float  # s
 
-    def at(self, point: Floats) -> dict[str, Floats]:
-        """What is known of legs from points (point, xyz), some of the family."""
-        cubics = aperture_terms((point - self.middle) / self.half, 1.0)
-        values = row_products(cubics, self.coefficients)
-        known = {name: values[:, columns] for name, columns in self.columns.items()}
-        if "departure" in known:
-            known["departure"] = known["departure"].reshape(len(point), known["departure"].shape[1] // 3, 3)
-        return known | {"error": np.full(len(point), self.error)}
+    def put(self, samples: ApertureSamples, rows: Ints, point: Floats) -> None:
+        """Write what is known of some legs, of the family, from their points (leg, xyz); the rest stays as in room."""
+        for name, solved in self.coefficients.items():
+            column = getattr(samples, name)
+            put_cubics(rows, point, self.middle, self.half, solved, column.reshape(len(column), -1))
+        samples.error[rows] = self.error
 
 
 def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: float) -> _FacetInterpolant | None:
@@ -203,7 +201,4 @@ def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: floa
     if not (smooth and wrong["gain"].max() <= SMOOTH_GAIN and wrong["departure"].max() <= SMOOTH_DIRECTION):
         return None
     error = late + turned / rate + 0.5 * rate * softer + float(exact.error.max())
-    last = np.cumsum([0, *(solved.shape[1] for solved in coefficients.values())]).tolist()
-    columns = {name: slice(*ends) for name, ends in zip(coefficients, pairwise(last), strict=True)}
-    every = np.concatenate([np.empty((at.shape[1], 0)), *coefficients.values()], axis=1)
-    return _FacetInterpolant(middle, half, every, columns, error)
+    return _FacetInterpolant(middle, half, coefficients, error)
