@@ -116,7 +116,7 @@ def ray_cones(
         reach[i] = longest if full else min(first, longest)
         far[i] = 0.98 * (shortest if full else min(first - 2.0 * wide, shortest))
         angle = _subtended(spread[i], length[i]) + 0.5 * curvature * reach[i]
-        if 0.0 < angle < WIDEST:  # of that cone, only the layers that it comes to bend rays
+        if curvature > 0.0 and 0.0 < angle < WIDEST:  # of that cone, only the layers that it comes to bend rays
             aside, down = reach[i] * math.tan(angle), -reach[i] * rise
             upper, lower = -start[i, 2] + min(down, 0.0) - aside, -start[i, 2] + max(down, 0.0) + aside
             angle += 0.5 * reach[i] * (_largest(upper, lower, *layers) - curvature)

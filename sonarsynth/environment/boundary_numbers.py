@@ -63,14 +63,17 @@ def coefficient(boundary: SeaSurface | SeaBottom, grazing: npt.ArrayLike, freque
     """
     angle = np.asarray(grazing, float)
     none = np.isnan(angle)
-    q = np.where(none, 0.5 * np.pi, angle)
-    value = boundary.reflection.coefficient(q)
+    if none.any():
+        value = np.ones(angle.shape, complex)
+        value[~none] = coefficient(boundary, angle[~none], frequency)
+        return value
+    value = boundary.reflection.coefficient(angle)
     if isinstance(boundary, SeaSurface) and boundary.bubbles and boundary.wind_speed is not None:
         if frequency is None:
             raise ValueError("the loss in bubbles needs a frequency")
         with formula_ranges.noted():
-            value = value * 10.0 ** (-boundary_reflection.bubble_loss(boundary.wind_speed, frequency, q) / 20.0)
-    return np.asarray(np.where(none, 1.0 + 0j, value))
+            value = value * 10.0 ** (-boundary_reflection.bubble_loss(boundary.wind_speed, frequency, angle) / 20.0)
+    return np.asarray(value)
 
 
 def rms_height(boundary: SeaSurface | SeaBottom) -> float:

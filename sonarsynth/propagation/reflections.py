@@ -70,6 +70,6 @@ def as_sign(phase: Floats) -> tuple[Floats, Floats]:
     if not phase.any():
         return np.ones(phase.shape), phase
     half = np.rint(phase / np.pi)
-    multiple = np.abs(phase - np.pi * half) < 1e-9
-    sign = np.where(multiple & (np.mod(half, 2) == 1), -1.0, 1.0)
-    return sign, np.where(multiple, 0.0, np.mod(phase + np.pi, 2.0 * np.pi) - np.pi)
+    multiple, odd = np.abs(phase - np.pi * half) < 1e-9, half != 2.0 * np.rint(0.5 * half)
+    within = phase - 2.0 * np.pi * np.rint(phase / (2.0 * np.pi))
+    return np.where(multiple & odd, -1.0, 1.0), np.where(multiple, 0.0, within)

@@ -62,7 +62,8 @@ class EchoBatch(Columns):
     @property
     def spot(self) -> Floats:
         """Where on its facet each echo comes from (echo, xyz) m, world, from the middle; 0 of means over facets."""
-        return self.surface.pose.turn_to_world(self.part.spot(self.patch))
+        spot = self.part.spot(self.patch)
+        return self.surface.pose.turn_to_world(spot) if spot.any() else spot
 
     def pulses(self, centre: float) -> PulseResponse:
         """What they make of the pulse; centre (Hz)."""

@@ -73,9 +73,8 @@ class _EchoBlock:
         """The echoes picked by a mask, each with a pair of its own."""
         ends = np.cumsum([len(g.row) for g in self.groups])[:-1]
         groups = [g.select(np.flatnonzero(keep)) for g, keep in zip(self.groups, np.split(loud, ends), strict=True)]
-        (row,) = _columns(groups, "row")
-        number = np.split(np.arange(len(row)), np.cumsum([len(g.row) for g in groups])[:-1])
-        groups = [g.but(row=rows) for g, rows in zip(groups, number, strict=True)]
+        (row,), last = _columns(groups, "row"), np.cumsum([len(g.row) for g in groups]).tolist()
+        groups = [g.but(row=np.arange(end - len(g.row), end)) for g, end in zip(groups, last, strict=True)]
         out, leg, factor = self.out.select(row), self.leg[row], self.factor[row]
         carried, kept = None if self.carried is None else self.carried.select(row), np.flatnonzero(loud)
         few, pulses = rows_of(self.few, kept), self.pulses.select(kept)
@@ -93,7 +92,7 @@ class _EchoBlock:
         law, gain = self.few, self.array.fronts.gain(self.leg[row], few)
         if few is None:
             more = [g.over(self.towards_probes(g, MORE)) for g in self.groups]
-            law = np.concatenate([law, np.concatenate(more)], axis=1)
+            law = np.concatenate([law, _joined(more)], axis=1)
         return probe_fits.gains(law, amplitude, gain, tapered, self.strength)
 
     def towards_probes(self, group: EchoBatch, some: slice = slice(None)) -> Floats:
@@ -133,7 +132,7 @@ def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...
     for variation in terms:
         block = blocks.pop()
         over = _with_reflection_phases(block, strongest)
-        spot = np.concatenate([g.spot for g in block.groups])
+        (spot,) = _columns(block.groups, "spot")
         if spot.any() and not block.array.bending.profile.uniform:
             over = delay_to_scattering_points(over, block.array, block.leg, spot)
         array, out, legs, meeting = block.array, block.out, block.legs, block.array.meeting
@@ -196,7 +195,7 @@ def _all_echoes(array: FacetPaths, snap: Emission, components: tuple[tuple[Compo
     out = out.select(way)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
     groups = echo_batches(array, out, leg, components, carried, factor)
-    few = np.concatenate([g.over(_towards_probes(array, leg, carried, g, FEW)) for g in groups])
+    few = _joined([g.over(_towards_probes(array, leg, carried, g, FEW)) for g in groups])
     pulses = PulseResponse.join([g.pulses(array.context.receiver.centre) for g in groups])
     return _EchoBlock(array, groups, out, leg, factor, few, pulses, carried)
 
@@ -234,7 +233,12 @@ def _towards_probes(array: FacetPaths, leg: Ints, carried: MotionTerms | None, g
 
 def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:
     """Columns (echo,) of all groups, in order."""
-    return [np.concatenate([getattr(g, name) for g in groups]) for name in names]
+    return [_joined([getattr(g, name) for g in groups]) for name in names]
+
+
+def _joined(blocks: list[np.ndarray]) -> np.ndarray:
+    """Rows of all blocks, in order; of one alone, that itself."""
+    return blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
 
 
 def _ways_to_facets(array: FacetPaths, snap: Emission) -> TransmitPaths:
@@ -284,7 +288,7 @@ def _with_reflection_phases(block: _EchoBlock, strongest: float) -> ArrayExpansi
     over = array.fronts.expansion[block.leg[row]]
     if not any(g.turns for g in block.groups):
         return over
-    shift = np.concatenate([g.turned(block.towards_probes(g)) for g in block.groups])
+    shift = _joined([g.turned(block.towards_probes(g)) for g in block.groups])
     leaps = np.abs(shift).max(axis=1, initial=0.0) > MAX_PHASE_CHANGE
     if not shift.any():
         return over

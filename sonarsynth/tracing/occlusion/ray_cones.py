@@ -67,8 +67,7 @@ def classify_rays(
     owner, facet = (None if of is None else of[sure] for of in facets)
     apex, axis = start[sure], departure[sure]
     if medium.profile.uniform and not spread.any():
-        to = np.where(bounces[sure, None] > 0, apex + reach[:, None] * axis, end[sure])
-        verdict[sure] = np.where(occluded(bodies, apex, to, owner, facet), CLOSED, EMPTY)
+        verdict[sure] = np.where(occluded(bodies, apex, apex + reach[:, None] * axis, owner, facet), CLOSED, EMPTY)
     else:
         verdict[sure] = classify_cones(bodies, apex, axis, slope, reach, far, (owner, facet))
     return verdict
