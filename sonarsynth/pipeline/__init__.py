@@ -149,15 +149,17 @@ def beamform_frame(plan: Plan, index: int, traced: TracedFrame, sound: Sound | N
     parts = SoundParts(plan)
     recorded = synthesise(plan, traced, parts, sound)
     mark_stage("synthesise")
-    isolated = None
+    isolated, values = None, Values()
     if "signals" in plan.products:
+        values = signal_values(plan, recorded)  # at once, while they are in the caches
+        mark_stage("collect")
         isolated = isolated_levels(plan, traced.frame, traced.budget, traced.truth.snap_level)
         mark_stage("measure")
     beamformed = BeamformedFrame(recorded, None, None)
     if plan.products & OF_BEAMS:
         beamformed = locate_and_image(plan, traced.frame, known_signals(plan, traced.frame, recorded))
-    snr = snr_values(plan, traced.frame, traced.arrivals, traced.truth, parts, beamformed.image)
-    return replace(beamformed, isolated=isolated, recorded=recorded, snr=snr)
+    values |= snr_values(plan, traced.frame, traced.arrivals, traced.truth, parts, beamformed.image)
+    return replace(beamformed, isolated=isolated, values=values)
 
 
 def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFrame:
@@ -226,10 +228,7 @@ def _beamformed_values(
     """All stored values, before targets get their slots; `plan` is that of the frame's sequence."""
     frame = traced.frame
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
-    values = _traced_values(plan, traced, direct, beamformed.isolated) | beamformed.snr
-    if "signals" in plan.products:
-        counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
-        values |= signal_values(beamformed.recorded or beamformed.signals, counts)
+    values = _traced_values(plan, traced, direct, beamformed.isolated) | beamformed.values
     if beamformed.image is None or beamformed.estimates is None:
         mark_stage("collect")
         return values

@@ -39,5 +39,4 @@ class BeamformedFrame:
     imaged: Signals | None = None  # that the image was made of: without direct pulses and reflections that were removed
     beams: BeamSpectra | None = None  # of the echo window of these
     isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the link budget, in signals
-    recorded: Signals | None = None  # as the converter gave them, where the sonar corrected them since
-    snr: Values = field(default_factory=dict)
+    values: Values = field(default_factory=dict)  # to store: signals as the converter gave them, signal to noise

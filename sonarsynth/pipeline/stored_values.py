@@ -11,6 +11,7 @@ from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation
 from sonarsynth.equations.kernels.rounding import multiples
 from sonarsynth.imaging.beam_envelopes import envelope_levels
 from sonarsynth.labels.views.range_cells_met import met_at_ranges
+from sonarsynth.pipeline.variables import counting
 from sonarsynth.pipeline.variables.variable import Variable
 from sonarsynth.pipeline.variables.variable_groups import LEVEL_STEP, NO_LEVEL
 from sonarsynth.planning import Plan
@@ -96,9 +97,9 @@ def sensor_values(drawn: DrawnErrors) -> Values:
     )
 
 
-def signal_values(signals: Signals, counts: bool) -> Values:
+def signal_values(plan: Plan, signals: Signals) -> Values:
     """Signals, as counts of the converter or in Pa."""
-    pressure = multiples(signals.pressure, signals.quantum) if counts else signals.pressure
+    pressure = multiples(signals.pressure, signals.quantum) if counting(plan) else signals.pressure
     return table("/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside)
 
 

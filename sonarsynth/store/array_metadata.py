@@ -93,5 +93,5 @@ def _document(
 def _codecs(dtype: np.dtype[Any], compressed: dict[str, Any]) -> list[dict[str, Any]]:
     """Blosc, and a checksum."""
     order: dict[str, Any] = {"configuration": {"endian": "little"}} if dtype.itemsize > 1 else {}
-    blosc = {"typesize": dtype.itemsize, **compressed, "blocksize": 0}
+    blosc = {"typesize": dtype.itemsize, **compressed}
     return [{"name": "bytes", **order}, {"name": "blosc", "configuration": blosc}, {"name": "crc32c"}]

@@ -14,6 +14,7 @@ from sonarsynth.pipeline.variables.static_variables import coordinates
 from sonarsynth.pipeline.variables.variable import Variable, flags
 from sonarsynth.pipeline.variables.variable_groups import VARIABLES
 from sonarsynth.planning import OF_BEAMS, Plan
+from sonarsynth.receiver import Converter
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,9 +24,16 @@ __all__ = [
     "Variable",
     "attributes",
     "coordinates",
+    "counting",
     "frame_tree",
     "variables",
 ]
+
+
+def counting(plan: Plan) -> Converter | None:
+    """The converter whose counts are stored as pressure; None where int16 does not hold them, or there is none."""
+    converter = plan.scene.sonar.converter
+    return converter if converter is not None and converter.bits <= 16 else None
 
 
 def variables(plan: Plan) -> tuple[Variable, ...]:
@@ -46,8 +54,7 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
         chosen = [v for v in chosen if (v.group, v.name) != ("/image", "remainder")]
     categories = flags(plan.recipe.categories)
     chosen = [replace(v, attributes=categories) if v.name == "category" else v for v in chosen]
-    converter = plan.scene.sonar.converter
-    if converter is not None and converter.bits <= 16:
+    if (converter := counting(plan)) is not None:
         counts: dict[str, Any] = {
             "dtype": "int16",
             "fill": -(2**15),
