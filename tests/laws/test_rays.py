@@ -50,25 +50,6 @@ def test_the_bed_ends_the_water_that_a_ray_may_turn_in() -> None:
         assert len(found.pair) == paths
 
 
-def test_a_ray_followed_arc_by_arc_ends_where_the_eigenray_does() -> None:
-    from sonarsynth.equations.rays import ray_arcs
-
-    rng = np.random.default_rng(8)
-    depth = np.sort(rng.uniform(0, 100, 9))
-    depth[4] = depth[5]
-    water = ray_solutions.water(depth, 1500 + 8 * rng.normal(size=9), 100.0)
-    z1, z2, r = rng.uniform(0, 100, 800), rng.uniform(0, 100, 800), 10 ** rng.uniform(0, 3.3, 800)
-    found = ray_solutions.eigenrays(water, z1, z2, r)
-    nodes = np.empty((200 * len(found.pair), 3))
-    angle = -np.arctan2(found.start_sine, found.slowness * found.start_speed)
-    count = ray_arcs.chords(water.depth, water.speed, z1[found.pair], angle, found.slowness, found.length, 1e-3, nodes)
-    last = np.flatnonzero(np.diff(nodes[:count, 0], append=-1))
-    _, x, z = nodes[last].T
-    assert np.isfinite(np.fmax(found.upper, found.lower)).sum() > 50
-    np.testing.assert_allclose(x, r[found.pair], rtol=1e-8)
-    np.testing.assert_allclose(z, z2[found.pair], atol=2e-6)
-
-
 @pytest.mark.parametrize("layers", [0, 800])
 def test_mean_slowness_is_the_integral_of_the_slowness(layers) -> None:
     """In few layers, and in so many that whole ones are summed beforehand."""
