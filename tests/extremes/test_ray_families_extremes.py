@@ -8,7 +8,6 @@ import sys
 import numpy as np
 import pytest
 
-from sonarsynth.conventions import Floats
 from sonarsynth.equations.rays import ray_solutions
 from sonarsynth.validation.rays.ray_matching import rays_of
 from sonarsynth.validation.references.rays.exact_rays import exact_rays
@@ -147,15 +146,6 @@ def test_weak_to_violent_gradients(gradient: float) -> None:
                 assert sorted(family(found, i) for i in range(len(found.pair))) == sorted(row[0] for row in fan)
 
 
-def test_a_millimetre_of_water() -> None:
-    water = ray_solutions.water(np.array([0.0, 4e-4, 6e-4, 1e-3]), np.array([1500.0, 1502.0, 1499.0, 1501.0]), 1e-3)
-    for start, end, distance in ((2e-4, 5e-4, 1e-3), (0.0, 1e-3, 0.02), (5e-4, 5e-4, 1e-5), (1e-4, 9e-4, 0.3)):
-        found = one(water, start, end, distance, 4, 4)
-        check(water, found, start, end, distance)
-        fan = families(water, start, end, np.array([distance]), 4, 4)[0]
-        assert sorted(family(found, i) for i in range(len(found.pair))) == sorted(row[0] for row in fan)
-
-
 def test_a_hundred_kilometres_in_eleven_kilometres_of_water_and_twelve_vertices() -> None:
     depth = np.array([0.0, 50.0, 200.0, 1000.0, 1300.0, 4000.0, 11000.0])
     water = ray_solutions.water(depth, np.array([1540.0, 1539.0, 1515.0, 1483.0, 1482.0, 1522.0, 1645.0]), 11000.0)
@@ -221,16 +211,3 @@ def test_turning_exactly_at_a_node_is_one_ray() -> None:
         mine = (found.turning == 1) & (abs(found.lower - 30.0) < 1e-3)
         assert mine.sum() == 1
         assert found.lower[mine][0] == pytest.approx(30.0, abs=1e-7 + 1e3 * abs(step))
-
-
-def test_no_vertices_and_no_reflections() -> None:
-    found = ray_solutions.eigenrays(CHANNEL, np.array([5.0]), np.array([30.0]), np.array([40.0]), 0, 5)
-    assert names(found) == [(0, 0, 0)]
-    assert len(one(CHANNEL, 5.0, 5.0, 40.0, 0, 0).pair) == 0
-    with pytest.raises(ValueError, match="negative"):
-        one(CHANNEL, 5.0, 5.0, 40.0, -1, 0)
-
-
-def test_nothing_to_trace() -> None:
-    empty: Floats = np.empty(0)
-    assert len(ray_solutions.eigenrays(CHANNEL, empty, empty, empty, 3, 3).pair) == 0
