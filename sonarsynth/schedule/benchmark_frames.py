@@ -17,19 +17,19 @@ import numpy as np
 
 from sonarsynth import store
 from sonarsynth.labels.odds import NO_ODDS, Odds, odds
-from sonarsynth.pipeline import Values, beamform_frame, range_frame, silent_at, stage_timer, trace_at
+from sonarsynth.pipeline import Values
 from sonarsynth.pipeline.labelled_estimates import beam_width
-from sonarsynth.planning import Plan, check_unsampled_frame
+from sonarsynth.planning import Plan
+from sonarsynth.schedule.making import job_of
+from sonarsynth.schedule.tasks import StageResult, remember, render_frames
 from sonarsynth.store.layout import layout_of
 
 LONGEST: Final = 5.0
 """Seconds that a frame may take, by counts of its work, for any to be tried."""
-TRIED: Final = 1.2
+TRIED: Final = 0.6
 """Seconds of processor time after which no further frame is tried."""
 FRAMES: Final = 8
 """Frames that are tried at most."""
-
-Stages = dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -60,53 +60,45 @@ class Trial:
     odds: Odds  # of finding targets in these
 
 
-@dataclass(frozen=True, eq=False)
-class _TimedFrame:
-    """A frame that was made."""
-
-    frame: int
-    values: Values
-    cpu: Stages
-    wall: float
-
-    @property
-    def seconds(self) -> float:
-        """Of the processor, in all stages."""
-        return sum(self.cpu.values())
-
-
 def try_frames(plan: Plan, folder: Path | None = None) -> Trial:
-    """Make some frames of a plan and write them below a folder (left out: that of temporary files).
+    """Make some frames of a plan, as a worker does, and write them below a folder (left out: that of temporary files).
 
-    The first one is made twice, for what it loads is there for all others. Raises RuntimeError where no frame can be
+    Each is made twice, for what it loads is there for all that are like it. Raises RuntimeError where no frame can be
     made, or one would take long; OSError where there is no room.
     """
     if sum(stage.seconds for stage in plan.stages) > LONGEST:
         raise RuntimeError(f"one would take more than {LONGEST:g} s")
-    timed, failures = list[_TimedFrame](), list[str]()
+    job = job_of(Path(), plan, "")
+    remember(job, plan)
+    made, failures = list[StageResult](), list[str]()
     for index in _spread(plan.recipe.frames):
-        if sum(frame.seconds for frame in timed) > TRIED:
+        if sum(_seconds(frame) for frame in made) > TRIED:
             break
-        try:
-            if not timed:
-                _make(plan, index)
-            timed.append(_make(plan, index))
-        except Exception as error:
-            failures.append(f"frame {index}: {' '.join(f'{type(error).__name__}: {error}'.split())}")
-    if not timed:
+        _, frame = (render_frames(job, [index])[0] for _ in range(2))
+        if frame.failure is None:
+            made.append(frame)
+        else:
+            failures.append(f"frame {index}: {frame.failure.error}")
+    if not made:
         raise RuntimeError(failures[0])
-    fixed, writing, shard = _write(plan, [frame.values for frame in timed], folder)
-    names = dict.fromkeys(name for frame in timed for name in frame.cpu)
+    fixed, writing, shard = _write(plan, [frame.value for frame in made], folder)
+    names = dict.fromkeys(name for frame in made for name in frame.parts)
+    wall, spent = sum(sum(frame.seconds.values()) for frame in made), sum(_seconds(frame) for frame in made)
     return Trial(
-        frames=tuple(frame.frame for frame in timed),
-        cpu={name: sum(frame.cpu.get(name, 0.0) for frame in timed) / len(timed) for name in names},
-        waiting=max(sum(frame.wall for frame in timed) / max(sum(frame.seconds for frame in timed), 1e-9), 1.0),
+        frames=tuple(frame.frame for frame in made),
+        cpu={name: sum(frame.parts.get(name, 0.0) for frame in made) / len(made) for name in names},
+        waiting=max(wall / max(spent, 1e-9), 1.0),
         writing=writing,
         fixed=fixed,
         shard=shard,
         failures=tuple(failures),
-        odds=sum((_odds(plan, frame.values) for frame in timed), NO_ODDS),
+        odds=sum((_odds(plan, frame.value) for frame in made), NO_ODDS),
     )
+
+
+def _seconds(frame: StageResult) -> float:
+    """Of the processor, in all stages."""
+    return sum(frame.cpu.values())
 
 
 def _odds(plan: Plan, values: Values) -> Odds:
@@ -124,22 +116,6 @@ def _spread(frames: int) -> list[int]:
     """Frames to try, by golden ratio: spread over a dataset, however many of them are tried."""
     places = np.mod((np.arange(1, FRAMES + 1)) * 0.6180339887498949, 1.0)
     return list(dict.fromkeys(int(frame) for frame in places * frames))
-
-
-def _make(plan: Plan, index: int) -> _TimedFrame:
-    """One frame, through all its stages."""
-    began = time.perf_counter()
-    with stage_timer() as cpu:
-        plan = plan.at(index)
-        frame = plan.recipe.frame(index)[1]
-        check_unsampled_frame(plan, frame)
-        if plan.makes_sound:
-            traced = trace_at(plan, frame)
-            values = range_frame(plan, index, traced, beamform_frame(plan, index, traced))
-        else:
-            values = silent_at(plan, frame)
-        values = layout_of(plan).check(values)
-    return _TimedFrame(index, values, dict(cpu), time.perf_counter() - began)
 
 
 def _write(plan: Plan, tried: Sequence[Values], folder: Path | None) -> tuple[Sizes, float, Sizes]:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 import math
 import re
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from sonarsynth import pipeline, schedule, store
 from sonarsynth.planning import Plan, plan
+from sonarsynth.products import Arrivals
 from sonarsynth.recipe import Recipe, reading
+from sonarsynth.recipe.scene import Frame
 from sonarsynth.schedule import benchmark_frames
 from sonarsynth.store import creating
 
@@ -104,27 +108,48 @@ def test_where_nothing_can_be_tried_counts_serve(
     assert made.bytes > 0
     assert math.isfinite(made.seconds)
 
-    def fails(plan: Plan, frame: object) -> None:
+    def fails(plan: Plan, *traced: object) -> None:
         raise ValueError("no such\nwater")
 
-    monkeypatch.setattr(benchmark_frames, "trace_at", fails)
+    monkeypatch.setattr(pipeline, "trace_at", fails)
     made = schedule.predict(small_plan)
     assert made.failures[0].endswith("ValueError: no such water")
 
 
 def test_a_frame_that_fails_is_named_and_the_others_serve(small_plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
-    real = benchmark_frames.trace_at
+    real = pipeline.trace_at
 
-    def fails(plan: Plan, frame: object) -> object:
-        if frame.index == 12:  # type: ignore[attr-defined]
+    def fails(plan: Plan, frame: Frame, *traced: Arrivals) -> pipeline.TracedFrame:
+        if frame.index == 12:
             raise ValueError("no water")
-        return real(plan, frame)  # type: ignore[arg-type]
+        return real(plan, frame, *traced)
 
-    monkeypatch.setattr(benchmark_frames, "trace_at", fails)
+    monkeypatch.setattr(pipeline, "trace_at", fails)
     made = schedule.predict(small_plan)
     assert made.failures == ("frame 12: ValueError: no water",)
     assert made.basis.startswith("timing frames on this machine (number")
     assert "12" not in made.basis
+
+
+def test_frames_are_timed_as_workers_make_them(small_plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In one thread, and without what the first of their kind load: tables of a pulse, for one."""
+    real, begun = pipeline.trace_at, set[int]()
+    threads = set[int]()
+
+    def loads(plan: Plan, frame: Frame, *traced: Arrivals) -> pipeline.TracedFrame:
+        threads.update(library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas")
+        until = time.thread_time() + 0.1 * (frame.index not in begun)
+        begun.add(frame.index)
+        while time.thread_time() < until:
+            pass
+        return real(plan, frame, *traced)
+
+    monkeypatch.setattr(pipeline, "trace_at", loads)
+    with threadpool_limits(2, "blas"):
+        made = schedule.predict(small_plan)
+    assert threads == {1}
+    assert made.frame_seconds < 0.1
+    assert len(begun) > 1
 
 
 def test_predictions_grow_as_they_must(prediction: schedule.Prediction) -> None:
