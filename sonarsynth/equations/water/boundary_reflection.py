@@ -66,10 +66,10 @@ def rayleigh(
     sine = np.abs(np.sin(np.asarray(grazing, float)))
     m, ratio, delta = (np.asarray(x, float) for x in (density_ratio, speed_ratio, loss_tangent))
     n = (1.0 - 1j * delta) / ratio
-    w = np.asarray(np.sqrt((n - 1.0) * (n + 1.0) + sine * sine))
-    w.imag = -np.abs(w.imag)  # where there is no loss and the angle is below the critical one, it may be above 0
-    both = m * sine
-    top, bottom = both - w, both + w
+    contrast = (n - 1.0) * (n + 1.0)
+    w = np.where(contrast == 0.0, sine, np.sqrt(contrast + sine**2))
+    w = np.where(w.imag > 0.0, -w, w)
+    top, bottom = m * sine - w, m * sine + w
     nothing = bottom == 0.0  # q = 0 and n = 1
     return np.asarray(np.where(nothing, (m - 1.0) / (m + 1.0), top / np.where(nothing, 1.0, bottom)))
 
