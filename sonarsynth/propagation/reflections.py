@@ -50,9 +50,8 @@ def at_boundaries(
         return Reflections(alike(1.0, len(surface)), none, none)
     over = bounces(environment.surface, surface_grazing, surface, float(profile.at(0.0)), centre)
     under = bounces(environment.bottom, bottom_grazing, bottom, float(profile.at(environment.depth)), centre)
-    return Reflections(
-        over.modulus * under.modulus, over.phase + under.phase, np.hypot(over.delay_std, under.delay_std)
-    )
+    blurred = np.sqrt(over.delay_std**2 + under.delay_std**2)
+    return Reflections(over.modulus * under.modulus, over.phase + under.phase, blurred)
 
 
 def reflections_along(
@@ -60,7 +59,7 @@ def reflections_along(
     centre: float,
 ) -> Reflections:  # fmt: skip
     """Of so many reflections (path,) of rays that have directions (path, xyz) at depths (path,) m, by Snell's law."""
-    slowness = np.hypot(direction[:, 0], direction[:, 1]) / profile.at(depth)
+    slowness = np.sqrt(direction[:, 0] ** 2 + direction[:, 1] ** 2) / profile.at(depth)
     over, under = (np.arccos(np.minimum(slowness * float(profile.at(z)), 1.0)) for z in (0.0, environment.depth))
     return at_boundaries(environment, profile, over, surface, under, bottom, centre)
 

@@ -26,7 +26,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from sonarsynth.columns import Columns, alike, rows_of
+from sonarsynth.columns import Columns, alike
 from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.kernels import moving_ends
@@ -123,13 +123,14 @@ def bounced_anew(paths: Bounced, z: Floats, before: Floats, after: Floats, mediu
     """Paths of which surface and bottom reflect what has another direction (path, xyz) at depths z (path,) m than was
     traced; centre (Hz): of the band."""
     rows = np.flatnonzero(paths.bounces)
-    turned = np.abs(np.subtract(rows_of(after, rows).T, rows_of(before, rows).T, order="C"))
+    turned = np.abs(np.subtract(after.take(rows, axis=0).T, before.take(rows, axis=0).T, order="C"))
     rows = rows[(turned > SAME).any(axis=0)]
     if not len(rows):
         return paths
     counts = paths.surface[rows], paths.bottom[rows], centre
     old, new = (
-        reflections_along(medium.environment, medium.profile, z[rows], of[rows], *counts) for of in (before, after)
+        reflections_along(medium.environment, medium.profile, z[rows], of.take(rows, axis=0), *counts)
+        for of in (before, after)
     )
     boundary, phase, blur = paths.boundary.copy(), paths.phase.copy(), paths.delay_std.copy()
     boundary[rows] *= new.modulus / np.maximum(old.modulus, 1e-300)

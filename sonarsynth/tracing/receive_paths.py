@@ -250,8 +250,8 @@ def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Me
         every, bow = np.arange(len(facets.facet)), 0.5 * bend * farthest**2
         return np.asarray(in_front(every, facets.point, facets.normal, position, slack + bow, np.empty((0, 3))))
     level = position[:2] - facets.point[:, :2]
-    distance = np.hypot(level[:, 0], level[:, 1])
-    flattest = distance / np.hypot(distance, (bounces + 2) * medium.depth)
+    distance = np.sqrt(level[:, 0] ** 2 + level[:, 1] ** 2)
+    flattest = distance / np.sqrt(distance**2 + ((bounces + 2) * medium.depth) ** 2)
     cosine = flattest * medium.profile.speed.min() / medium.profile.speed.max()
     ahead = np.einsum("ij,ij->i", facets.normal[:, :2], level) / np.maximum(distance, 1e-300)
     steepest = np.abs(facets.normal[:, 2]) * np.sqrt((1.0 - cosine) * (1.0 + cosine))

@@ -159,7 +159,7 @@ def assemble(
         lit_by=np.asarray((out.surface > 0) + 2 * (out.bottom > 0)),
         arrives_by=np.asarray((legs.surface > 0) + 2 * (legs.bottom > 0)),
         phase=phase,
-        delay_std=np.hypot(np.hypot(out.delay_std, legs.delay_std), pulses.delay_std),
+        delay_std=np.sqrt(out.delay_std**2 + legs.delay_std**2 + pulses.delay_std**2),
         echo_delay_std=pulses.delay_std,
         doppler=np.zeros(len(length)),
         coherent=pulses.coherent,

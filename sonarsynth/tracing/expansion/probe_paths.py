@@ -97,7 +97,8 @@ def _boundaries(legs: ReceivePaths, departure: Floats, medium: Medium, centre: f
     rows = np.flatnonzero(legs.bounces > 0)
     if not len(rows):
         return shift, ratio, softer
-    p = np.hypot(departure[rows, :, 0], departure[rows, :, 1]) / profile.at(depth(legs.point[rows]))[:, None]
+    x, y, _ = np.moveaxis(departure[rows], 2, 0)
+    p = np.sqrt(x * x + y * y) / profile.at(depth(legs.point[rows]))[:, None]
     surface, bottom = (np.repeat(n[rows, None], p.shape[1], axis=1) for n in (legs.surface, legs.bottom))
     angles = [np.arccos(np.minimum(p * float(profile.at(z)), 1.0)) for z in (0.0, medium.depth)]
     bounced = at_boundaries(medium.environment, profile, angles[0], surface, angles[1], bottom, centre)

@@ -113,7 +113,7 @@ class Occlusion:
             rows = np.flatnonzero(ahead > spread)
         leaving = starts.select(rows)
         verdict[rows] = classify_rays(
-            self.bodies, self.bending, leaving.point, end[rows], away[rows], length[rows], spread[rows],
+            self.bodies, self.bending, leaving.point, *(of.take(rows, axis=0) for of in (end, away, length, spread)),
             bounces=legs.bounces[rows], turning=legs.turning[rows], facets=(leaving.owner, leaving.facet),
         )  # fmt: skip
         return verdict
@@ -161,14 +161,15 @@ class Occlusion:
             hide(self.bodies, starts.point[rows], points, seen)
             return look & ~seen
         row, column = np.nonzero(look)
-        leg, offset = rows[row], self.receiver.pose.turn_to_world(self._points[point])[column]
+        leg, offset = rows[row], self.receiver.pose.turn_to_world(self._points[point]).take(column, axis=0)
         bounces, unseen = legs.bounces[leg], np.zeros(len(leg), bool)
-        ahead, length = _towards(legs.length[leg], legs.departure[leg], bounces, offset)
+        ahead, length = _towards(legs.length[leg], legs.departure.take(leg, axis=0), bounces, offset)
         if normal is not None:
-            unseen = dot(ahead, normal[leg]) <= 0.0
+            unseen = dot(ahead, normal.take(leg, axis=0)) <= 0.0
         ray = np.flatnonzero(~unseen)
         leaving, turning = starts.select(leg[ray]), legs.turning[leg[ray]]
-        away = leaving.point, self.receiver.pose.position + offset[ray], ahead[ray], length[ray]
+        offset, ahead = offset.take(ray, axis=0), ahead.take(ray, axis=0)
+        away = leaving.point, self.receiver.pose.position + offset, ahead, length[ray]
         own = leaving.owner, leaving.facet
         unseen[ray] = hidden(self.bodies, self.bending, *away, bounces=bounces[ray], turning=turning, facets=own)
         look[row, column] = unseen
