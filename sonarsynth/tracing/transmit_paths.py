@@ -72,7 +72,8 @@ class TransmitPaths(Columns):
             return self
         begin = np.flatnonzero(first)
         value = np.add.reduceat(self.spreading * self.boundary * np.exp(1j * self.phase), begin)
-        merged = self.select(np.lexsort((self.bounces, np.cumsum(first)))[begin])  # by the fewest bounces
+        number = np.cumsum(first) * (1 + self.bounces.max()) + self.bounces
+        merged = self.select(np.argsort(number, kind="stable")[begin])  # by the fewest bounces
         return merged.but(boundary=np.abs(value) / merged.spreading, phase=np.angle(value + 0.0))
 
     @cached_property
