@@ -76,7 +76,7 @@ def trace_each(
             heard_directly |= set(group.snaps if group.direct else ())
     speed = receiver.speed(context.medium)
     traced = [join(arrivals or [no_arrivals(array.legs)], speed, receiver.centre) for arrivals in blocks]
-    return [arrivals.but(snap=arrivals.snap - start) for arrivals, start in zip(traced, first, strict=False)]
+    return [of.but(snap=of.snap - start) if start else of for of, start in zip(traced, first, strict=False)]
 
 
 def _where_heard(array: FacetPaths, meeting: Meeting) -> FacetPaths:

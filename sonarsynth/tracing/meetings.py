@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import TypeVar
 
 import numpy as np
@@ -88,30 +88,32 @@ class MeetingTimes:
         met, arrival_time = self.met[:, snap, owner], self.arrival_time[:, :, snap, owner]
         if len(met) == 1:
             return (None,)
-        between = self._between(snap, owner)
+        in_sight = cache(partial(self._in_sight, snap, owner, self._between(snap, owner)))
 
         def near(first: tuple[int, int], pair: tuple[int, int]) -> bool:
             heard = self._alike(self.sonar, float(arrival_time[first]), float(arrival_time[pair]), self.aperture)
             times = float(met[first[0]]), float(met[pair[0]])
             alike = heard and (body is None or self._alike(body.track, *times, body.mesh.radius))
-            return alike and self._in_sight(snap, owner, first, pair, between)
+            return alike and bool(in_sight(first)[pair])
 
         order = [divmod(n, len(met)) for n in np.argsort(arrival_time, axis=None, kind="stable").tolist()]
         found = [tuple(sorted(of)) for of in groups(order, near) if not self.every.isdisjoint(of)]
         return tuple(found) if len(found) > 1 else (None,)
 
-    def _in_sight(self, snap: int, owner: int, first: tuple[int, int], pair: tuple[int, int], between: Bools) -> bool:
-        """Whether an owner that sound meets by other families is lit and seen from nearly the same sides then, and
-        hidden alike by bodies that may come between (body,)."""
+    def _in_sight(self, snap: int, owner: int, between: Bools, first: tuple[int, int]) -> Bools:
+        """Whether an owner that sound meets by other ways (family, family on) is lit and seen from nearly the same
+        sides then as by the first, and hidden alike by bodies that may come between (body,)."""
         met, heard = self.met[:, snap], self.arrival_time[:, :, snap, owner]
-        late, later = met[pair[0]] - met[first[0]], heard[pair] - heard[first]
+        late, later = met - met[first[0]], heard - heard[first]
         _, velocity, spin = self._places
-        gone, moved = velocity * late[:, None], self.sonar.velocity * later
-        way, way_on = met[pair[0], owner] - self.snaps[snap].time, heard[pair] - met[pair[0], owner]
-        past = np.linalg.norm(gone[owner]) / way, np.linalg.norm(gone[owner] - moved) / way_on
-        turned = max(past) / self.speed + np.linalg.norm(spin[owner]) * abs(late[owner])
-        beside = np.linalg.norm(gone - gone[owner], axis=1)[: len(between)]
-        return bool(turned <= self.shared and (beside <= self.shared * self.radius[: len(between)])[between].all())
+        gone, moved = velocity * late[..., None], self.sonar.velocity * later[..., None]
+        way, way_on = met[:, owner] - self.snaps[snap].time, heard - met[:, owner, None]
+        past = np.linalg.norm(gone[:, owner], axis=-1) / way
+        past_on = np.linalg.norm(gone[:, None, owner] - moved, axis=-1) / way_on
+        rate, turning = np.maximum(past[:, None], past_on) / self.speed, np.linalg.norm(spin[owner])
+        beside = np.linalg.norm(gone - gone[:, owner, None], axis=-1)[:, : len(between)]
+        hidden_alike = (beside <= self.shared * self.radius[: len(between)])[:, between].all(axis=1)
+        return (rate + turning * np.abs(late[:, owner, None]) <= self.shared) & hidden_alike[:, None]
 
     def _between(self, snap: int, owner: int) -> Bools:
         """(body,) which may stand in rays from a snap to an owner and on to the array: seen from above, where all
