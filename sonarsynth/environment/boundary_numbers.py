@@ -27,12 +27,9 @@ class Bounces:
 
 
 def bounces(
-    boundary: SeaSurface | SeaBottom,
-    grazing: npt.ArrayLike,
-    count: npt.ArrayLike,
-    sound_speed: npt.ArrayLike,
+    boundary: SeaSurface | SeaBottom, grazing: npt.ArrayLike, count: npt.ArrayLike, sound_speed: npt.ArrayLike,
     frequency: float | None = None,
-) -> Bounces:
+) -> Bounces:  # fmt: skip
     """The effect of `count` (path,) reflections at the same grazing angle (path,) (rad), of no matter where count is 0.
 
     sound_speed (m/s) is the water's at the boundary; frequency (Hz) as for `coefficient`. The blur of several bounces
@@ -63,17 +60,14 @@ def coefficient(boundary: SeaSurface | SeaBottom, grazing: npt.ArrayLike, freque
     """
     angle = np.asarray(grazing, float)
     none = np.isnan(angle)
-    if none.any():
-        value = np.ones(angle.shape, complex)
-        value[~none] = coefficient(boundary, angle[~none], frequency)
-        return value
-    value = boundary.reflection.coefficient(angle)
+    q = np.where(none, 0.5 * np.pi, angle) if none.any() else angle
+    value = boundary.reflection.coefficient(q)
     if isinstance(boundary, SeaSurface) and boundary.bubbles and boundary.wind_speed is not None:
         if frequency is None:
             raise ValueError("the loss in bubbles needs a frequency")
         with formula_ranges.noted():
-            value = value * 10.0 ** (-boundary_reflection.bubble_loss(boundary.wind_speed, frequency, angle) / 20.0)
-    return np.asarray(value)
+            value = value * 10.0 ** (-boundary_reflection.bubble_loss(boundary.wind_speed, frequency, q) / 20.0)
+    return np.asarray(np.where(none, 1.0 + 0j, value) if none.any() else value)
 
 
 def rms_height(boundary: SeaSurface | SeaBottom) -> float:

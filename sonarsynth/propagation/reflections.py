@@ -36,14 +36,9 @@ def reflections(environment: Environment, profile: Profile, paths: Paths, centre
 
 
 def at_boundaries(
-    environment: Environment,
-    profile: Profile,
-    surface_grazing: Floats,
-    surface: Ints,
-    bottom_grazing: Floats,
-    bottom: Ints,
-    centre: float,
-) -> Reflections:
+    environment: Environment, profile: Profile, surface_grazing: Floats, surface: Ints, bottom_grazing: Floats,
+    bottom: Ints, centre: float,
+) -> Reflections:  # fmt: skip
     """Of so many reflections (path,) at grazing angles (path,) in rad."""
     if not (surface.any() or bottom.any()):
         none = alike(0.0, len(surface))

@@ -72,13 +72,9 @@ class EchoBatch(Columns):
 
 
 def echo_batches(
-    array: FacetPaths,
-    out: TransmitPaths,
-    leg: Ints,
-    components: tuple[tuple[Component, ...], ...],
-    carried: MotionTerms | None,
-    factor: Floats,
-) -> list[EchoBatch]:
+    array: FacetPaths, out: TransmitPaths, leg: Ints, components: tuple[tuple[Component, ...], ...],
+    carried: MotionTerms | None, factor: Floats,
+) -> list[EchoBatch]:  # fmt: skip
     """Echoes of pairs of a way and a leg (pair,), by owner and part; carried: by how much pairs differ from those that
     were traced, where anything moves; factor (pair,): what ways do to amplitudes.
 

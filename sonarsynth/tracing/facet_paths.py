@@ -140,12 +140,9 @@ def facet_paths_at_rest(context: FrameContext, propagation: Propagation, snaps: 
 
 
 def facet_paths(
-    context: FrameContext,
-    propagation: Propagation,
-    owners: tuple[int, ...] | None = None,
-    snaps: tuple[Emission, ...] | None = None,
-    ways: Ways | None = None,
-) -> FacetPaths:
+    context: FrameContext, propagation: Propagation, owners: tuple[int, ...] | None = None,
+    snaps: tuple[Emission, ...] | None = None, ways: Ways | None = None,
+) -> FacetPaths:  # fmt: skip
     """Facet to array, for every surface element, or those of some owners, that leaves a ray for the array that no body
     hides, by some ways or all. Of no others than some `snaps` may light (None: any), where that is known of rays in
     layers.

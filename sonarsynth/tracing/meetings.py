@@ -113,7 +113,7 @@ class MeetingTimes:
         rate, turning = np.maximum(past[:, None], past_on) / self.speed, np.linalg.norm(spin[owner])
         beside = np.linalg.norm(gone - gone[:, owner, None], axis=-1)[:, : len(between)]
         hidden_alike = (beside <= self.shared * self.radius[: len(between)])[:, between].all(axis=1)
-        return (rate + turning * np.abs(late[:, owner, None]) <= self.shared) & hidden_alike[:, None]
+        return np.asarray((rate + turning * np.abs(late[:, owner, None]) <= self.shared) & hidden_alike[:, None])
 
     def _between(self, snap: int, owner: int) -> Bools:
         """(body,) which may stand in rays from a snap to an owner and on to the array: seen from above, where all

@@ -178,18 +178,9 @@ def no_arrivals(legs: ReceivePaths) -> Arrivals:
     """No arrivals at all: what a frame without a snap has."""
     none, zero = np.empty(0), np.empty(0, int)
     return assemble(
-        legs.select(zero),
-        ArrayExpansion.none(0),
-        TransmitPaths.none(0),
-        0,
-        0.0,
-        none,
-        kind=Kind.DIRECT,
-        target=zero,
-        facet=zero,
-        scattering=none,
-        pulses=PulseResponse.plain(0),
-    )
+        legs.select(zero), ArrayExpansion.none(0), TransmitPaths.none(0), 0, 0.0, none,
+        kind=Kind.DIRECT, target=zero, facet=zero, scattering=none, pulses=PulseResponse.plain(0),
+    )  # fmt: skip
 
 
 def join(blocks: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:

@@ -121,19 +121,12 @@ class Occlusion:
     def _dark(self, legs: ReceivePaths, starts: Starts, rows: Ints) -> Bools:
         """(row, 1 + sensor) from where some legs are hidden: the array centre, each hydrophone. Parts of the array that
         see alike are looked at together."""
-        every = np.arange(len(self._points))
-        array_cells = cells(self.elements)
-        row, cell = np.repeat(rows, len(array_cells.radius)), np.tile(np.arange(len(array_cells.radius)), len(rows))
-        repeated, places, offset, spread = (
-            legs.select(row),
-            starts.select(row),
-            self.receiver.pose.turn_to_world(array_cells.centre)[cell],
-            array_cells.radius[cell],
-        )
-        verdict = self._cones(repeated, places, spread, offset)
-        verdict = verdict.reshape(len(rows), len(array_cells.radius))[:, array_cells.cell]
-        unseen = self._unseen(legs, starts, rows, every, verdict >= UNKNOWN)
-        return np.asarray((verdict == CLOSED) | unseen)
+        every, parts = np.arange(len(self._points)), cells(self.elements)
+        row, part = np.repeat(rows, len(parts.radius)), np.tile(np.arange(len(parts.radius)), len(rows))
+        offset = self.receiver.pose.turn_to_world(parts.centre).take(part, axis=0)
+        verdict = self._cones(legs.select(row), starts.select(row), parts.radius[part], offset)
+        verdict = verdict.reshape(len(rows), len(parts.radius))[:, parts.cell]
+        return np.asarray((verdict == CLOSED) | self._unseen(legs, starts, rows, every, verdict >= UNKNOWN))
 
     def _straight(self, legs: ReceivePaths) -> bool:
         """Whether legs are straight lines from end to end."""
