@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sonarsynth.conventions import Floats
 from sonarsynth.description.method import returned
 from sonarsynth.labels import echo_levels, label, link_budget, path_powers
 from sonarsynth.labels.estimate_labels import Direct
@@ -72,6 +71,7 @@ __all__ = [
     "follow_rays",
     "frame_tree",
     "locate_and_image",
+    "measured",
     "range_frame",
     "range_image_of",
     "render",
@@ -142,6 +142,15 @@ def trace_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> Trac
     return TracedFrame(frame, arrivals, truth, budget, levels_of_echoes, *others)
 
 
+def measured(plan: Plan, index: int, traced: TracedFrame) -> TracedFrame:
+    """What was traced, with the levels of its isolated paths in signals of each alone, where signals are stored."""
+    if "signals" not in plan.products or traced.isolated is not None:
+        return traced
+    isolated = isolated_levels(plan.at(index), traced.frame, traced.budget, traced.truth.snap_level)
+    mark_stage("measure")
+    return replace(traced, isolated=isolated)
+
+
 def beamform_frame(plan: Plan, index: int, traced: TracedFrame, sound: Sound | None = None) -> BeamformedFrame:
     """Signals, source estimates, and the energy image of the echo window, as far as the products need them.
     sound: as `prepared_sound` has it, if at hand."""
@@ -149,17 +158,13 @@ def beamform_frame(plan: Plan, index: int, traced: TracedFrame, sound: Sound | N
     parts = SoundParts(plan)
     recorded = synthesise(plan, traced, parts, sound)
     mark_stage("synthesise")
-    isolated, values = None, Values()
-    if "signals" in plan.products:
-        values = signal_values(plan, recorded)  # at once, while they are in the caches
-        mark_stage("collect")
-        isolated = isolated_levels(plan, traced.frame, traced.budget, traced.truth.snap_level)
-        mark_stage("measure")
+    values = signal_values(plan, recorded) if "signals" in plan.products else {}  # while they are in the caches
+    mark_stage("collect")
     beamformed = BeamformedFrame(recorded, None, None)
     if plan.products & OF_BEAMS:
         beamformed = locate_and_image(plan, traced.frame, known_signals(plan, traced.frame, recorded))
     values |= snr_values(plan, traced.frame, traced.arrivals, traced.truth, parts, beamformed.image)
-    return replace(beamformed, isolated=isolated, values=values)
+    return replace(beamformed, values=values)
 
 
 def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFrame:
@@ -205,17 +210,17 @@ def range_frame(
     plan: Plan, index: int, traced: TracedFrame, beamformed: BeamformedFrame, cloud: PointCloud | None = None
 ) -> Values:
     """The point cloud, and every stored value of the frame; cloud: its points, where these are made already."""
-    plan = plan.at(index)
+    plan, traced = plan.at(index), measured(plan, index, traced)
     values = in_slots(plan, _beamformed_values(plan, traced, beamformed, cloud) | which_values(plan), VARIABLES)
     mark_stage("label")
     return values
 
 
-def _traced_values(plan: Plan, traced: TracedFrame, direct: Direct, isolated: Floats | None = None) -> Values:
-    """Stored values of paths and truth; isolated: levels of single paths, measured in signals of each alone."""
+def _traced_values(plan: Plan, traced: TracedFrame, direct: Direct) -> Values:
+    """Stored values of paths and truth."""
     frame = traced.frame
     values = frame_values(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
-    values |= link_budget_values(traced.budget, isolated) | soundscape_values(plan, frame, traced.chorus)
+    values |= link_budget_values(traced.budget, traced.isolated) | soundscape_values(plan, frame, traced.chorus)
     values |= clear_values(plan, traced.chorus, traced.echoes, direct, frame.moment.snaps)
     if "paths" in plan.products:
         values |= path_values(traced.arrivals, plan.sizes["path"], plan.sizes["sensor"])
@@ -228,7 +233,7 @@ def _beamformed_values(
     """All stored values, before targets get their slots; `plan` is that of the frame's sequence."""
     frame = traced.frame
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
-    values = _traced_values(plan, traced, direct, beamformed.isolated) | beamformed.values
+    values = _traced_values(plan, traced, direct) | beamformed.values
     if beamformed.image is None or beamformed.estimates is None:
         mark_stage("collect")
         return values

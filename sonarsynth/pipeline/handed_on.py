@@ -27,6 +27,7 @@ class TracedFrame:
     echoes: Echoes
     chorus: ChorusArrivals | None = None  # None: the scene has none
     reverberation: ReverberationArrivals | None = None
+    isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the link budget, in signals
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,5 +39,4 @@ class BeamformedFrame:
     image: EnergyImage | None
     imaged: Signals | None = None  # that the image was made of: without direct pulses and reflections that were removed
     beams: BeamSpectra | None = None  # of the echo window of these
-    isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the link budget, in signals
     values: Values = field(default_factory=dict)  # to store: signals as the converter gave them, signal to noise

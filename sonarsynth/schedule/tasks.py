@@ -154,7 +154,7 @@ def _values(plan: Plan, frame: int, before: Any) -> Any:
 Step = Callable[[Plan, int, Any], Any]
 """A part of a stage: of the plan, the number of a frame and what the step before made of it, what this one makes."""
 STAGES: Final[Mapping[str, Sequence[Step]]] = {
-    "trace": (_trace, _label),
+    "trace": (_trace, _label, pipeline.measured),
     "beamform": (_prepare, _beamform),
     "range": (_range, _values),
 }
