@@ -77,13 +77,15 @@ class EchoFilter:
         """Step (s) of delays."""
         return 0.5 / (self.length * self.received.beams.snapshots.spacing)
 
-    def profiles(self, u: Floats) -> tuple[npt.NDArray[np.complex64], npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-        """Spectra (beam, bin) of the profiles of beams (beam, xyz), these, powers (beam, delay), and their sums."""
+    def profiles(self, u: Floats) -> tuple[npt.NDArray[np.complex64], *tuple[npt.NDArray[np.float32], ...]]:
+        """Spectra (beam, bin) of the profiles of beams (beam, xyz), these, powers (beam, delay), their sums (beam,), and
+        the largest of all beams (delay,)."""
         window, sonar = self.received.beams.snapshots, self.received.sonar
         sine = u * (self.received.elements.face / sonar.assumed_sound_speed)
         blocks = [self.received.beams.spectra(u[low : low + BEAMS_AT_ONCE]) for low in range(0, len(u), BEAMS_AT_ONCE)]
         spectra = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
         power, total = np.empty((len(u), self.count), np.float32), np.empty(len(u), np.float32)
+        loudest = np.zeros(self.count, np.float32)
         room = np.empty((max(SAMPLES_AT_ONCE // self.length, 1), self.length), np.complex64)
         for low in range(0, len(u), len(room)):
             some = slice(low, low + len(room))
@@ -91,8 +93,8 @@ class EchoFilter:
             padded = room[: len(steered)]
             ranging_kernels.match(steered, sine[some, 1], sine[some, 2], *bins, self.share, self.matched, padded)
             waves = ifft(padded, axis=1, overwrite_x=True)
-            ranging_kernels.powers(waves, HALFWAY, power[some], total[some])
-        return spectra, power, total
+            ranging_kernels.powers(waves, HALFWAY, power[some], total[some], loudest)
+        return spectra, power, total, loudest
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +107,7 @@ class Profiles:
     spectra: npt.NDArray[np.complex64]  # (beam, bin) of which they are made
     power: npt.NDArray[np.float32]  # (beam, delay) relative
     total: npt.NDArray[np.float32]  # (beam,) sum over delays
+    loudest: npt.NDArray[np.float32]  # (delay,) of all beams
     first: float  # s after the direct arrival
     step: float  # s
     width: float  # rad: half of the half-power width of a beam
@@ -208,7 +211,7 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
     u = direction(received.image.azimuth[column], received.image.elevation[row])
     echoes = echo_filter(received)
     share, matched, taper = echoes.share, echoes.matched, echoes.taper
-    spectra, power, total = echoes.profiles(u)
+    spectra, power, total, loudest = echoes.profiles(u)
     spread = np.sum(taper**2)
     centre = float(f @ taper**2 / spread)
     beta = np.sqrt(max(float((f - centre) ** 2 @ taper**2 / spread), spacing**2))
@@ -219,6 +222,7 @@ def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profil
         spectra=spectra,
         power=power,
         total=total,
+        loudest=loudest,
         first=window.start - float(received.estimates.time[0]),
         step=echoes.step,
         width=half_width(elements, centre / c),

@@ -19,9 +19,9 @@ def _sum(values: Any) -> Any:
 
 
 @compiled
-def powers(waves: Any, taps: Any, power: Any, total: Any) -> None:
+def powers(waves: Any, taps: Any, power: Any, total: Any, loudest: Any) -> None:
     """Write |.|^2 of complex waves (beam, sample), and of what they are halfway between samples, into power (beam, two
-    for a sample), as many as it has, and their sums into total (beam,).
+    for a sample), as many as it has, their sums into total (beam,), and into loudest (delay,) what is more than it has.
 
     Waves have frequencies from 0 to half their rate and go on where they end as they begin. Halfway between samples
     they are the sum over k of taps (4,) times samples k + 1/2 before and after, turned by their middle frequency.
@@ -48,6 +48,8 @@ def powers(waves: Any, taps: Any, power: Any, total: Any) -> None:
             last = len(between) + 2
             power[n, count - 1] = re[last] * re[last] + im[last] * im[last]
         total[n] = _sum(power[n])
+        for i in range(count):
+            loudest[i] = max(loudest[i], power[n, i])
 
 
 @compiled

@@ -199,6 +199,8 @@ def test_powers_between_delays_are_those_of_a_transform_to_all_of_them(bins, cut
     length = next_fast_len(2 * bins)
     exact = np.abs(ifft(spectra.astype(complex), 2 * length, axis=1))[:, : 2 * length - cut] * 2
     found, total = np.empty(exact.shape, np.float32), np.empty(len(exact), np.float32)
-    ranging_kernels.powers(ifft(spectra.astype(np.complex64), length, axis=1), HALFWAY, found, total)
+    loudest = np.zeros(exact.shape[1], np.float32)
+    ranging_kernels.powers(ifft(spectra.astype(np.complex64), length, axis=1), HALFWAY, found, total, loudest)
+    np.testing.assert_array_equal(loudest, found.max(axis=0))
     np.testing.assert_allclose(total, found.sum(axis=1, dtype=float), rtol=1e-5)
     np.testing.assert_allclose(np.sqrt(found), exact, atol=(1e-2 if bins < 16 else 1e-4) * exact.max())

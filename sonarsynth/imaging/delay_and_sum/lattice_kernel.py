@@ -197,8 +197,9 @@ def lattice_beams(
     """Spectra of beams of an array in two halves, `focused_halves`: (row, bin) float32 pairs, of no more bins.
 
     As `lattice_energies`, with heights (column,) of the rows of a half; rise (level, side of y, column) of beams
-    across[bounds[level] : bounds[level + 1]]; middle (beam,): what a wave is later in the middle of the half to port,
-    and sooner in the other; row (beam,): where the spectrum of a beam is put.
+    across[bounds[2 * level] : bounds[2 * level + 1]], and of those as far down, which end at bounds[2 * level + 2];
+    middle (beam,): what a wave is later in the middle of the half to port, and sooner in the other; row (beam,): where
+    the spectrum of a beam is put.
     """
     columns, levels = len(heights), len(rise)
     size, lines = 2 * columns * rows * TERM, np.empty(4 * GROUPS * columns * TERM, np.float32)
@@ -210,10 +211,10 @@ def lattice_beams(
         chunk = folded[low // LANES * size :]
         for level in range(0, levels, 2):
             inner, outer = level * 2 * columns, min(level + 1, levels - 1) * 2 * columns
-            sums_over_rows(chunk, rows, heights, odd_rows, rise, up, inner, outer, first, spacing, groups, lines, False)
-            for which in range(min(2, levels - level)):
-                start, at, stop = 2 * which * GROUPS * columns * TERM, bounds[level + which], bounds[level + which + 1]
-                beams[:] = ZERO
+            sums_over_rows(chunk, rows, heights, odd_rows, rise, up, inner, outer, first, spacing, groups, lines, True)
+            for side in range(2 * min(2, levels - level)):
+                start, at, stop = side * GROUPS * columns * TERM, bounds[2 * level + side], bounds[2 * level + side + 1]
+                beams[: (stop - at) * BEAM] = ZERO
                 _add_beams(
                     lines, start, columns, odd_columns, across, port, middle, later, at, stop, np.float32(-1.0), first,
                     spacing, groups, beams, 0,

@@ -84,7 +84,7 @@ def pick(profiles: Profiles, image: EnergyImage, locality: float) -> AxisEchoes:
     own = power[rows, top]
     offset, _ = parabola(*(np.sqrt(power[rows, top + i]) for i in (-1, 0, 1)))
     near = np.maximum(_loudest_near(profiles, image, top), own)
-    anywhere = maximum_filter1d(power.max(axis=0), profiles.about * 2 + 1)[top]
+    anywhere = maximum_filter1d(profiles.loudest, profiles.about * 2 + 1)[top]
     noise = np.median(power[:, ::OVERSAMPLING], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         excess = 10 * np.log10(near / own)

@@ -110,8 +110,7 @@ def _maxima(
     profiles: Profiles, axes: Axes, index: Ints, least: Floats, dynamic_range: float, side_lobes: float
 ) -> tuple[Ints, Ints]:
     """Beams and delays (peak,) of local maxima within both (dB), half of `least` (beam,) at least."""
-    power, beams = profiles.power, (profiles.row, profiles.column)
-    loudest = power.max(axis=0)
+    power, loudest, beams = profiles.power, profiles.loudest, (profiles.row, profiles.column)
     floor = np.maximum(0.5 * least, loudest.max() * 10 ** (-dynamic_range / 10)).astype(np.float32)
     audible = maximum_filter1d(loudest, 2 * profiles.about + 1) * np.float32(10 ** (-side_lobes / 10))
     end = max(int(np.ceil(pulse_times.PULSE_HALF / profiles.step)), profiles.about) + 1
@@ -216,7 +215,7 @@ def noise_power(profiles: Profiles, image: EnergyImage, *, silent: bool = False)
     """
     least = np.finfo(np.float32)
     if silent:
-        return np.full(len(profiles.power), least.eps**2 * float(profiles.power.max()) + least.tiny)
+        return np.full(len(profiles.power), least.eps**2 * float(profiles.loudest.max()) + least.tiny)
     end = min(int(pulse_times.PULSE_HALF / profiles.step), profiles.power.shape[1] // 4)
     powers = profiles.power[:, end : profiles.power.shape[1] - end : OVERSAMPLING]
     half = powers.shape[1] // 2  # bits are in the order of powers, and parted twice as fast
