@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, azimuth_elevation, depth, direction
+from sonarsynth.conventions import Floats, azimuth_elevation, depth
 from sonarsynth.description.method import returned_rows
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.arrays.apertures import defocus_spread
@@ -14,7 +14,7 @@ from sonarsynth.geometry import Pose, unit
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import PointCloud, SourceEstimates, no_points
 from sonarsynth.ranging.illumination import by_snap, with_suspects
-from sonarsynth.ranging.picking.picked_echoes import PickedEchoes
+from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, tangents
 from sonarsynth.ranging.placing.solution import Solution
 from sonarsynth.ranging.range_profiles import aperture_moments
 from sonarsynth.ranging.received_window import ReceivedWindow
@@ -71,7 +71,7 @@ def _placed(
     echoes: PickedEchoes, window: ReceivedWindow, snaps: SourceEstimates, row: int, placer: _Placer
 ) -> PointCloud:
     """A point of every echo, as lit by a row of `snaps`; NaN where there is no place."""
-    source, beam = snaps.position[row], direction(echoes.azimuth, echoes.elevation)
+    source, beam = snaps.position[row], echoes.beam
     delay = echoes.delay - float(snaps.time[row] - snaps.time[0])
     wide = {"position": (3,), "by_source": (3,)}
     solution = placer.placing.place(delay, beam, source, window.sonar, placer.pose, placer.profile)
@@ -102,22 +102,12 @@ def _placed(
 
 def _with_defocus(echoes: PickedEchoes, distance: Floats, window: ReceivedWindow) -> PickedEchoes:
     """Echoes with what beams that are not focused at their distance (echo,) m add to the errors of directions."""
-    azimuth, elevation = echoes.azimuth, echoes.elevation
-    level = np.cos(elevation)
-    up = direction(azimuth, elevation + 0.5 * np.pi)
-    port = direction(azimuth + 0.5 * np.pi, np.zeros(len(azimuth)))
-    moments = aperture_moments(window.elements)
+    across = tangents(echoes.azimuth, echoes.elevation)
+    extent = np.sqrt(np.maximum(np.sum(across @ aperture_moments(window.elements) * across, axis=-1), 0.0))
     wavenumber = 2.0 * np.pi * window.sonar.band.centre / window.sonar.assumed_sound_speed
     with np.errstate(divide="ignore"):
         curvature = 1.0 / distance - (1.0 / window.focus if window.focus else 0.0)
-    across, along = (
-        defocus_spread(np.sqrt(np.maximum(np.sum(axis @ moments * axis, axis=1), 0.0)), curvature, wavenumber)
-        for axis in (port, up)
-    )
-    return echoes.but(
-        azimuth_error=np.minimum(np.hypot(echoes.azimuth_error, across / np.maximum(level, 0.1)), np.pi),
-        elevation_error=np.minimum(np.hypot(echoes.elevation_error, along), np.pi),
-    )
+    return echoes.further_off(*defocus_spread(extent, curvature, wavenumber))
 
 
 def _with_bending(
@@ -131,23 +121,14 @@ def _with_bending(
     middle, half = 0.5 * (own + other), np.maximum(0.5 * np.abs(other - own), LEAST_HEIGHT)
     gradient = (profile.at(middle + half) - profile.at(middle - half)) / (2.0 * half)
     arc = 0.5 * distance * np.abs(gradient) / float(profile.at(own))
-    port = arc * (direction(echoes.azimuth + 0.5 * np.pi, np.zeros(len(beam))) @ up)
-    upward = arc * (direction(echoes.azimuth, echoes.elevation + 0.5 * np.pi) @ up)
-    return echoes.but(
-        azimuth_error=np.minimum(
-            np.hypot(echoes.azimuth_error, port / np.maximum(np.cos(echoes.elevation), 0.1)), np.pi
-        ),
-        elevation_error=np.minimum(np.hypot(echoes.elevation_error, upward), np.pi),
-    )
+    return echoes.further_off(*arc * (tangents(echoes.azimuth, echoes.elevation) @ up))
 
 
 def _at_true_directions(echoes: PickedEchoes, velocity: Floats, window: ReceivedWindow) -> PickedEchoes:
     """Echoes where they come from, of beams that an array at rest would hear them in; velocity (xyz): m/s."""
     live, c = window.elements.position[window.elements.gain != 0], window.sonar.assumed_sound_speed
-    heard = direction(echoes.azimuth, echoes.elevation)
-    azimuth, elevation = azimuth_elevation(
-        true_directions(heard, velocity / c, plane_normal(live, c / window.sonar.band.centre))
-    )
+    normal = plane_normal(live, c / window.sonar.band.centre)
+    azimuth, elevation = azimuth_elevation(true_directions(echoes.beam, velocity / c, normal))
     return echoes.but(azimuth=azimuth, elevation=elevation)
 
 
@@ -181,7 +162,7 @@ def range_error(
     beside = solution.by_angle * _angle_error(echoes, estimates.position[row])
     clock = solution.by_path * c * echoes.delay_error
     g = solution.by_source
-    snap = np.einsum("bi,ij,bj->b", g, estimates.position_covariance[row], g)
+    snap = np.sum(g @ estimates.position_covariance[row] * g, axis=1)
     moved = g @ estimates.position_by_speed[row] * sonar.sound_speed_error  # which `snap` holds
     speed = solution.by_speed * sonar.sound_speed_error
     both = np.maximum(snap + speed * (speed + 2.0 * moved), 0.0)
@@ -190,14 +171,10 @@ def range_error(
 
 def _angle_error(echoes: PickedEchoes, source: Floats) -> Floats:
     """Standard error (echo,) in rad of the angle between echo and source."""
-    beam = direction(echoes.azimuth, echoes.elevation)
-    sine, cosine = np.sin(echoes.azimuth), np.cos(echoes.azimuth)
-    to_port = np.column_stack([-sine, cosine, np.zeros(len(beam))])
+    beam, across = echoes.beam, tangents(echoes.azimuth, echoes.elevation)
     away = source - (beam @ source)[:, None] * beam
-    length = np.linalg.norm(away, axis=1, keepdims=True)
-    toward = unit(np.where(length > 0.0, away, to_port))
+    toward = unit(np.where(away.any(axis=1, keepdims=True), away, across[1]))
+    up, port = np.sum(across * toward, axis=-1)
     level = np.cos(echoes.elevation)
-    port = np.sum(to_port * toward, axis=1)
-    up = np.copysign(np.sqrt(np.maximum(1.0 - port**2, 0.0)), toward[:, 2])
     variance = (port * level * echoes.azimuth_error) ** 2 + (up * echoes.elevation_error) ** 2
     return np.asarray(np.sqrt(np.maximum(variance + 2.0 * port * level * up * echoes.error_product, 0.0)))

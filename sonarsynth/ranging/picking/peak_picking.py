@@ -18,7 +18,7 @@ from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond, possible_grating_lobes
 from sonarsynth.ranging.picking.peak_kernels import beside, farthest, local_maxima, over_lobes, power_centres
-from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
+from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes, tangents
 from sonarsynth.ranging.range_profiles import (
     OVERSAMPLING,
     Profiles,
@@ -155,8 +155,8 @@ class Axes:
     def of(window: ReceivedWindow, profiles: Profiles) -> Axes:
         """Of the beams of an image."""
         image, moments = window.image, profiles.moments
-        middle = float(np.mean(image.elevation[profiles.row])), float(np.mean(image.azimuth[profiles.column]))
-        across = _tangents(*middle)
+        middle = image.azimuth[profiles.column].mean(), image.elevation[profiles.row].mean()
+        across = tangents(*middle) * [[1.0], [np.cos(middle[1])]]  # as elevation, and azimuth, grow
         aperture = np.sqrt(np.sum(across @ aperture_moments(window.elements) * across, axis=1))  # m, rms
         k = 2 * np.pi / window.sonar.assumed_sound_speed
         return Axes(
@@ -197,12 +197,6 @@ class Axes:
         told = self.resolved & (self.step * sharp <= COARSE)
         error = np.where(told, np.minimum(resolved_error, [np.pi, np.pi, np.inf]), self.unresolved_error)
         return error, self.resolved[:2].all() * np.prod((CENTRE_ERROR * centre / sharp)[:, :2], axis=1)
-
-
-def _tangents(elevation: float, azimuth: float) -> Floats:
-    """Vectors (2, xyz): how a direction moves as its elevation, and its azimuth, grow."""
-    se, ce, sa, ca = np.sin(elevation), np.cos(elevation), np.sin(azimuth), np.cos(azimuth)
-    return np.array([[-se * ca, -se * sa, ce], [-ce * sa, ce * ca, 0.0]])
 
 
 def noise_power(profiles: Profiles, image: EnergyImage, *, silent: bool = False) -> Floats:
