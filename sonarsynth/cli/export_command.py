@@ -85,21 +85,24 @@ def export(
 
 
 def _points(store: str, to: str, out: Path | None, frames: str | None, relative_to: str) -> None:
+    from sonarsynth.conventions import counted
     from sonarsynth.export import points, write_points
     from sonarsynth.store import Damage, named_after, open_store
 
     tree = open_store(store)
+    chosen = _built(tree, store, frames)
     beside = named_after(store).with_suffix(f".{to}")
     file = out or beside
     file = file / beside.name if file.is_dir() else file
     try:
-        cloud = points(tree, _built(tree, store, frames), relative_to=relative_to)
+        cloud = points(tree, chosen, relative_to=relative_to)
         written = write_points(cloud, file if file.suffix else file.with_suffix(f".{to}"))
     except Damage:
         raise
     except (ValueError, ImportError) as error:
         raise BadOption(str(error)) from None
-    typer.echo(f"{written}: {cloud.sizes['point']} points")
+    typer.echo(f"{written}: {counted(cloud.sizes['point'], 'point')} of {counted(len(chosen), 'frame')}")
+    _say_left_out(tree, frames)
 
 
 def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
@@ -123,6 +126,16 @@ def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
         typer.echo(str(file))
     for note in lost:
         typer.echo(f"note: {note}")
+    _say_left_out(tree, frames)
+
+
+def _say_left_out(tree: xr.DataTree, frames: str | None) -> None:
+    """That an export of all frames lacks those that were not built."""
+    from sonarsynth.store import built_frames
+
+    total = tree.sizes["frame"]
+    if frames is None and (left := total - len(built_frames(tree))):
+        typer.echo(f"note: {left} of {total} frames have not been built, and are left out")
 
 
 def _built(tree: xr.DataTree, store: str, frames: str | None) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,14 +25,14 @@ NEEDED = (("truth", "sonar_velocity"), ("truth", "sonar_spin"), ("truth/targets"
 
 
 def points(
-    store: str | Path | xr.DataTree, frames: Iterable[int] | None = None, *, relative_to: str = "sonar"
+    store: str | Path | xr.DataTree, frames: int | Iterable[int] | None = None, *, relative_to: str = "sonar"
 ) -> xr.Dataset:
     """The points of some frames of a store as one cloud.
 
     Parameters
     ----------
     store: path, URL or opened tree.
-    frames: numbers of frames; left out: all that were built.
+    frames: a number, several, or a mask (frame,) of bool; left out: all that were built.
     relative_to: the axes of `position`: "sonar", those of the array when it heard the echo; "world"; or the name of a
         target, as it was when the sound met it, so that points on its hull fall together whatever it and the array do.
 
@@ -62,9 +61,7 @@ def points(
             ("relative_to",), f"must be sonar, world or a target ({', '.join(names)}), not {relative_to!r}"
         )
     cloud = tree["cloud"].dataset
-    chosen = built_frames(tree).tolist() or [0] if frames is None else [operator.index(frame) for frame in frames]
-    if wrong := [frame for frame in chosen if not 0 <= frame < cloud.sizes["frame"]]:
-        raise IndexError(f"frame {wrong[0]} is outside 0..{cloud.sizes['frame'] - 1}")
+    chosen = some_frames(tree, frames) or [0] * (frames is None)
     of_frames = [_frame(tree, index, relative_to, names) for index in chosen]
     columns = {name: np.concatenate([c[name] for c in of_frames]) for name in of_frames[0]} if of_frames else {}
     variables = {
@@ -72,6 +69,25 @@ def points(
         for name, values in columns.items()
     }
     return xr.Dataset(variables, attrs={"relative_to": relative_to})
+
+
+def some_frames(tree: xr.DataTree, frames: int | Iterable[int] | None) -> list[int]:
+    """Numbers of frames of a tree: one, several, or those of a mask (frame,); left out: all that were built.
+
+    Raises IndexError for a frame that is not there, or a mask of another length, TypeError for what is no whole number.
+    """
+    if frames is None:
+        return [int(frame) for frame in built_frames(tree)]
+    listed = list(frames) if isinstance(frames, Iterable) and not hasattr(frames, "__array__") else frames
+    chosen, count = np.atleast_1d(np.asarray(listed)), tree["truth"].sizes["frame"]
+    if chosen.dtype == bool and chosen.shape != (count,):
+        raise IndexError(f"a mask of {chosen.size} frames, where there are {count}")
+    numbers = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
+    if numbers.size and numbers.dtype.kind not in "iu":
+        raise TypeError(f"frames must be whole numbers, not {frames!r}")
+    if len(wrong := numbers[(numbers < 0) | (numbers >= count)]):
+        raise IndexError(f"frame {wrong[0]} is outside 0..{count - 1}")
+    return [int(frame) for frame in numbers]
 
 
 def _attributes(cloud: xr.Dataset, name: str) -> dict[str, object]:

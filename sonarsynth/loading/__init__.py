@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from sonarsynth.loading.accessor import SonarAccessor
 from sonarsynth.loading.frames import Frames, RenderedFrames
-from sonarsynth.store import Folder, open_store
+from sonarsynth.store import Folder, absolute, open_store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,11 +26,14 @@ def open(path: Folder | Path | str) -> xr.DataTree:
     Returns
     -------
     xarray's own tree: `tree["truth/targets"].sel(target="remus")`. Its `.sonar` has tables and pictures (see
-    `SonarAccessor`): `tree.sonar.points(7)`, `tree.sonar.table("truth/targets")`, `tree.sonar.image(7)`.
+    `SonarAccessor`): `tree.sonar.points(7)`, `tree.sonar.table("truth/targets")`, `tree.sonar.image(7)`. Frames that
+    were not built read as NaN and -1: `print(tree.sonar)` says which were, and which failed.
 
     Raises
     ------
     Mismatch where there is no store of ours, or one of another format. Reading a variable raises Damage where its file
     is damaged or missing; chunks that were exchanged whole are found by `verify` alone.
     """
-    return open_store(path)
+    tree = open_store(path)
+    tree.encoding["source"] = str(absolute(path))
+    return tree

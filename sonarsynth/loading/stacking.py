@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sonarsynth.detection import beam_width
-from sonarsynth.store import built_frames
+from sonarsynth.export import some_frames
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,7 +17,7 @@ EFFICIENCY: Final = 2.0 / np.pi
 """Of a median of many Gaussian numbers: the variance of their mean over its own (Cramer 1946, section 28.5)."""
 
 
-def stack(tree: xr.DataTree, frames: Iterable[int] | None = None) -> xr.DataArray:
+def stack(tree: xr.DataTree, frames: int | Iterable[int] | None = None) -> xr.DataArray:
     """Median energy (elevation, azimuth) in Pa2 s over frames in which nothing moves by more than half a beam.
 
     Windows without an image are left out; windows that a loud stranger spoils count as any other, which moves the
@@ -26,15 +26,16 @@ def stack(tree: xr.DataTree, frames: Iterable[int] | None = None) -> xr.DataArra
     Parameters
     ----------
     tree: of a store.
-    frames: numbers of frames; left out, all that were built.
+    frames: numbers, or a mask (frame,); left out, all that were built.
 
     Raises
     ------
-    ValueError where the store has no image, no frame is left, or a target moves too far over the array's view.
+    ValueError where the store has no image, no frame is left, or a target moves too far over the array's view;
+    IndexError for a frame that is not there.
     """
     if "image" not in tree.children:
         raise ValueError("the store has no image")
-    chosen = built_frames(tree) if frames is None else np.asarray(list(frames), int)
+    chosen = np.asarray(some_frames(tree, frames), int)
     energy = tree["image"].dataset["energy"].isel(frame=chosen)
     imaged = np.isfinite(energy.values).any(axis=(1, 2))
     if not imaged.any():

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from math import prod
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import xarray as xr
 
-from sonarsynth.store import built_frames
+from sonarsynth.export import some_frames
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,18 +30,18 @@ def points_table(tree: xr.DataTree, frames: int | Iterable[int] | None) -> pd.Da
     cloud = cloud[own].isel(point=slice(0, int(counts.max(initial=0)))).load()
     filled = np.arange(cloud.sizes["point"]) < counts[:, None]
     table = cloud.assign_coords(point=np.arange(cloud.sizes["point"])).to_dataframe(dim_order=["frame", "point"])
-    table = _with_words(table[filled.ravel()], cloud)
+    table = _described(table[filled.ravel()], cloud)
     names = [str(name) for name in tree["truth/targets"].coords["target"].values]
     return table.assign(target=_named(table["target"], range(len(names)), names))
 
 
 def as_table(
-    tree: xr.DataTree, group: str, rows: Iterable[str] | None, frames: int | Iterable[int] | None
+    tree: xr.DataTree, group: str, rows: str | Iterable[str] | None, frames: int | Iterable[int] | None
 ) -> pd.DataFrame:
     """A group as a table; see `SonarAccessor.table`."""
-    node = tree[group]
-    if not isinstance(node, xr.DataTree):
-        raise KeyError(f"{group} is a variable: name its group")
+    if (path := f"/{group.strip('/')}") not in tree.groups:
+        raise KeyError(f"{group} is no group of the store, which has {', '.join(tree.groups)}")
+    node, rows = cast(xr.DataTree, tree[path]), (rows,) if isinstance(rows, str) else rows
     dataset = node.to_dataset(inherit=True)
     if "frame" in node.to_dataset(inherit=False).dims:
         dataset = _of_frames(tree, dataset, frames)
@@ -55,13 +55,13 @@ def as_table(
     if count > MOST_ROWS:
         raise ValueError(f"{group}: {count} rows are more than {MOST_ROWS}; choose frames, or use xarray")
     included = [name for name, own in axes.items() if set(own) <= set(wanted)]
-    columns: dict[str, xr.DataArray] = {}
+    read, columns = dataset[included].load(), dict[str, xr.DataArray]()  # each file once, not for each component
     for name in included:
-        columns |= _columns(str(name), dataset[name])
+        columns |= _columns(str(name), read[name])
     chosen = xr.Dataset(columns, attrs=dataset.attrs).drop_vars(COMPONENTS, errors="ignore")
     chosen = chosen.expand_dims({name: dataset[name] for name in wanted if name not in chosen.dims})
     chosen = chosen.assign_coords({name: _labels(dataset[name]) for name in wanted})
-    table = _with_words(chosen.to_dataframe(dim_order=list(wanted)), chosen)
+    table = _described(chosen.to_dataframe(dim_order=list(wanted)), chosen)
     table.attrs["left_out"] = sorted(str(name) for name in axes if name not in included)
     return table
 
@@ -89,30 +89,23 @@ def _columns(name: str, values: xr.DataArray) -> dict[str, xr.DataArray]:
 
 def _of_frames(tree: xr.DataTree, dataset: xr.Dataset, frames: int | Iterable[int] | None) -> xr.Dataset:
     """Some frames of a dataset; left out: those that were built."""
-    if frames is None:
-        chosen = built_frames(tree).tolist()
-    else:
-        chosen = [frames] if isinstance(frames, int | np.integer) else [int(frame) for frame in frames]
-    count = dataset.sizes["frame"]
-    if wrong := [frame for frame in chosen if not 0 <= frame < count]:
-        raise IndexError(f"frame {wrong[0]} is outside 0..{count - 1}")
-    return dataset.isel(frame=chosen)
+    return dataset.isel(frame=some_frames(tree, frames))
 
 
-def _with_words(table: pd.DataFrame, dataset: xr.Dataset) -> pd.DataFrame:
-    """Flags by their names."""
-    words = {}
+def _described(table: pd.DataFrame, dataset: xr.Dataset) -> pd.DataFrame:
+    """Flags by their names; the units of what has one are in `.attrs`."""
+    units, words = {str(name): str(values.attrs.get("units", "1")) for name, values in dataset.variables.items()}, {}
     for name, values in dataset.data_vars.items():
         flags, meanings = np.atleast_1d(values.attrs.get("flag_values", ())), values.attrs.get("flag_meanings", "")
         if len(flags) > 1:  # a single one says which number is none
             words[str(name)] = _named(table[name], flags.tolist(), str(meanings).split())
-    return table.assign(**words)
+    table = table.assign(**words)
+    table.attrs["units"] = {name: unit for name, unit in units.items() if unit != "1"}
+    return table
 
 
 def _named(numbers: pd.Series, values: Iterable[int], names: list[str]) -> Any:
     """Numbers as categories by name; missing where they have none."""
     import pandas as pd
 
-    code_of = {value: i for i, value in enumerate(values)}
-    codes = [code_of.get(int(n), -1) if np.isfinite(n) else -1 for n in numbers]
-    return pd.Categorical.from_codes(codes, pd.Index(names))
+    return pd.Categorical.from_codes(pd.Index(list(values)).get_indexer(pd.Index(numbers)), pd.Index(names))

@@ -10,7 +10,8 @@ from sonarsynth.conventions import counted, evenly
 from sonarsynth.evaluation import bounds, brightest_beam_on_target, range_errors
 from sonarsynth.pictures.store_reading import built, echo_levels, mesh_group, needed, read
 from sonarsynth.products import View
-from sonarsynth.store import Folder, Remote
+from sonarsynth.store import Folder, Remote, beside, ranges
+from sonarsynth.store.files.json_lines import read_lines
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,11 +32,10 @@ def summary(tree: xr.DataTree, store: Folder) -> str:
     """What a store holds, of the frames that were built, and how well these agree with their own truth (of more than
     `JUDGED`, some spread over all)."""
     frames = built(tree)
-    total = tree["truth"].sizes["frame"]
     size = bytes_of(store)
     lines = [
         f"{store.name}: {tree.attrs.get('title') or 'untitled'}",
-        f"  frames     {len(frames)} of {total} built" + (f", {size / 1e6:.1f} MB on disk" if size else ""),
+        f"  frames     {built_of(tree, store)}" + (f", {size / 1e6:.1f} MB on disk" if size else ""),
         *(f"  {name:10s} {_shape(tree, variable)}" for name, variable in VARIABLES.items()),
     ]
     if not len(frames):
@@ -44,6 +44,17 @@ def summary(tree: xr.DataTree, store: Folder) -> str:
     if len(judged) < len(frames):
         some = [f"  judged     {len(judged)} of these frames, spread over all ('sonarsynth verify' reads every one)"]
     return "\n".join([*lines, *_targets(tree, frames), *some, *_agreement(tree, judged)])
+
+
+def built_of(tree: xr.DataTree, store: Folder | None) -> str:
+    """How many frames of a tree were built, and which; and which failed, where the place of its store is known."""
+    numbers, there = np.asarray(tree["truth"].dataset["frame"].values), built(tree)  # of a selection too
+    frames, missing = numbers[there].tolist(), set(np.delete(numbers, there).tolist())
+    rows = [] if store is None or not missing else read_lines(beside(store, "failed.jsonl"))
+    failed = sorted(missing.intersection(row["frame"] for row in rows if isinstance(row.get("frame"), int)))
+    which = f" ({ranges(frames)})" if frames and missing else ""
+    gone = f", {len(failed)} failed ({ranges(failed)})" if failed else ""
+    return f"{len(frames)} of {len(numbers)} built{which}{gone}"
 
 
 def spread(frames: np.ndarray) -> np.ndarray:

@@ -96,9 +96,9 @@ def test_the_commands_go_the_whole_way(
         ('[{"image_id": 2, "score": 1, "bbox": [0, 0, 1, 1], "range_error": -1}]', "range_error must not be negative"),
         ('[{"image_id": 2, "score": 1, "azimuth": 0, "elevation": 91}]', "elevation must be within 90 degrees"),
         ('[{"image_id": 2, "score": 1, "score": 2, "bbox": [0, 0, 1, 1]}]', "is no JSON (an object has 'score' twice)"),
-        ('[{"image_id": 2, "score": 1, "bbox": [0, 0, 1, 1], "category_id": 2}]', "which has 1 target"),
-        ('[{"image_id": 99, "score": 1, "bbox": [0, 0, 1, 1]}]', "frame 99 is not in the store"),
-        ('[{"image_id": 9, "score": 1, "bbox": [0, 0, 1, 1]}]', "frame 9 was not built"),
+        ('[{"image_id": 2, "score": 1, "bbox": [0, 0, 1, 1], "category_id": 2}]', "d.json: detection 0: category_id 2"),
+        ('[{"image_id": 99, "score": 1, "bbox": [0, 0, 1, 1]}]', "d.json: detection 0: frame 99 is not in the store"),
+        ('[{"image_id": 9, "score": 1, "bbox": [0, 0, 1, 1]}]', "d.json: detection 0: frame 9 was not built"),
     ],
 )  # fmt: skip
 def test_a_bad_file_gets_one_line(

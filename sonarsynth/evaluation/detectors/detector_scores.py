@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -175,24 +175,35 @@ def evaluate(
     Raises
     ------
     FieldError for a split or a category that the store has not, or a frame that was not built; DetectionsError for a
-    file that cannot be read.
+    file that cannot be read, TypeError for what is neither.
     """
     tree = open_store(store) if isinstance(store, str | Path) else store
     frames = chosen_frames(tree, split)
     objects = true_objects(tree, frames)
+    file = "detections" if detections == TRUTH or not isinstance(detections, str | Path) else str(detections)
     if isinstance(detections, str | Path):
         detections = as_detections(objects) if detections == TRUTH else read(detections)
-    total = tree.sizes["frame"]
-    if len(outside := detections.frame[detections.frame >= total]):
-        raise FieldError(("detections",), f"frame {outside[0]} is not in the store, which has frames 0 to {total - 1}")
-    if split is None and len(unbuilt := np.setdiff1d(detections.frame, frames)):
-        raise FieldError(("detections",), f"frame {unbuilt[0]} was not built")
+    if not isinstance(detections, Detections):
+        kind = type(detections).__name__
+        raise TypeError(f"detections must be those of sonarsynth.detect, a file or 'truth', not a {kind}")
     names = tuple(category_names(tree))
-    if len(unknown := detections.category[detections.category >= len(names)]):
-        listed = ", ".join(f"{number} {name}" for number, name in enumerate(names, 1))
-        raise FieldError(("detections",), f"category_id {unknown[0] + 1} is not in the store, which has {listed}")
+    _must_be_of(detections, file, tree.sizes["frame"], frames if split is None else None, names)
     judged = _with_angles(tree, detections.take(np.isin(detections.frame, frames)))
     return DetectorReport(len(frames), names, judged, objects)
+
+
+def _must_be_of(found: Detections, file: str, total: int, built: np.ndarray | None, names: Sequence[str]) -> None:
+    """Raise FieldError for the first detection in a frame or of a category that the store has not."""
+
+    def refuse(wrong: np.ndarray, what: str, column: np.ndarray, why: str) -> None:
+        if wrong.any():
+            raise FieldError((file,), f"detection {(n := int(np.argmax(wrong)))}: {what} {column[n]} {why}")
+
+    refuse(found.frame >= total, "frame", found.frame, f"is not in the store, which has frames 0 to {total - 1}")
+    if built is not None:
+        refuse(~np.isin(found.frame, built), "frame", found.frame, "was not built")
+    listed = ", ".join(f"{number} {name}" for number, name in enumerate(names, 1))
+    refuse(found.category >= len(names), "category_id", found.category + 1, f"is not in the store, which has {listed}")
 
 
 def words_of(precision: Mapping[str, float], found: Mapping[str, float]) -> tuple[str, ...]:
