@@ -23,7 +23,7 @@ REFERENCE_TRANSFORM = 1.42e-3
 """Seconds of the transforms in `machine_factor` on the machine where the constants below were measured."""
 
 SECONDS = {
-    "trace facet": 1.25e-6,  # straight rays, lit and seen, ray casting both ways, scattering law over the aperture
+    "trace facet": 0.6e-6,  # straight rays, lit and seen, ray casting both ways, scattering law over the aperture
     "trace coherent facet": 2.2e-6,  # none of them is too faint
     "label beam": 0.25e-6,
     "label facet": 0.28e-6,

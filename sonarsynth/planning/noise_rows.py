@@ -30,7 +30,7 @@ PATH_SECONDS = 150e-9
 """Of one core for a sample of one hydrophone of a source of noise."""
 PLAYED_SECONDS = 70e-9
 """Of one core for a sample of one hydrophone of a recording that is played."""
-ERROR_SECONDS = 40e-9
+ERROR_SECONDS = 5e-9
 """Of one core to filter a sample of one channel."""
 LEAST_OFF = 1e-3
 """degree: a source of noise that passes by less in a record stands still."""

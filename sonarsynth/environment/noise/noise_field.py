@@ -11,7 +11,7 @@ from sonarsynth.environment.noise.directions import NoiseDirections
 ROUNDING = 1e-10
 """Of the mean power of a hydrophone, added to the diagonal of a cross spectral density before it is factored: closely
 spaced hydrophones hear the same, and their matrix is singular but for rounding."""
-SECONDS, PRODUCT_SECONDS = 10e-9, 0.1e-9
+SECONDS, PRODUCT_SECONDS = 4.5e-9, 0.1e-9
 """Of one core to draw a sample of one hydrophone; and for a product of two numbers where noise is correlated."""
 
 

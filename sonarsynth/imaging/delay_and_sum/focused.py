@@ -84,7 +84,7 @@ class FocusedDelayAndSum(Steering):
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`, of all bins."""
         across, up = self.subarrays if isinstance(self.subarrays, tuple) else (1, 1)
-        return 2.4e-9 * (across + up) * size.beams * size.bins
+        return 0.8e-9 * (across + up) * size.beams * size.bins
 
     def row(self) -> str:
         """Its kind, and the subarrays where there are some."""
