@@ -75,7 +75,6 @@ __all__ = [
     "range_frame",
     "range_image_of",
     "render",
-    "silent_at",
     "silent_frame",
     "stage_timer",
     "trace_at",
