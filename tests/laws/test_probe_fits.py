@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from sonarsynth.equations.kernels.row_products import put_cubics
 from sonarsynth.equations.kernels.unit_vectors import moved, to_images, to_moved_images
 from sonarsynth.geometry import rotation_matrix, unit
 from sonarsynth.products import ArrayExpansion
@@ -67,6 +68,15 @@ def test_a_probe_without_a_ray_is_left_out_and_said_to_be_missed() -> None:
     np.testing.assert_allclose(found, wanted, atol=1e-9)
     assert missed[0] < 1e-12
     assert np.isinf(missed[1])
+
+
+def test_cubics_are_written_to_their_rows_alone() -> None:
+    point, middle, half = RNG.normal(size=(7, 3)), RNG.normal(size=3), np.array([0.5, 1.0, 2.0])
+    coefficients, rows, out = RNG.normal(size=(20, 6)), np.array([1, 4, 6]), np.full((7, 6), np.nan)
+    put_cubics(rows, point, middle, half, coefficients, out)
+    wanted = aperture_terms((point[rows] - middle) / half, 1.0) @ coefficients
+    np.testing.assert_allclose(out[rows], wanted, rtol=1e-12, atol=1e-12)
+    assert np.isnan(np.delete(out, rows, axis=0)).all()
 
 
 def test_images_of_probes_are_seen_from_where_a_facet_has_moved_to() -> None:
