@@ -34,14 +34,11 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     """
     bodies, sonar_pose, beams = context.bodies, context.receiver.pose, context.receiver.sonar.beams
     medium, sonar_track = context.medium, context.receiver.track
-    model = propagation.direct if propagation.bends else None
     connect = partial(propagation.direct.connect, medium.profile, medium.depth)
-    bent = None if model is None else connect
+    model, bent = (propagation.direct, connect) if propagation.bends else (None, None)
     moving = bodies if sonar_track else tuple(body.frozen for body in bodies)
-    straight_lines = medium.profile.uniform and propagation.straight(medium.profile)
-    travel = (
-        partial(_straight_times, 1.0 / medium.profile.speed[0]) if straight_lines else partial(_direct_times, connect)
-    )
+    straight = medium.profile.uniform and propagation.straight(medium.profile)
+    travel = partial(_straight_times, 1.0 / medium.profile.speed[0]) if straight else partial(_direct_times, connect)
     met = meeting_times([body.track for body in moving], context.snaps, travel)
     there = [met_at(moving, times) for times in met]
     when = hearing(context, met, there, snap_level)

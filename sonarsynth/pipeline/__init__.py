@@ -38,7 +38,6 @@ from sonarsynth.pipeline.stored_values import (
     signal_values,
     source_estimate_values,
     truth_values,
-    which_values,
 )
 from sonarsynth.pipeline.synthesis import NO_RECORDER, Recorder, digitise, frame_signals, known_elements, known_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, frame_tree, variables
@@ -94,12 +93,11 @@ def silent_at(plan: Plan, frame: Frame, arrivals: Arrivals | None = None) -> Val
     """As `silent_frame`, of a frame that is made already; `plan` is that of its sequence, arrivals as of `trace_at`."""
     if plan.products:
         traced = trace_at(plan, frame, arrivals)
-        direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
-        return in_slots(plan, _traced_values(plan, traced, direct) | which_values(plan), VARIABLES)
+        return in_slots(plan, _traced_values(plan, traced, heard_directly(plan, traced.arrivals, frame.moment.snaps)))
     truth = label(context_of(plan, frame), plan.propagation, snap_levels(frame.moment.snaps))
     mark_stage("label")
     sound = soundscape_values(plan, frame, frame_chorus(plan, frame))
-    return in_slots(plan, frame_values(plan, frame) | truth_values(truth) | which_values(plan) | sound, VARIABLES)
+    return in_slots(plan, frame_values(plan, frame) | truth_values(truth) | sound)
 
 
 def trace_frame(plan: Plan, index: int) -> TracedFrame:
@@ -210,7 +208,7 @@ def range_frame(
 ) -> Values:
     """The point cloud, and every stored value of the frame; cloud: its points, where these are made already."""
     plan, traced = plan.at(index), measured(plan, index, traced)
-    values = in_slots(plan, _beamformed_values(plan, traced, beamformed, cloud) | which_values(plan), VARIABLES)
+    values = in_slots(plan, _beamformed_values(plan, traced, beamformed, cloud))
     mark_stage("label")
     return values
 

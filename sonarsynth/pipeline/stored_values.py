@@ -11,9 +11,9 @@ from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation
 from sonarsynth.equations.kernels.rounding import multiples
 from sonarsynth.imaging.beam_envelopes import envelope_levels
 from sonarsynth.labels.views.range_cells_met import met_at_ranges
-from sonarsynth.pipeline.variables import counting
+from sonarsynth.pipeline.variables import variables
 from sonarsynth.pipeline.variables.variable import Variable
-from sonarsynth.pipeline.variables.variable_groups import LEVEL_STEP, NO_LEVEL
+from sonarsynth.pipeline.variables.variable_groups import LEVEL_STEP, NO_LEVEL, VARIABLES
 from sonarsynth.planning import Plan
 from sonarsynth.products import (
     LINK_BUDGET,
@@ -99,7 +99,8 @@ def sensor_values(drawn: DrawnErrors) -> Values:
 
 def signal_values(plan: Plan, signals: Signals) -> Values:
     """Signals, as counts of the converter or in Pa."""
-    pressure = multiples(signals.pressure, signals.quantum) if counting(plan) else signals.pressure
+    counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
+    pressure = multiples(signals.pressure, signals.quantum) if counts else signals.pressure
     return table("/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside)
 
 
@@ -208,15 +209,15 @@ def which_values(plan: Plan) -> Values:
     )
 
 
-def in_slots(plan: Plan, values: Values, variables: tuple[Variable, ...]) -> Values:
-    """The values of a frame, axes of targets and emissions as long as in the store; `plan` is that of its sequence."""
-    values = _with_room(values, plan.sizes["emission"], variables)
+def in_slots(plan: Plan, values: Values) -> Values:
+    """Values of a frame and of its sequence, whose `plan` it is, axes of targets and emissions as long as in stores."""
+    values = _with_room(values | which_values(plan), plan.sizes["emission"])
     slots = {name: n for n, name in enumerate(plan.recipe.target_names)}
     own_slots = np.array([slots[target.name] for target in plan.scene.world.targets], np.int64)
     if len(own_slots) == len(slots):
         return values
     padded = dict(values)
-    for v in variables:
+    for v in VARIABLES:
         if "target" in v.dims and (v.group, v.name) in values:
             padded[v.group, v.name] = _spread(values[v.group, v.name], v, own_slots, len(slots))
     padded["/truth/targets", "present"] = np.isin(np.arange(len(slots)), own_slots).astype(np.int8)
@@ -228,13 +229,13 @@ def in_slots(plan: Plan, values: Values, variables: tuple[Variable, ...]) -> Val
     return padded
 
 
-def _with_room(values: Values, emissions: int, variables: tuple[Variable, ...]) -> Values:
+def _with_room(values: Values, emissions: int) -> Values:
     """The values with room for so many emissions: those that a frame does not have are the last."""
     missing = emissions - len(values["/truth/emissions", "source"])
     if not missing:
         return values
     padded = dict(values)
-    for v in variables:
+    for v in VARIABLES:
         if "emission" in v.dims and (v.group, v.name) in values:
             widths = [(0, missing if dim == "emission" else 0) for dim in v.dims[1:]]
             padded[v.group, v.name] = np.pad(values[v.group, v.name], widths, constant_values=v.fill)

@@ -78,8 +78,7 @@ def _compressed(numbers: np.ndarray, how: dict[str, Any]) -> bytes:
     """Numbers as blosc packs them, in one of the ways above."""
     blosc.use_threads = False  # as zarr has it: several threads put blocks into a file in the order in which they end
     name, level, shuffle, size = how.values()
-    packed: Any = blosc.compress(numbers, name.encode(), level, _SHUFFLES[shuffle], size)
-    return _checked(bytes(packed))
+    return _checked(bytes(blosc.compress(numbers, name.encode(), level, _SHUFFLES[shuffle], size)))
 
 
 def _checked(data: bytes) -> bytes:

@@ -78,11 +78,6 @@ def pixel_box(bounds: Floats, beams: BeamGrid) -> Floats:
 
     A grid of one column, or row, has a beam as wide as its span.
     """
-    azimuth, elevation = (
-        0.5 * count + angles * (max(count - 1, 1) / span)
-        for count, span, angles in (
-            (beams.azimuths, beams.azimuth_span, bounds[:2]),
-            (beams.elevations, beams.elevation_span, bounds[2:]),
-        )
-    )
-    return np.array([azimuth[0], elevation[0], azimuth[1], elevation[1]])
+    count = np.array([beams.azimuths, beams.elevations])
+    span = np.array([beams.azimuth_span, beams.elevation_span])
+    return np.ravel(0.5 * count + bounds.reshape(2, 2).T * (np.maximum(count - 1, 1) / span))

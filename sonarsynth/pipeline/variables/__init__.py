@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from sonarsynth.pipeline.variables.static_variables import coordinates
 from sonarsynth.pipeline.variables.variable import Variable, flags
 from sonarsynth.pipeline.variables.variable_groups import VARIABLES
 from sonarsynth.planning import OF_BEAMS, Plan
-from sonarsynth.receiver import Converter
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,18 +24,12 @@ __all__ = [
     "Variable",
     "attributes",
     "coordinates",
-    "counting",
     "frame_tree",
     "variables",
 ]
 
 
-def counting(plan: Plan) -> Converter | None:
-    """The converter whose counts are stored as pressure; None where int16 does not hold them, or there is none."""
-    converter = plan.scene.sonar.converter
-    return converter if converter is not None and converter.bits <= 16 else None
-
-
+@lru_cache(maxsize=8)
 def variables(plan: Plan) -> tuple[Variable, ...]:
     """The variables of a build: of the products asked for, and int16 pressure where a converter is described."""
     wanted = {"truth", *plan.products}
@@ -54,7 +48,8 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
         chosen = [v for v in chosen if (v.group, v.name) != ("/image", "remainder")]
     categories = flags(plan.recipe.categories)
     chosen = [replace(v, attributes=categories) if v.name == "category" else v for v in chosen]
-    if (converter := counting(plan)) is not None:
+    converter = plan.scene.sonar.converter
+    if converter is not None and converter.bits <= 16:
         counts: dict[str, Any] = {
             "dtype": "int16",
             "fill": -(2**15),
