@@ -48,6 +48,8 @@ ENOUGH, ALIKE = 168, 0.99
 RESIDUE = 1e-7
 """Of the loudest pressure: what the tail of the direct pulse may still be in the echo window, as synthesis cuts it."""
 
+Powers = npt.NDArray[np.float32]
+
 
 @dataclass(frozen=True, eq=False)
 class Moments:
@@ -77,8 +79,8 @@ class EchoFilter:
         """Step (s) of delays."""
         return 0.5 / (self.length * self.received.beams.snapshots.spacing)
 
-    def profiles(self, u: Floats) -> tuple[npt.NDArray[np.complex64], *tuple[npt.NDArray[np.float32], ...]]:
-        """Spectra (beam, bin) of the profiles of beams (beam, xyz), these, powers (beam, delay), their sums (beam,), and
+    def profiles(self, u: Floats) -> tuple[npt.NDArray[np.complex64], Powers, Powers, Powers]:
+        """Spectra (beam, bin) of the profiles of beams (beam, xyz), these, powers (beam, delay), their sums (beam,) and
         the largest of all beams (delay,)."""
         window, sonar = self.received.beams.snapshots, self.received.sonar
         sine = u * (self.received.elements.face / sonar.assumed_sound_speed)
@@ -105,9 +107,9 @@ class Profiles:
     column: Ints  # (beam,) azimuth index
     direction: Floats  # (beam, xyz)
     spectra: npt.NDArray[np.complex64]  # (beam, bin) of which they are made
-    power: npt.NDArray[np.float32]  # (beam, delay) relative
-    total: npt.NDArray[np.float32]  # (beam,) sum over delays
-    loudest: npt.NDArray[np.float32]  # (delay,) of all beams
+    power: Powers  # (beam, delay) relative
+    total: Powers  # (beam,) sum over delays
+    loudest: Powers  # (delay,) of all beams
     first: float  # s after the direct arrival
     step: float  # s
     width: float  # rad: half of the half-power width of a beam
@@ -205,29 +207,21 @@ def echo_filter(received: ReceivedWindow) -> EchoFilter:
 
 def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profiles:
     """Profiles of the beams (row, column) by their `echo_filter`."""
-    window, elements, c = received.beams.snapshots, received.elements, received.sonar.assumed_sound_speed
-    f, spacing = window.frequency, window.spacing
-    row, column = beams
+    window, (row, column), echoes = received.beams.snapshots, beams, echo_filter(received)
     u = direction(received.image.azimuth[column], received.image.elevation[row])
-    echoes = echo_filter(received)
-    share, matched, taper = echoes.share, echoes.matched, echoes.taper
-    spectra, power, total, loudest = echoes.profiles(u)
-    spread = np.sum(taper**2)
-    centre = float(f @ taper**2 / spread)
-    beta = np.sqrt(max(float((f - centre) ** 2 @ taper**2 / spread), spacing**2))
+    f, power = window.frequency, echoes.taper**2 / np.sum(echoes.taper**2)
+    centre = float(f @ power)
+    beta = np.sqrt(max(float((f - centre) ** 2 @ power), window.spacing**2))
     return Profiles(
-        row=row,
-        column=column,
-        direction=u,
-        spectra=spectra,
-        power=power,
-        total=total,
-        loudest=loudest,
+        row,
+        column,
+        u,
+        *echoes.profiles(u),
         first=window.start - float(received.estimates.time[0]),
         step=echoes.step,
-        width=half_width(elements, centre / c),
+        width=half_width(received.elements, centre / received.sonar.assumed_sound_speed),
         resolution=1 / (2 * np.pi * beta),
-        moments=_moments(f, share, np.abs(matched) ** 2, spacing),
+        moments=_moments(f, echoes.share, np.abs(echoes.matched) ** 2, window.spacing),
         filter=echoes,
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, azimuth_elevation
-from sonarsynth.ranging.picking.peak_kernels import farthest, loudest_lines
+from sonarsynth.ranging.picking.peak_kernels import farthest, loudest_between, loudest_lines
 from sonarsynth.ranging.range_profiles import Profiles
 from sonarsynth.ranging.received_window import ReceivedWindow
 
@@ -64,9 +64,6 @@ def louder_beyond(
     peak, u = peak[~inside], u[~inside]
     far = np.linalg.norm(u - profiles.direction[b[peak]], axis=1) * (farthest(elements.position) / c / profiles.step)
     first, last = np.maximum(np.ceil(t[peak] - far), 0.0).astype(int), (t[peak] + far).astype(int) + 1
-    late, loudest = np.empty(len(u), int), np.empty(len(u))
-    for n, power in enumerate(profiles.filter.profiles(u)[1] if len(u) else ()):
-        late[n] = first[n] + power[first[n] : last[n]].argmax()
-        loudest[n] = power[late[n]]
+    late, loudest = loudest_between(profiles.filter.profiles(u)[1], first, last) if len(u) else np.zeros((2, 0))
     louder = loudest > height[peak]
     return u[louder], profiles.step * late[louder], loudest[louder]

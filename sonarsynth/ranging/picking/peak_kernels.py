@@ -56,8 +56,8 @@ def local_maxima(
                 loud = (own[t] > floor[b]) & (own[t] >= audible[t])
                 top[t] = loud & (own[t] > before[t]) & (own[t] >= max(after[t], left[t], right[t]))
             top[last - first : last - first + 8] = False
-            for eight in np.flatnonzero(eights[: (last - first + 7) // 8]):
-                for t in range(first + 8 * eight, first + 8 * eight + 8):
+            for eight in range((last - first + 7) // 8):
+                for t in range(first + 8 * eight, first + 8 * eight + 8 if eights[eight] > 0 else 0):
                     if top[t - first] and not exceeded(power, index, i, j, t, about):
                         peaks[0, count], peaks[1, count] = b, t
                         count += 1
@@ -161,6 +161,16 @@ def loudest_lines(spectra: Any, b: Any, turn: Any, width: int) -> Any:
             if centre >= 0 and loud > power[p]:
                 line[p], power[p] = centre, loud
     return line, power / width**2
+
+
+@compiled
+def loudest_between(power: Any, first: Any, last: Any) -> Any:
+    """Where power (beam, delay) of each beam is largest from its `first` (beam,) delay to before `last`, and that."""
+    late, loudest = np.empty(len(power), np.int64), np.empty(len(power))
+    for b in range(len(power)):
+        late[b] = first[b] + np.argmax(power[b, first[b] : last[b]])
+        loudest[b] = power[b, late[b]]
+    return late, loudest
 
 
 @compiled(fastmath={"contract"}, forceinline=True)
