@@ -27,9 +27,9 @@ from sonarsynth.receiver import Band, Elements, Sonar
 
 MAX_BEAMS = 16384
 """No more beams are ranged, the loudest of them: a bound on memory where a whole image is loud."""
-BEAMS_AT_ONCE, SAMPLES_AT_ONCE = 2048, 65536
-"""Beams that share the sums over rows of a lattice; and samples of beams that are transformed together, in the cache:
-more at once would need memory that is given back, and taken again, in every frame."""
+SAMPLES_AT_ONCE = 65536
+"""Of beams that are transformed together, in the cache: more at once would need memory that is given back, and taken
+again, in every frame."""
 OVERSAMPLING = 4
 """Delays of a profile for each that its bandwidth needs: two of a transform, and one more after each."""
 HALFWAY = np.array([0.605571, -0.133738, 0.032692, -0.004536], np.float32)
@@ -84,8 +84,7 @@ class EchoFilter:
         the largest of all beams (delay,)."""
         window, sonar = self.received.beams.snapshots, self.received.sonar
         sine = u * (self.received.elements.face / sonar.assumed_sound_speed)
-        blocks = [self.received.beams.spectra(u[low : low + BEAMS_AT_ONCE]) for low in range(0, len(u), BEAMS_AT_ONCE)]
-        spectra = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        spectra = self.received.beams.spectra(u)
         power, total = np.empty((len(u), self.count), np.float32), np.empty(len(u), np.float32)
         loudest = np.zeros(self.count, np.float32)
         room = np.empty((max(SAMPLES_AT_ONCE // self.length, 1), self.length), np.complex64)
