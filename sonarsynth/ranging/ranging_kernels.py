@@ -10,15 +10,7 @@ from sonarsynth.compiling import compiled
 from sonarsynth.equations.kernels.phasors import face_response, sine
 
 
-@compiled(fastmath=True, forceinline=True)
-def _sum(values: Any) -> Any:
-    total = np.float32(0.0)
-    for k in range(len(values)):
-        total += values[k]
-    return total
-
-
-@compiled
+@compiled(fastmath=True)
 def powers(waves: Any, taps: Any, power: Any, total: Any, loudest: Any) -> None:
     """Write |.|^2 of complex waves (beam, sample), and of what they are halfway between samples, into power (beam, two
     for a sample), as many as it has, their sums into total (beam,), and into loudest (delay,) what is more than it has.
@@ -47,9 +39,11 @@ def powers(waves: Any, taps: Any, power: Any, total: Any, loudest: Any) -> None:
         if count % 2 > 0:
             last = len(between) + 2
             power[n, count - 1] = re[last] * re[last] + im[last] * im[last]
-        total[n] = _sum(power[n])
+        sum_of_all = np.float32(0.0)
         for i in range(count):
+            sum_of_all += power[n, i]
             loudest[i] = max(loudest[i], power[n, i])
+        total[n] = sum_of_all
 
 
 @compiled
