@@ -4,6 +4,7 @@ and the converter. The array is one, or cut into subarrays to each of which path
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any, Final
@@ -131,14 +132,14 @@ def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Element
 def _prepared(
     plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements, *, whole: bool = True
 ) -> Callable[[], Signals]:
-    """What gives `array_signals`, prepared as far as the method can. whole: as of `Reception`."""
+    """What gives `array_signals`, made as far as the method makes them before they are looked at. whole: as of
+    `Reception`."""
     reception = reception_of(plan, frame)._replace(elements=sensors, whole=whole, still=not frame.sonar_velocity.any())
     method, heard = plan.choices.synthesis, behind_baffle(arrivals, plan.scene.sonar)
-    prepare: Any = getattr(method, "prepared", partial(partial, method.signals))
-    make = prepare(heard, frame.moment.snaps, reception)
+    late = method.signals(heard, frame.moment.snaps, reception)
 
     def signals() -> Signals:
-        made = make()
+        made = copy(late)  # what is summed is not kept
         samples = (reception.samples,) if whole else np.shape(getattr(made, "pressure", 0))[1:]
         refused = plan.scene.sonar.converter is not None  # NaN, without a look at all samples here
         checked: Signals = returned(method, "signals", made, (sensors.count, *samples), "pressure", unknown=refused)

@@ -28,8 +28,7 @@ __all__ = [
 
 
 class SignalSynthesis(Protocol):
-    """A method of synthesis. One that has `prepared` too, of the same arguments, gives there what then gives the
-    signals: frames of a block are prepared one after the other, before the first is summed."""
+    """A method of synthesis."""
 
     def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
         """Pressure at each hydrophone, without noise and without a converter, in the window of the reception; where

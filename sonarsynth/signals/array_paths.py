@@ -187,10 +187,9 @@ def folded(phase: Floats) -> tuple[Floats, Floats]:
     of half turns to rounding leaves no phase."""
     if not phase.any():
         return np.ones(phase.size), phase
-    cosine, sine = np.cos(phase), np.sin(phase)
-    sign = np.where(cosine < 0.0, -1.0, 1.0)
-    remainder = np.arctan2(sign * sine, sign * cosine)
-    return sign, np.where(np.abs(remainder) > 2e-16 * (1.0 + np.abs(phase)), remainder, 0.0)
+    turns = np.rint(phase / np.pi)
+    remainder = phase - np.pi * turns
+    return 1.0 - 2.0 * (turns % 2.0), np.where(np.abs(remainder) > 2e-16 * (1.0 + np.abs(phase)), remainder, 0.0)
 
 
 def towards(front: Wavefronts, points: Floats) -> tuple[Floats, Floats]:

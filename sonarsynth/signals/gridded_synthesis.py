@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
@@ -66,9 +66,15 @@ def _sounding(plan: Layout, front: ArrayPaths, sampling_frequency: float, sample
     return [(min(max(low, 0), samples), min(max(high, 0), samples)) for low, high in ends]
 
 
-Summing = Callable[[], tuple[npt.NDArray[Any], int, int]]
-"""Gives the pressure (sensor, sample), the sample of the window where it begins, and the number of arrivals that the
-window cuts."""
+class LateSignals(Signals):
+    """Signals that are summed at the hydrophones when their pressure is first looked at. What is made before is small:
+    made for some frames, one after the other, it stays in the caches of a core."""
+
+    @cached_property
+    def pressure(self) -> npt.NDArray[np.float32]:
+        """(sensor, sample) Pa."""
+        total: Callable[[], npt.NDArray[Any]] = vars(self).pop("total")
+        return total().astype(np.float32, copy=False)
 
 
 @dataclass(frozen=True)
@@ -169,25 +175,22 @@ class GriddedSynthesis(UnroundedSynthesis):
         self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
     ) -> tuple[npt.NDArray[Any], int]:
         """As `UnroundedSynthesis.pressure`: silence, and stretches of it that hold whole pulses."""
-        pressure, _, outside = self._sound(arrivals, snaps, reception._replace(whole=True))()
-        return pressure, outside
+        total, _, outside = self._sound(arrivals, snaps, reception._replace(whole=True))
+        return total(), outside
 
     def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
-        """As `SignalSynthesis.signals`."""
-        return self._signals(self._sound(arrivals, snaps, reception), reception)
+        """As `SignalSynthesis.signals`, with all made but for the sums at the hydrophones."""
+        total, first, outside = self._sound(arrivals, snaps, reception)
+        rate, late = reception.sonar.sampling_frequency, object.__new__(LateSignals)
+        of = {"start": reception.start + first / rate, "sampling_frequency": rate, "quantum": 0.0, "clipped": 0}
+        vars(late).update(of, outside=outside, total=total)
+        return late
 
-    def prepared(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Callable[[], Signals]:
-        """What gives the `signals`, with all made but for the sums at the hydrophones."""
-        if type(self).signals is not OWN_SIGNALS:
-            return partial(self.signals, arrivals, snaps, reception)
-        return partial(self._signals, self._sound(arrivals, snaps, reception), reception)
-
-    def _signals(self, sound: Summing, reception: Reception) -> Signals:
-        (pressure, first, outside), rate = sound(), reception.sonar.sampling_frequency
-        start = reception.start + first / rate
-        return Signals(pressure.astype(np.float32, copy=False), start, rate, 0.0, 0, outside)
-
-    def _sound(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Summing:
+    def _sound(
+        self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
+    ) -> tuple[Callable[[], npt.NDArray[Any]], int, int]:
+        """What gives the pressure (sensor, sample), the sample of the window where it begins, and the number of
+        arrivals that the window cuts."""
         elements, sonar, absorption, _, samples, whole, still = reception
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
         front = from_the_sharpest(front, stop_frequency(sonar.antialias))
@@ -200,7 +203,7 @@ class GriddedSynthesis(UnroundedSynthesis):
             few = still and paths.count <= FEW
             parts.append(_FewPaths.of(span, within, paths) if few else self.waves(span, paths, reception))
 
-        def sound() -> tuple[npt.NDArray[Any], int, int]:
+        def total() -> npt.NDArray[Any]:
             out = np.zeros((elements.count, high - low), self.precision)
             for part in parts:
                 if isinstance(part, _FewPaths):
@@ -208,9 +211,9 @@ class GriddedSynthesis(UnroundedSynthesis):
                     out[:, first - low : stop - low] += sound_of_few(part, self, reception)
                 else:
                     add(out, low, part)
-            return out, low, plan.outside
+            return out
 
-        return sound
+        return total, low, plan.outside
 
     def waves(self, span: Segment, paths: ArrayPaths, reception: Reception) -> Waves:
         """The waves of the paths of a stretch."""
@@ -218,7 +221,3 @@ class GriddedSynthesis(UnroundedSynthesis):
         paths, bins = bins_of(span, paths, sonar, reception.absorption, self.tolerance)
         origin, stop = reception.start + span.first / sonar.sampling_frequency, stop_frequency(sonar.antialias)
         return prepared(span, paths, reception.elements, bins, origin=origin, stop=stop, method=method)
-
-
-OWN_SIGNALS: Final = GriddedSynthesis.signals
-"""One that is made of this, and makes its signals otherwise, prepares nothing."""

@@ -1,5 +1,6 @@
 """Laws of the chain from scene to signals, image and labels."""
 
+import weakref
 from dataclasses import replace
 from functools import lru_cache
 
@@ -11,9 +12,11 @@ from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.bubble.snap_pressure import spectrum
 from sonarsynth.equations.noise.filters import response
 from sonarsynth.pipeline import beamform_frame, render, synthesise, trace_frame
+from sonarsynth.pipeline.synthesis import frame_signals, prepared_sound
 from sonarsynth.planning import PRODUCTS, plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import MirrorLobe
+from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.targets.shapes import Remus100
 from tests.scenes import point_scene, remus
@@ -53,6 +56,29 @@ def test_a_point_scatterer_gives_the_closed_form() -> None:
     closed *= element_directivity(f, look[:, None, :], made.elements.face, 1500.0)
     exact = np.fft.irfft(closed, padded, axis=1)[:, :samples] * rate
     assert np.abs(signals.pressure - exact).max() <= 1e-4 * np.abs(exact).max()
+
+
+class Louder(GriddedSynthesis):
+    """Twice as loud as the synthesis that it is made of."""
+
+    def signals(self, arrivals, snaps, reception):
+        heard = super().signals(arrivals, snaps, reception)
+        return replace(heard, pressure=2.0 * heard.pressure)
+
+
+def test_what_a_synthesis_made_of_another_says_is_heard_and_sums_are_not_kept() -> None:
+    made, traced, _ = _one_facet(point_scene(TARGET, SNAP))
+    louder = replace(made, choices=replace(made.choices, synthesis=Louder()))
+    plain = replace(made, choices=replace(made.choices, synthesis=GriddedSynthesis()))
+    sounds = [prepared_sound(of, traced.frame, traced.arrivals) for of in (plain, louder)]
+    one, two = (
+        frame_signals(of, traced.frame, traced.arrivals, sound=sound)
+        for of, sound in zip((plain, louder), sounds, strict=True)
+    )
+    np.testing.assert_array_equal(two.pressure, 2.0 * one.pressure)
+    kept = weakref.ref(one.pressure)
+    del one
+    assert kept() is None  # frames of a block have theirs one after the other
 
 
 def test_the_image_of_a_point_peaks_at_its_place() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,14 +106,15 @@ def add(out: npt.NDArray[Any], first: int, waves: Waves) -> None:
 
 def _waves(front: Wavefronts, chosen: list[Tile], stage: Stage) -> Iterator[Wave]:
     """The waves of all tiles, one by one."""
+    shorter = cache(partial(_shorter, stage))
     for tile in chosen:
         if not tile.alone:
-            yield _wave(tile, front.select(_neighbours_apart(tile.paths)), stage)
+            yield _wave(tile, front.select(_neighbours_apart(tile.paths)), stage, shorter)
             continue
         most = max(1, LARGEST // (len(tile.nodes(stage.aim.elements)) * stage.segment.samples))
         for first in range(0, tile.paths.size, most):
             some = tile.reference.select(slice(first, first + most))
-            yield _wave(replace(tile, paths=tile.paths[first : first + most], reference=some), some, stage)
+            yield _wave(replace(tile, paths=tile.paths[first : first + most], reference=some), some, stage, shorter)
 
 
 def _neighbours_apart(paths: Ints) -> Ints:
@@ -145,11 +146,11 @@ def _on_grid(bins: Bins, highest: float, width: int, oversampling: float, dtype:
     return bins.cut(min(bins.frequency.size, circle // 2 - bins.first)), grid
 
 
-def _wave(tile: Tile, paths: Wavefronts, stage: Stage) -> Wave:
-    """What sounds at the nodes of a tile."""
+def _wave(tile: Tile, paths: Wavefronts, stage: Stage, shorter: Callable[[int], Stage]) -> Wave:
+    """What sounds at the nodes of a tile; shorter: `_shorter` of the stage."""
     reference, points = tile.reference, tile.nodes(stage.aim.elements)
     begin, length = _lasting(tile, paths, stage)
-    stage = _shorter(stage, length)
+    stage = shorter(2 * int(next_fast_len(-(-length // 2), real=True)))
     since = begin / (stage.segment.samples * stage.bins.step)
     field = (_alone if tile.alone else _deposit)(tile, paths, points, since, stage)
     if reference.expansion.phase.any() or reference.expansion.delay_variance.any():
@@ -192,8 +193,8 @@ def _hear(out: npt.NDArray[Any], sample: int, some: Wave) -> None:
 
 
 def _shorter(stage: Stage, length: int) -> Stage:
-    """A stage of a stretch that holds no more than `length` samples, where that is a part of it: of fewer bins."""
-    bins, segment, length = stage.bins, stage.segment, 2 * int(next_fast_len(-(-length // 2), real=True))
+    """A stage of a stretch of no more than `length` samples, where that is a part of it: of fewer bins."""
+    bins, segment = stage.bins, stage.segment
     if 8 * length > 7 * segment.samples:
         return stage
     rate, early = segment.samples * bins.step, segment.before / (segment.before + segment.after)

@@ -219,18 +219,19 @@ def combine(spectra: Any, first: int, factors: Any, pair: Any, power: Any, respo
 
 
 @compiled(fastmath=True, forceinline=True, borrows=True)
-def _sum_three(weight: Any, nodes: Any, first: int, parity: int, out: Any) -> None:
-    """Put weight (node,), of zeros beyond the last, times three nodes (node, parity, sample) in out, or add it there
-    from the second three on."""
+def _sum_five(weight: Any, nodes: Any, first: int, parity: int, out: Any) -> None:
+    """Put weight (node,), of zeros beyond the last, times five nodes (node, parity, sample) in out, or add it there
+    from the second five on."""
     last = nodes.shape[0] - 1
-    one, two, three = nodes[first, parity], nodes[min(first + 1, last), parity], nodes[min(first + 2, last), parity]
-    u, v, w = weight[first], weight[first + 1], weight[first + 2]
+    a, b, c = nodes[first, parity], nodes[min(first + 1, last), parity], nodes[min(first + 2, last), parity]
+    d, e = nodes[min(first + 3, last), parity], nodes[min(first + 4, last), parity]
+    s, t, u, v, w = weight[first], weight[first + 1], weight[first + 2], weight[first + 3], weight[first + 4]
     if first == 0:
         for i in range(out.size):
-            out[i] = u * one[i] + v * two[i] + w * three[i]
+            out[i] = s * a[i] + t * b[i] + u * c[i] + v * d[i] + w * e[i]
     else:
         for i in range(out.size):
-            out[i] += u * one[i] + v * two[i] + w * three[i]
+            out[i] += s * a[i] + t * b[i] + u * c[i] + v * d[i] + w * e[i]
 
 
 @compiled(fastmath=True, forceinline=True, borrows=True)
@@ -256,14 +257,14 @@ def hear(
     """
     samples, cubes, number = field.shape[3], taps.size // (4 * lanes), taps.dtype.type
     wave = np.zeros((2, samples + 2 * lanes), field.dtype)  # between zeros
-    share = np.zeros(weight.shape[1] + 2, weight.dtype)
+    share = np.zeros(weight.shape[1] + 4, weight.dtype)
     for q in range(out.shape[0]):
         if gain[q] == 0.0:
             continue
         share[: weight.shape[1]] = weight[q]
         for parity in range(2):
-            for n in range(0, weight.shape[1], 3):
-                _sum_three(share, field[column[q]], n, parity, wave[parity, lanes : lanes + samples])
+            for n in range(0, weight.shape[1], 5):
+                _sum_five(share, field[column[q]], n, parity, wave[parity, lanes : lanes + samples])
         whole = np.floor(0.5 * late[q])
         low = 2.0 * whole - late[q] - 0.5 * lanes
         first = np.floor(low) + 1.0

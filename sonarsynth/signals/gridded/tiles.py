@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,9 @@ MOST_TERMS = 24
 
 FEW = 4
 """So many paths are each steered to itself."""
+
+FAINTER = 2
+"""Families half or a quarter as loud as the loudest may err by twice or four times as much of their own."""
 
 LARGE_FAMILY = 500
 """Families of so many paths have tiles of their own: they are short, and have few modes."""
@@ -232,10 +235,13 @@ def tiles(front: Wavefronts, aim: TileSettings) -> list[Tile]:
     large = np.bincount(front.family) >= LARGE_FAMILY
     kind = np.where(missed, -1, front.family * large[front.family])
     groups = [(np.flatnonzero(~apart & (kind == of)), of < 0) for of in (0, *np.flatnonzero(large).tolist(), -1)]
-    chosen += [_alone(paths, front, aim) for paths, _ in groups if 0 < paths.size <= FEW]
-    if many := [group for group in groups if group[0].size > FEW]:
-        views = _views(front, aim)
-        chosen += [tile for paths, misses in many for tile in _tiles(paths, views, aim, misses)]
+    groups = [(paths, misses) for paths, misses in groups if paths.size]
+    loud = [float(np.linalg.norm(front.amplitude[paths])) for paths, _ in groups]
+    views = cache(partial(_views, front, aim))
+    for (paths, misses), own in zip(groups, loud, strict=True):
+        fainter = min(int(np.log2(max(loud) / own)), FAINTER)
+        of = replace(aim, tolerance=2.0**fainter * aim.tolerance) if fainter else aim
+        chosen += [_alone(paths, front, of)] if paths.size <= FEW else _tiles(paths, views(), of, misses)
     return chosen
 
 
