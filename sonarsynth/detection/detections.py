@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
+from sonarsynth.store.files.place import write_atomically
 
 MEASURED: Final = ("azimuth", "elevation", "range", "azimuth_error", "elevation_error", "range_error")
 """What a detection may say besides its box, by the names of the file."""
@@ -72,7 +73,7 @@ class Detections:
                 row["bbox"] = [x0, y0, x1 - x0, y1 - y0]
             rows.append(row | {name: values[i] for name, values in columns.items() if np.isfinite(values[i])})
         Path(path).parent.mkdir(parents=True, exist_ok=True)
-        Path(path).write_text("[" + ",\n".join(map(json.dumps, rows)) + "]\n", encoding="utf-8")
+        write_atomically(Path(path), ("[" + ",\n".join(map(json.dumps, rows)) + "]\n").encode())
         return Path(path)
 
 

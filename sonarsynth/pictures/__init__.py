@@ -184,6 +184,4 @@ def _write_sheet(
     errors = Errors(points=frame.points, error=frame.range_error)
     view = frame_view(tree, frame)
     fig = sheet(*beam_grid(tree), view, errors, loudest_of_beams, window([view]), "energy re the brightest beam (dB)")
-    path = folder / "sheet.png"
-    fig.savefig(path)
-    return path
+    return save(fig, folder / "sheet.png")

@@ -11,7 +11,7 @@ import numpy as np
 
 from sonarsynth.conventions import Progress
 from sonarsynth.pictures.figures.compared_images import BesidePicture, Column, Moment, Panel
-from sonarsynth.pictures.figures.style import decibels
+from sonarsynth.pictures.figures.style import decibels, save
 from sonarsynth.pictures.film import thinned, write_film
 from sonarsynth.pictures.recipe_diff import names_of
 from sonarsynth.pictures.scores import LEVEL, EchoEnergies, as_table, echo_energies, scores_of
@@ -88,7 +88,7 @@ def show_beside(
     sheet = BesidePicture(*beam_grid(trees[0]), columns, heading, NOTE, rows=len(chosen), of=of)
     sheet.show(*(moment(trees, references, *pick) for pick in chosen))
     files = [folder / "beside.png"]
-    sheet.figure.savefig(files[0], dpi=120)
+    save(sheet.figure, files[0], dpi=120)
     if film and len(frames) > 1:
         if len(thinned(frames)) < len(frames):
             say(f"film: {len(thinned(frames))} of {len(frames)} frames")

@@ -15,6 +15,7 @@ import numpy as np
 
 from sonarsynth.conventions import aligned, counted
 from sonarsynth.equations.rays.ray_solutions import water
+from sonarsynth.pictures.figures.style import TIGHT, save
 from sonarsynth.pictures.ray_figures.ray_figure import section_figure, space_figure
 from sonarsynth.pictures.ray_figures.ray_page import page
 from sonarsynth.pictures.ray_figures.ray_styles import FAN, Look
@@ -26,6 +27,7 @@ from sonarsynth.planning import plan as plan_of
 from sonarsynth.propagation.ray_request import EigenrayRequest
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.store.files.place import write_atomically
 
 LONGEST_TABLE = 100
 REFLECTED = {"surface": "surface", "bottom": "bottom", "facet": "target"}
@@ -85,14 +87,14 @@ def show_rays(plan: Plan, index: int, out: Path) -> tuple[list[Path], str]:
     every = counted(len(rays), "ray")
     out.mkdir(parents=True, exist_ok=True)
     files = [out / name for name in ("section.png", "space.png", "rays.html", "rays.json")]
-    section_figure(f"{title}: {every}", rays, looks, depth, speed, geometry).savefig(files[0])
+    save(section_figure(f"{title}: {every}", rays, looks, depth, speed, geometry), files[0])
     met = [i for i, look in enumerate(looks) if look.family != FAN or np.isfinite(look.coefficient)]
     shown = met if any(look.family == FAN for look in (looks[i] for i in met)) else range(len(looks))
     described = every if len(shown) == len(rays) else f"{len(shown)} of {every}, sent on from a target"
     space = space_figure(f"{title}: {described}", [rays[i] for i in shown], [looks[i] for i in shown], geometry)
-    space.savefig(files[1], bbox_inches="tight", pad_inches=0.1)
-    files[2].write_text(page(value, looks, geometry), encoding="utf-8")
-    files[3].write_text(json.dumps(value, allow_nan=False) + "\n", encoding="ascii")
+    save(space, files[1], **TIGHT)
+    write_atomically(files[2], page(value, looks, geometry).encode())
+    write_atomically(files[3], (json.dumps(value, allow_nan=False) + "\n").encode())
     return files, table(lines)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,9 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, finite_json
 from sonarsynth.pictures.figures.strength_figure import strength_figure
+from sonarsynth.pictures.figures.style import save
 from sonarsynth.scattering import Scattering
+from sonarsynth.store.files.place import write_atomically
 from sonarsynth.targets.shapes import Shape
 from sonarsynth.targets.target_strength import target_strength
 
@@ -58,11 +59,10 @@ def write_strength(table: StrengthTable, title: str, out: Path) -> list[Path]:
     """Write `target_strength.csv` (aspect, frequency, level) and `target_strength.png` into a folder; their paths."""
     out.mkdir(parents=True, exist_ok=True)
     files = [out / "target_strength.csv", out / "target_strength.png"]
-    with files[0].open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["aspect_deg", "frequency_hz", "target_strength_db"])
-        for aspect, levels in zip(np.rad2deg(table.aspect), table.strength, strict=True):
-            rows = zip(table.frequency, levels, strict=True)
-            writer.writerows([f"{aspect:.9g}", f"{f:.9g}", f"{level:.4f}"] for f, level in rows)
-    strength_figure(title, table.aspect, table.frequency, table.strength).savefig(files[1])
+    lines = ["aspect_deg,frequency_hz,target_strength_db"]
+    for aspect, levels in zip(np.rad2deg(table.aspect), table.strength, strict=True):
+        rows = zip(table.frequency, levels, strict=True)
+        lines += [f"{aspect:.9g},{frequency:.9g},{level:.4f}" for frequency, level in rows]
+    write_atomically(files[0], ("\r\n".join(lines) + "\r\n").encode())
+    save(strength_figure(title, table.aspect, table.frequency, table.strength), files[1])
     return files

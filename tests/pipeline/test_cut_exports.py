@@ -18,6 +18,7 @@ import xarray as xr
 from sonarsynth import planning, schedule
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
+from sonarsynth.detection import from_rows
 from sonarsynth.export import FORMATS, coco_files, sonar_netcdf, write_points
 from sonarsynth.recipe import reading
 
@@ -69,6 +70,37 @@ def test_a_file_of_points_is_all_there_or_as_it_was(ending: str, tmp_path: Path)
             write_points(cloud, file)
         assert raised.value.filename == str(file)
         assert file.read_text() == "an earlier export" and list(tmp_path.iterdir()) == [file]
+
+
+def test_a_file_that_a_command_writes_is_all_there_or_as_it_was(
+    store: Path, small_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On a full disk a table, a picture and a list of detections were cut, and the line did not name the file."""
+    commands = {
+        "d.json": ["detect", str(store), "--out"],
+        "t/target_strength.csv": ["target-strength", "{kind: sphere, radius: 0.25 m}", "--out"],
+        "snap.png": ["snap", str(small_file), "--out"],
+    }
+    for name, command in commands.items():
+        file = tmp_path / name
+        place = str(file.parent if "/" in name else file)
+        assert run(app, [*command, place]) == 0  # all that it imports is compiled
+        whole = file.read_bytes()
+        capsys.readouterr()
+        with files_of_at_most(len(whole) - 1):
+            assert run(app, [*command, place]) == 1
+        assert capsys.readouterr().err == f"sonarsynth: {file}: File too large\n"
+        assert file.read_bytes() == whole and {one.name for one in file.parent.iterdir()} >= {file.name}
+        assert not list(file.parent.glob("*.partial")) + list(file.parent.glob(".*"))
+
+
+def test_a_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reading_end = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    from_rows([{"frame": 1, "score": 0.5, "azimuth": 0.0, "elevation": 0.0}]).write(pipe)
+    assert pipe.is_fifo() and b'"image_id": 1' in os.read(reading_end, 1000)
+    os.close(reading_end)
 
 
 @pytest.mark.parametrize(("to", "module"), [("coco", coco_files), ("sonar-netcdf", sonar_netcdf)])

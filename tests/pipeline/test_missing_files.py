@@ -129,8 +129,10 @@ def test_a_store_without_its_marks_is_said_to_be_one(copy: Path) -> None:
         with pytest.warns(Unmarked, match=rf"s\.zarr: \.marks{said}copy it as well"):
             reads(copy)
     shown = [sys.executable, "-m", "sonarsynth", "show", str(copy), "--frame", "9"]
-    notes = subprocess.run(shown, capture_output=True, text=True, check=True).stderr
-    assert notes.startswith(f"sonarsynth: {copy}: .marks is missing: ") and notes.count("sonarsynth: ") == 1
+    said_by_show = subprocess.run(shown, capture_output=True, text=True, check=True).stderr
+    assert (
+        said_by_show.startswith(f"sonarsynth: {copy}: .marks is missing: ") and said_by_show.count("sonarsynth: ") == 1
+    )
     place = Remote("memory://unmarked/s.zarr")
     place.write_each(contents(copy))
     with pytest.warns(Unmarked, match=rf"s\.zarr: \.marks{said}copy it as well"):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Bytes, Floats
+from sonarsynth.store.files.place import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,6 +37,9 @@ WINDS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WS
 
 PAGE_CONFIG = {"displaylogo": False, "responsive": True, "showSendToCloud": False, "plotlyServerURL": ""}
 """Nothing leads out of a page: plotly 7 has a button that sends it away."""
+
+TIGHT: Final[dict[str, Any]] = {"bbox_inches": "tight", "pad_inches": 0.1}
+"""How figures are saved whose axes leave a margin."""
 
 INK = "#222222"
 PALE = "#8a8a8a"
@@ -75,7 +80,8 @@ def figure(width: float, height: float, layout: str = "constrained", **more: Any
 
 
 def save(fig: Figure, out: Path, **options: Any) -> Path:
-    """Write a figure into a file, a PNG where the name does not say, and its folder; returns the file.
+    """Write a figure into a file, all of it or nothing, and its folder; a PNG where the name does not say. Returns the
+    file.
 
     Raises BadEnding for a name that ends as that of no picture.
     """
@@ -83,7 +89,9 @@ def save(fig: Figure, out: Path, **options: Any) -> Path:
     if file.suffix[1:].lower() not in known:
         raise BadEnding(f"{file}: is none of {', '.join(sorted(known))} (by its ending)")
     file.parent.mkdir(parents=True, exist_ok=True)
-    fig.savefig(file, **options)
+    content = io.BytesIO()
+    fig.savefig(content, format=file.suffix[1:], **options)
+    write_atomically(file, content.getvalue())
     return file
 
 

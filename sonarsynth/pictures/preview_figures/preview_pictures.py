@@ -11,6 +11,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, Progress
 from sonarsynth.environment.casts import profile_of
 from sonarsynth.equations.rays.ray_solutions import water
+from sonarsynth.pictures.figures.style import TIGHT, save
 from sonarsynth.pictures.preview_figures.distribution_figure import distribution_figure
 from sonarsynth.pictures.preview_figures.overview_figure import Overview, overview_figure
 from sonarsynth.pictures.ray_figures.scene_geometry import scene_geometry
@@ -19,6 +20,7 @@ from sonarsynth.products import SPLITS
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.sampled_geometry import SEQUENCES, frame_of, sample_geometry
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.store.files.place import write_atomically
 
 MOST_DRAWN = 3
 """Scenes that are drawn, if there are more sequences."""
@@ -62,15 +64,11 @@ def draw_preview(
     files = []
     for sequence in np.unique(np.linspace(0, recipe.sequences - 1, min(MOST_DRAWN, recipe.sequences)).astype(int)):
         files.append(out / f"scene-{sequence}.png")
-        _save(overview_figure(overview(recipe, int(sequence))), files[-1])
+        save(overview_figure(overview(recipe, int(sequence))), files[-1], **TIGHT)
     files += [out / "distributions.png", out / "preview.json"]
-    _save(distribution_figure(sampled), files[-2])
-    files[-1].write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="ascii")
+    save(distribution_figure(sampled), files[-2], **TIGHT)
+    write_atomically(files[-1], (json.dumps(value, indent=2, allow_nan=False) + "\n").encode())
     return files, value
-
-
-def _save(fig: Any, file: Path) -> None:
-    fig.savefig(file, bbox_inches="tight", pad_inches=0.1)
 
 
 def overview(recipe: Recipe, sequence: int) -> Overview:

@@ -15,6 +15,7 @@ from sonarsynth.pictures.report_figures import report_plots as plots
 from sonarsynth.pictures.report_figures.report_numbers import numbers_of
 from sonarsynth.pictures.store_reading import NothingToDraw
 from sonarsynth.store import Folder, built_frames, folder_of, named_after, open_store
+from sonarsynth.store.files.place import write_atomically
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -74,7 +75,7 @@ def report(
             script = False
     sections += [*_clouds(numbers), *_scores(numbers)]
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(PAGE.format(title=title, body="\n".join(sections), numbers=_as_json(numbers)), encoding="utf-8")
+    write_atomically(file, PAGE.format(title=title, body="\n".join(sections), numbers=_as_json(numbers)).encode())
     return file, numbers
 
 

@@ -269,7 +269,7 @@ def write_in(folder: Opened, name: str, content: bytes) -> None:
 
 def write_atomically(file: Folder, content: bytes) -> None:
     """Write a file beside a store so that it is there whole or not at all."""
-    if isinstance(file, Remote):
+    if isinstance(file, Remote) or (file.exists() and not file.is_file()):  # a pipe or a device
         file.write_bytes(content)
     else:
         within.write_atomically(Path(os.path.realpath(file.parent)), file.name, content)
