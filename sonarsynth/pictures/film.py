@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
@@ -13,6 +14,7 @@ import numpy as np
 
 from sonarsynth.conventions import Progress
 from sonarsynth.pictures.figures.style import BACKDROP, ENERGY_MAP, OUTLINES, pixels
+from sonarsynth.store.files.place import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,7 +89,9 @@ def _gif(shots: Iterator[np.ndarray], path: Path, frames_per_second: float) -> P
     plain = (Image.fromarray(shot).convert("RGB") for shot in shots)
     frames = [shot.quantize(palette=colours, dither=Image.Dither.NONE) for shot in plain]
     milliseconds = max(20, round(1000 / frames_per_second))
-    frames[0].save(path, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False)
+    content, settings = io.BytesIO(), {"duration": milliseconds, "loop": 0, "optimize": False}
+    frames[0].save(content, "GIF", save_all=True, append_images=frames[1:], **settings)
+    write_atomically(path, content.getvalue())
     return path
 
 

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from sonarsynth.pictures.figures.frontier_figure import Line, Panel, frontier_figure
+from sonarsynth.pictures.figures.style import save
+from sonarsynth.store.files.place import write_atomically
 from sonarsynth.validation.validation_rows import Row
 
 
@@ -21,13 +23,12 @@ def write(rows: Sequence[Row], out: Path, name: str) -> list[Path]:
     """Write <name>.json and, where error is traded for time, <name>.png into a folder; their paths."""
     out.mkdir(parents=True, exist_ok=True)
     files = [out / f"{name}.json", out / f"{name}.png"]
-    files[0].write_text(json.dumps(as_json(rows), indent=2) + "\n")
+    write_atomically(files[0], (json.dumps(as_json(rows), indent=2) + "\n").encode())
     panels = list(_panels(rows))
     if not panels:
         return files[:1]
-    frontier_figure(
-        f"{name}: error against run time", panels, "Cases without error are drawn on the dotted line."
-    ).savefig(files[1])
+    note = "Cases without error are drawn on the dotted line."
+    save(frontier_figure(f"{name}: error against run time", panels, note), files[1])
     return files
 
 

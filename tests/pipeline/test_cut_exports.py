@@ -20,6 +20,8 @@ from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.detection import from_rows
 from sonarsynth.export import FORMATS, coco_files, sonar_netcdf, write_points
+from sonarsynth.pictures.figures.style import figure
+from sonarsynth.pictures.film import write_film
 from sonarsynth.recipe import reading
 
 BELOW = """\
@@ -92,6 +94,16 @@ def test_a_file_that_a_command_writes_is_all_there_or_as_it_was(
         assert capsys.readouterr().err == f"sonarsynth: {file}: File too large\n"
         assert file.read_bytes() == whole and {one.name for one in file.parent.iterdir()} >= {file.name}
         assert not list(file.parent.glob("*.partial")) + list(file.parent.glob(".*"))
+
+
+def test_a_film_is_all_there_or_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")  # no ffmpeg
+    drawn, film = figure(2, 2, dpi=50), tmp_path / "film.gif"
+    write_film(drawn, lambda text: drawn.suptitle(text), "ab", tmp_path, 5.0)
+    whole = film.read_bytes()
+    with files_of_at_most(len(whole) - 1), pytest.raises(OSError) as raised:
+        write_film(drawn, lambda text: drawn.suptitle(text), "ab", tmp_path, 5.0)
+    assert raised.value.filename == str(film) and film.read_bytes() == whole
 
 
 def test_a_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
