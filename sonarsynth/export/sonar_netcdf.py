@@ -7,6 +7,7 @@ its version 2.0 (github.com/ices-publications/SONAR-netCDF4).
 from __future__ import annotations
 
 import errno
+import os
 import shutil
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
@@ -83,20 +84,23 @@ def write_sonar_netcdf(
         raise FieldError(("signals",), "the store has neither signals nor beams nor images")
     folder.mkdir(parents=True, exist_ok=True)
     sequence = np.asarray(tree["trajectory"].values)[frames]
-    _must_have_room(folder, groups, len(frames), len(np.unique(sequence)))
+    frame_bytes = sum(len(beams.names) * (4 * beams.length + BEAM_BYTES) for beams in groups)
+    _must_have_room(folder, len(frames) * frame_bytes + len(np.unique(sequence)) * FILE_BYTES)
     files = []
     for number in np.unique(sequence).tolist():
         files.append(folder / f"sequence_{number}.nc")
-        _write(tree, files[-1], frames[sequence == number], groups, sent)
+        own = frames[sequence == number]
+        with files[-1].open("wb") as file:  # raises where a quota or a limit of files is met
+            os.posix_fallocate(file.fileno(), 0, len(own) * frame_bytes + FILE_BYTES)
+        _write(tree, files[-1], own, groups, sent)
         if progress is not None:
             progress(int((sequence <= number).sum()), len(frames), 0)
     return tuple(files)
 
 
-def _must_have_room(folder: Path, groups: list[_Beams], frames: int, files: int) -> None:
+def _must_have_room(folder: Path, needed: int) -> None:
     """Raise OSError where the disk is too small: HDF5 ends the process when it is full."""
-    a_frame = sum(len(beams.names) * (4 * beams.length + BEAM_BYTES) for beams in groups)
-    needed, free = frames * a_frame + files * FILE_BYTES, shutil.disk_usage(folder).free
+    free = shutil.disk_usage(folder).free
     if needed > free:
         said = f"takes {format_bytes(needed)}, and {format_bytes(free)} are free"
         raise OSError(errno.ENOSPC, said, str(folder))

@@ -155,11 +155,13 @@ def test_netcdf_is_not_begun_on_a_disk_that_is_too_small(
     assert out.exists() == there and not list(tmp_path.glob("out/*"))
 
 
+@pytest.mark.parametrize("to", ["coco", "sonar-netcdf"])
 def test_a_full_disk_is_said_with_the_name_of_the_folder(
-    store: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    store: Path, tmp_path: Path, to: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """Of a quota too, where HDF5 ended the process with a signal."""
     with files_of_at_most(40):
-        assert run(app, ["export", str(store), "--to", "coco", "--out", str(tmp_path / "out")]) == 1
+        assert run(app, ["export", str(store), "--to", to, "--out", str(tmp_path / "out")]) == 1
     assert f"{tmp_path}/out: File too large" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
