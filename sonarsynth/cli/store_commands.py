@@ -135,7 +135,8 @@ def _print(score: dict[str, Any], console: Console) -> None:
             table.add_row(which, str(row["objects"]), *words_of(row, row))
     console.print(table)
     for rate in score["detection"]:
-        console.print(f"found at {rate['false_alarms_a_frame']:g} false alarms a frame: {share_found(rate)}")
+        alarms = rate["false_alarms_a_frame"]
+        console.print(f"found at {alarms:g} false alarm{'s' * (alarms != 1.0)} a frame: {share_found(rate)}")
     for name, row in score["errors"].items():
         if row["count"]:
             share = f"; {100 * row['share_within_3']:.3g} % within 3 predicted errors" if "predicted" in row else ""
