@@ -67,10 +67,7 @@ class _Beams(NamedTuple):
 
 
 def write_sonar_netcdf(
-    tree: xr.DataTree,
-    folder: Path,
-    frames: np.ndarray,
-    progress: Progress | None = None,
+    tree: xr.DataTree, folder: Path, frames: np.ndarray, progress: Progress | None = None
 ) -> tuple[Path, ...]:
     """Write some frames of a store, `sequence_<number>.nc` for each sequence of frames.
 

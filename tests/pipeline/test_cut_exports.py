@@ -20,7 +20,7 @@ from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.detection import from_rows
 from sonarsynth.export import FORMATS, coco_files, sonar_netcdf, write_points
-from sonarsynth.pictures.figures.style import figure
+from sonarsynth.pictures.figures.style import figure, save
 from sonarsynth.pictures.film import write_film
 from sonarsynth.recipe import reading
 
@@ -75,13 +75,12 @@ def test_a_file_of_points_is_all_there_or_as_it_was(ending: str, tmp_path: Path)
 
 
 def test_a_file_that_a_command_writes_is_all_there_or_as_it_was(
-    store: Path, small_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    store: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """On a full disk a table, a picture and a list of detections were cut, and the line did not name the file."""
+    """On a full disk a table and a list of detections were cut, and the line did not name the file."""
     commands = {
         "d.json": ["detect", str(store), "--out"],
         "t/target_strength.csv": ["target-strength", "{kind: sphere, radius: 0.25 m}", "--out"],
-        "snap.png": ["snap", str(small_file), "--out"],
     }
     for name, command in commands.items():
         file = tmp_path / name
@@ -96,14 +95,18 @@ def test_a_file_that_a_command_writes_is_all_there_or_as_it_was(
         assert not list(file.parent.glob("*.partial")) + list(file.parent.glob(".*"))
 
 
-def test_a_film_is_all_there_or_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_film_and_a_picture_are_all_there_or_as_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")  # no ffmpeg
-    drawn, film = figure(2, 2, dpi=50), tmp_path / "film.gif"
-    write_film(drawn, lambda text: drawn.suptitle(text), "ab", tmp_path, 5.0)
-    whole = film.read_bytes()
-    with files_of_at_most(len(whole) - 1), pytest.raises(OSError) as raised:
-        write_film(drawn, lambda text: drawn.suptitle(text), "ab", tmp_path, 5.0)
-    assert raised.value.filename == str(film) and film.read_bytes() == whole
+    drawn = figure(2, 2, dpi=50)
+    for write in (
+        lambda: write_film(drawn, lambda text: drawn.suptitle(text), "ab", tmp_path, 5.0),
+        lambda: save(drawn, tmp_path / "picture"),
+    ):
+        file = write()
+        whole = file.read_bytes()
+        with files_of_at_most(len(whole) - 1), pytest.raises(OSError) as raised:
+            write()
+        assert raised.value.filename == str(file) and file.read_bytes() == whole
 
 
 def test_a_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
