@@ -32,8 +32,8 @@ def write(measured: AccuracyReport, out: Path, name: str = "recipe") -> list[Pat
         return files[:1]
     frames = ", ".join(str(n) for n in measured.frames)
     note = (
-        f"Frames {frames}; {measured.hydrophones} hydrophones computed exactly. Errors are the largest of the frames, "
-        "times their mean. Points without error are drawn on the dotted line."
+        f"Frames {frames}; {measured.hydrophones} hydrophones computed exactly. An error is the largest of the frames, "
+        "a time the mean of them. Points without error are drawn on the dotted line."
     )
     frontier_figure(f"{measured.title}: error against run time", panels, note).savefig(files[1])
     return files

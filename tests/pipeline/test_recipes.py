@@ -182,6 +182,11 @@ def test_what_is_wrong_in_a_setting_is_named_with_its_field(small_file: Path, se
     assert refused(small_file, (setting,)).startswith(message)
 
 
+def test_one_setting_needs_no_list(small_file: Path) -> None:
+    one, listed = (reading.load(small_file, sets) for sets in ("trajectory.frames=3", ["trajectory.frames=3"]))
+    assert one.frames == 3 and one.digest == listed.digest
+
+
 def test_a_kind_set_over_the_fields_of_another_says_how_to_replace_them(small_file: Path) -> None:
     message = refused(small_file, ("scene.sonar.array.kind=romanis",))
     (hint,) = message.partition("\n")[0].split("--set ")[1:]

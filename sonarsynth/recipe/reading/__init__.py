@@ -43,13 +43,13 @@ __all__ = [
 _ADAPTER: Final[TypeAdapter[Recipe]] = TypeAdapter(Recipe)
 
 
-def load(path: Path | str, sets: Sequence[str] = ()) -> Recipe:
+def load(path: Path | str, sets: str | Sequence[str] = ()) -> Recipe:
     """Read a recipe from a YAML file.
 
     Parameters
     ----------
     path: the file.
-    sets: settings `path=value` that replace fields, such as `scene.trajectory.frames=8`.
+    sets: settings `path=value` that replace fields, such as `scene.trajectory.frames=8`, or one alone.
 
     Returns
     -------
@@ -83,10 +83,10 @@ def loads(text: str, name: str = "recipe", folder: Path | str = ".", *, resolved
     return recipe_of(read_text(text, name, Path(folder).absolute()), check_files=False, resolved=resolved)
 
 
-def read(path: Path | str, sets: Sequence[str] = ()) -> Source:
+def read(path: Path | str, sets: str | Sequence[str] = ()) -> Source:
     """A recipe file as plain values with their lines, and settings over it. Raises RecipeError."""
     source = read_file(path)
-    for setting in sets:
+    for setting in [sets] if isinstance(sets, str) else sets:
         source = override(source, setting)
     return source
 
