@@ -126,6 +126,8 @@ def array_paths(
         raise ValueError(f"arrival {near[touching][0]} comes from a hydrophone")
     sign, phase = folded(arrivals.phase)
     delay, corners = _centred(arrivals)
+    occluded = arrivals.occluded.copy()
+    occluded[:, :1] &= 127  # not whether the centre is reached
     return ArrayPaths(
         delay=delay,
         direction=arrivals.direction,
@@ -142,19 +144,12 @@ def array_paths(
         corner_delays=corners,
         coherent_fraction=arrivals.coherent_fraction,
         height_delay_std=np.minimum(arrivals.height_delay_std, LONGEST_BLUR),
-        occluded=_without_centre(arrivals),
+        occluded=occluded,
         family=arrivals.family,
         modes=np.zeros((count, 0)),
         centre=arrivals.centre,
         attenuation=attenuation,
     )
-
-
-def _without_centre(arrivals: Arrivals) -> Bytes:
-    """Which hydrophones (path, byte) paths do not reach, whether they reach the centre or not."""
-    occluded = arrivals.occluded.copy()
-    occluded[:, :1] &= 127
-    return occluded
 
 
 def _centred(arrivals: Arrivals) -> tuple[Floats, Floats]:

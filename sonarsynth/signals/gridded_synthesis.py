@@ -182,8 +182,8 @@ class GriddedSynthesis(UnroundedSynthesis):
         """As `SignalSynthesis.signals`, with all made but for the sums at the hydrophones."""
         total, first, outside = self._sound(arrivals, snaps, reception)
         rate, late = reception.sonar.sampling_frequency, object.__new__(LateSignals)
-        of = {"start": reception.start + first / rate, "sampling_frequency": rate, "quantum": 0.0, "clipped": 0}
-        vars(late).update(of, outside=outside, total=total)
+        begin = {"start": reception.start + first / rate, "sampling_frequency": rate}
+        vars(late).update(begin, quantum=0.0, clipped=0, outside=outside, total=total)
         return late
 
     def _sound(

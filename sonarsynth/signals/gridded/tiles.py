@@ -24,9 +24,6 @@ MOST_TERMS = 24
 FEW = 4
 """So many paths are each steered to itself."""
 
-FAINTER = 2
-"""Families half or a quarter as loud as the loudest may err by twice or four times as much of their own."""
-
 LARGE_FAMILY = 500
 """Families of so many paths have tiles of their own: they are short, and have few modes."""
 
@@ -229,17 +226,20 @@ def _halves(trial: _Trial, views: _Views, aim: TileSettings) -> tuple[Ints, Ints
 
 def tiles(front: Wavefronts, aim: TileSettings) -> list[Tile]:
     """The tiles of predicted least cost: each is halved while that pays; the first halving may pay only with the
-    second. Paths that miss some hydrophones are apart: each of these is a node of their tiles."""
-    apart, missed = steep(front, aim.highest), front.occluded.any(axis=1)
+    second. Paths that miss some hydrophones are apart: each of these is a node of their tiles. Fainter families err as
+    much as the loudest does, by up to four times as much of their own."""
+    apart = steep(front, aim.highest)
     chosen = [_alone(np.flatnonzero(apart), front, aim)] if apart.any() else []
     large = np.bincount(front.family) >= LARGE_FAMILY
-    kind = np.where(missed, -1, front.family * large[front.family])
+    kind = front.family * large[front.family]
+    kind[front.occluded.any(axis=1)] = -1
     groups = [(np.flatnonzero(~apart & (kind == of)), of < 0) for of in (0, *np.flatnonzero(large).tolist(), -1)]
     groups = [(paths, misses) for paths, misses in groups if paths.size]
-    loud = [float(np.linalg.norm(front.amplitude[paths])) for paths, _ in groups]
+    loud = np.log2([np.abs(front.amplitude[paths]).sum() for paths, _ in groups])
     views = cache(partial(_views, front, aim))
-    for (paths, misses), own in zip(groups, loud, strict=True):
-        fainter = min(int(np.log2(max(loud) / own)), FAINTER)
+    for (paths, misses), fainter in zip(
+        groups, np.minimum(loud.max(initial=-np.inf) - loud, 2.0).astype(int).tolist(), strict=True
+    ):
         of = replace(aim, tolerance=2.0**fainter * aim.tolerance) if fainter else aim
         chosen += [_alone(paths, front, of)] if paths.size <= FEW else _tiles(paths, views(), of, misses)
     return chosen
