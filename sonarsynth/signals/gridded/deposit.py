@@ -68,8 +68,7 @@ def prepared(
     stop (Hz) is the stop edge of the filter; method is width, oversampling, precision and tolerance of
     `GriddedSynthesis`.
     """
-    samples = segment.samples
-    width, oversampling, dtype, tolerance = method
+    samples, (width, oversampling, dtype, tolerance) = segment.samples, method
     highest = highest_heard(bins, stop, tolerance, oversampling)
     bins, grid = _on_grid(bins, highest, width, oversampling, dtype)
     weights = spectral_quantiles(bins.frequency, bins.spectrum, highest)
@@ -194,12 +193,11 @@ def _hear(out: npt.NDArray[Any], sample: int, some: Wave) -> None:
 
 def _shorter(stage: Stage, length: int) -> Stage:
     """A stage of a stretch of no more than `length` samples, where that is a part of it: of fewer bins."""
-    bins, segment = stage.bins, stage.segment
+    bins, segment, rate = stage.bins, stage.segment, stage.segment.samples * stage.bins.step
     if 8 * length > 7 * segment.samples:
         return stage
-    rate, early = segment.samples * bins.step, segment.before / (segment.before + segment.after)
     wave = kernel(stage.wave.width, rate / stage.aim.highest, 2 * length, stage.dtype)
-    bins = bins.shorter(segment.samples, length, early)
+    bins = bins.shorter(segment.samples, length, segment.before / (segment.before + segment.after))
     bins, grid = _on_grid(bins, stage.aim.highest, stage.grid.width, stage.oversampling, stage.dtype)
     return stage._replace(bins=bins, segment=replace(segment, samples=length), grid=grid, wave=wave)
 

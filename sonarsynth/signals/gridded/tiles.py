@@ -235,12 +235,12 @@ def tiles(front: Wavefronts, aim: TileSettings) -> list[Tile]:
     kind[front.occluded.any(axis=1)] = -1
     groups = [(np.flatnonzero(~apart & (kind == of)), of < 0) for of in (0, *np.flatnonzero(large).tolist(), -1)]
     groups = [(paths, misses) for paths, misses in groups if paths.size]
-    loud = np.log2([np.abs(front.amplitude[paths]).sum() for paths, _ in groups])
+    sound = np.abs(front.amplitude) * (np.linalg.norm(front.modes, axis=1) if front.modes.shape[1] else 1.0)
+    loud = np.log2([sound[paths].sum() + 1e-300 for paths, _ in groups])
     views = cache(partial(_views, front, aim))
-    for (paths, misses), fainter in zip(
-        groups, np.minimum(loud.max(initial=-np.inf) - loud, 2.0).astype(int).tolist(), strict=True
-    ):
-        of = replace(aim, tolerance=2.0**fainter * aim.tolerance) if fainter else aim
+    fainter = np.minimum(loud.max(initial=-np.inf) - loud, 2.0).astype(int).tolist()
+    for (paths, misses), less in zip(groups, fainter, strict=True):
+        of = replace(aim, tolerance=2.0**less * aim.tolerance) if less else aim
         chosen += [_alone(paths, front, of)] if paths.size <= FEW else _tiles(paths, views(), of, misses)
     return chosen
 
