@@ -55,6 +55,9 @@ FAR = 1e7
 RISING = 0.15
 """Sine of the elevation above which no direct sound comes from the bottom below: a ray that turned above the array,
 where sound is faster by 1 %, comes from sqrt(0.02) at most."""
+FAINT = 1e-8
+"""Power over that of the loudest pulse (80 dB below it) under which none is looked at: signals are not so exact, and
+what comes before a snap, as a filter rings or a synthetic pulse begins, would be an earlier one at its place."""
 LOUD = 0.01
 """Power over that of the loudest pulse, of those beside which others are looked for: echoes are fainter."""
 QUIET = 2.0
@@ -170,17 +173,17 @@ class Candidates:
             top = int(beside.argmax())
             if beside[top] > least:
                 at = signals.start + (max(middle - width, first) + top) / rate
-                self._add(look(rest, at, float(beside[top])), pulse_times.half_length(sonar.band), n)
+                found = look(rest, at, float(beside[top]))
+                if np.isfinite(found.row.time):
+                    self.add(found._replace(centre=found.row.time), pulse_times.half_length(sonar.band), n)
 
-    def _add(self, found: Candidate, apart: float, cause: int) -> None:
-        """Add a pulse by how loud it is, but one within `apart` (s) of any that is known beside its `cause`."""
-        time = found.row.time
-        if not np.isfinite(time):
-            return
+    def add(self, found: Candidate, apart: float, cause: int = -1) -> None:
+        """Add a pulse by how loud it is, but none that is within `apart` (s) of any that is known beside its `cause`: a
+        fit to the flank of a pulse leads to that."""
         known = [other.row.time for n, other in enumerate(self.found) if n != cause]
-        if not any(abs(other - time) < apart for other in known):
+        if not any(abs(other - found.row.time) < apart for other in known):
             fainter = (n for n, other in enumerate(self.found) if other.power < found.power)
-            self.found.insert(next(fainter, len(self.found)), found._replace(centre=time))
+            self.found.insert(next(fainter, len(self.found)), found)
 
     def _judged(self, candidate: Candidate) -> SourceFix:
         row = candidate.row

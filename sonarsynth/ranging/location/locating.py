@@ -13,6 +13,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.candidates import (
+    FAINT,
     QUIET,
     Candidate,
     Candidates,
@@ -22,7 +23,7 @@ from sonarsynth.ranging.location.candidates import (
     quiet_bin,
     when_heard,
 )
-from sonarsynth.ranging.location.locating_method import hearing_whole, unlocatable
+from sonarsynth.ranging.location.locating_method import ahead, hearing_whole, unlocatable
 from sonarsynth.ranging.location.pulse_times import AlignedPulse, Pulse
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
@@ -51,8 +52,8 @@ Cut aside of its pulse, a tail shifts it by 1 % of that: 16 ns, or 1.5 degrees, 
 """
 CLEAR = 3e4
 """Energy of a pulse at a sensor over that of the noise in a bin, above which so few sensors are tried."""
-UNHEARD = 1e-3
-"""Noise of the quiet over that of a pulse, below which so few sensors tell the time of a pulse as well as all."""
+ALONE = 2.0
+"""Noise of a longer window, over the share of it that is longer, up to which a pulse is alone in that."""
 ROBUST_ROUNDS = 3
 """Reweightings that turn outliers out of the first fit, at most."""
 FIRST_STEPS = 3
@@ -100,7 +101,7 @@ def locate(
     loud, count = loudness(signals, elements.gain != 0, width), int(np.count_nonzero(elements.gain))
     rounding = pulse_times.rounding(signals, loud.peak, short)
     quiet = quiet_bin(loud.quiet, count, sonar.band, short)
-    least = QUIET * max(loud.quiet, count * rounding * rate / (2 * short))
+    least = max(QUIET * max(loud.quiet, count * rounding * rate / (2 * short)), FAINT * float(loud.track.max()))
     known = SonarKnowledge(
         elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink, reflected
     )
@@ -114,7 +115,7 @@ def locate(
         top = _loudest(track, candidates, signals, snaps)
         if top is None or not track[top] > least:
             break
-        candidates.found.append(look(signals, signals.start + top / rate, float(track[top])))
+        candidates.add(look(signals, signals.start + top / rate, float(track[top])), short)
         track[max(top - width, 0) : top + width + 1] = 0.0
     if snaps > 1:
         candidates.look_beside(signals, receiver.track, width, least, look)
@@ -136,7 +137,7 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
     fitted = fit_pulse(signals, elements, sonar, centre, half, knowledge.velocity, knowledge.quiet)
     if isinstance(fitted, int):
         return refused(fitted)
-    wave, pulse, elements = fitted
+    wave, pulse, elements = ahead(fitted[0], elements), *fitted[1:]
     longer = max(round(0.5 * pulse.window / pulse_times.half_length(sonar.band)), 1)  # so much more noise is in a bin
     knowledge = replace(knowledge, rounding=longer * knowledge.rounding, quiet=longer * knowledge.quiet)
     if pulse.share > SHARED and pulse.noise > AUDIBLE * knowledge.quiet:
@@ -187,26 +188,29 @@ def fit_pulse(
     aligned = _aligned(signals, elements, sonar, wave, velocity, quiet)
     if isinstance(aligned, int):
         return aligned
-    wave, pulse, elements, longer = aligned
+    wave, pulse, moved, longer = aligned
     if not np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum()) < MAX_LAG / sonar.band.centre:
         return UNFIT
     if pulse.one_tone(SHARED) and not off < PERIODS_OFF / sonar.band.centre:
         return UNRESOLVED
     if pulse_times.cuts_tails(sonar.band) or pulse_times.null_in_band(elements, sonar, wave.direction):
-        some, longer = rows if quiet < UNHEARD * pulse.noise else slice(None), longer * pulse_times.LONGER
-        heard = _excerpt(signals, some, wave.time, half + longer * pulse_times.half_length(sonar.band))
-        window = _in_window(heard, elements.select(some), sonar, wave, longer, pulse.noise_to_signal)
-        pulse = replace(pulse, longer=window[1])
-    return wave, pulse, elements
+        window = longer * pulse_times.LONGER, pulse.noise_to_signal
+        whole = _aligned(signals, elements, sonar, wave, velocity, quiet, *window)
+        if not isinstance(whole, int):
+            quieter = whole[1].noise < ALONE * pulse_times.LONGER * pulse.noise
+            wave, moved = (whole[0], whole[2]) if quieter else (wave, moved)
+            pulse = replace(whole[1], other=pulse) if quieter else replace(pulse, other=whole[1])
+    return wave, pulse, moved
 
 
 def _aligned(
-    signals: Signals, elements: Elements, sonar: Sonar, wave: Wavefront, velocity: Floats, quiet: float
-) -> tuple[Wavefront, Pulse, Elements, float] | int:
+    signals: Signals, elements: Elements, sonar: Sonar, wave: Wavefront, velocity: Floats, quiet: float,
+    longer: float = 1.0, deaf: float = pulse_times.DEAF,
+) -> tuple[Wavefront, Pulse, Elements, float] | int:  # fmt: skip
     """As `fit_pulse`, from a wavefront that sensors are aligned on; and in how many times as long a window as a snap's
-    the pulse was measured."""
+    the pulse was measured: `longer` at least. deaf: as for `pulse_times.waveform`."""
     c, q, rest = sonar.assumed_sound_speed, elements.position, elements
-    aligned, longer, expected = None, 1.0, _times(wave, q, c)
+    aligned, expected = None, _times(wave, q, c)
     for _ in range(ROUNDS):
         if velocity.any():
             q = rest.position + (expected - wave.time)[:, None] * velocity
@@ -214,9 +218,9 @@ def _aligned(
         aside = ASIDE * longer * pulse_times.half_length(sonar.band)
         if anew := aligned is None or np.abs(expected - aligned.time).max() > aside:
             aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=longer)
-        pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
+        pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time, deaf)
         if anew and pulse.lasts and not (pulse.share > LOST and pulse.noise > AUDIBLE * longer * quiet):
-            whole = _whole(signals, elements, sonar, wave)
+            whole = _whole(signals, elements, sonar, wave, longer)
             if whole is None:
                 return BAND
             aligned, pulse, longer = whole
@@ -224,7 +228,7 @@ def _aligned(
         if better is None:
             return UNFIT
         wave, last, expected = better, expected, _times(better, q, c)
-        if np.abs(expected - last).max() < pulse_times.FLOOR:  # lags err by more without noise; the next by far less
+        if np.abs(expected - last).max() < pulse_times.FLOOR / longer**2:  # lags err by more; the next by far less
             break
     return wave, pulse, elements, longer
 
@@ -261,28 +265,19 @@ def _excerpt(signals: Signals, some: Ints | slice, centre: float, half: float) -
 
 
 def _whole(
-    signals: Signals, elements: Elements, sonar: Sonar, wave: Wavefront
+    signals: Signals, elements: Elements, sonar: Sonar, wave: Wavefront, longer: float
 ) -> tuple[AlignedPulse, Pulse, float] | None:
-    """A pulse that lasts longer than a snap, in a window so many times as long that holds it; None where none does, or
-    what that holds is another pulse."""
-    longer = pulse_times.LONGER
-    while longer * pulse_times.half_length(sonar.band) <= pulse_times.LONGER * pulse_times.LONGEST_HALF:
-        aligned, pulse = _in_window(signals, elements, sonar, wave, longer)
-        if pulse.aside > pulse_times.half_length(sonar.band):
+    """A pulse that lasts beyond a window so many times as long as a snap's, in one that holds it; None where none does,
+    or what that holds is another pulse."""
+    c, half = sonar.assumed_sound_speed, pulse_times.half_length(sonar.band)
+    while (longer := longer * pulse_times.LONGER) * half <= pulse_times.LONGER * pulse_times.LONGEST_HALF:
+        aligned = pulse_times.align(signals, elements, sonar.band, _times(wave, elements.position, c), longer=longer)
+        pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
+        if pulse.aside > half:
             return None
         if not pulse.lasts:
             return aligned, pulse, longer
-        longer *= pulse_times.LONGER
     return None
-
-
-def _in_window(
-    signals: Signals, elements: Elements, sonar: Sonar, wave: Wavefront, longer: float, deaf: float = pulse_times.DEAF
-) -> tuple[AlignedPulse, Pulse]:
-    """A pulse in a window so many times as long as a snap's; deaf: as for `pulse_times.waveform`."""
-    c = sonar.assumed_sound_speed
-    aligned = pulse_times.align(signals, elements, sonar.band, _times(wave, elements.position, c), longer=longer)
-    return aligned, pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time, deaf)
 
 
 def _times(wave: Wavefront, position: Floats, sound_speed: float) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description.method import FrameSize, Method, returned_rows
+from sonarsynth.equations.arrays.spherical_wave import Wavefront
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.receiver import Band, Elements
 from sonarsynth.state import Emission, Receiver, Survey, Trigger
@@ -60,13 +61,32 @@ class LocatingMethod(Method):
 @lru_cache(maxsize=16)
 def unlocatable(elements: Elements) -> str | None:
     """Why an array can locate nothing; None where it can."""
-    live = elements.position[elements.gain != 0]
-    if len(live) < 3:
-        return f"{len(live)} live hydrophone{'s' * (len(live) != 1)}: a direction needs three that are not in line"
-    spread = np.linalg.svd(live - live.mean(axis=0), compute_uv=False)
+    live, spread, _ = _extent(elements)
+    if live < 3:
+        return f"{live} live hydrophone{'s' * (live != 1)}: a direction needs three that are not in line"
     if not spread[1] > 1e-6 * spread[0]:
         return "the live hydrophones are in one line or in one place: they cannot tell a direction"
     return None
+
+
+def ahead(wave: Wavefront, elements: Elements) -> Wavefront:
+    """A wave, or what is heard alike by sensors that are in one plane: its image ahead of them where it comes from
+    behind."""
+    _, spread, axes = _extent(elements)
+    normal = axes[2]
+    if spread[2] > 1e-6 * spread[0] or not normal[0] * (wave.direction @ normal) < 0:
+        return wave
+    mirror = np.eye(3) - 2.0 * np.outer(normal, normal)
+    return replace(wave, direction=mirror @ wave.direction, tangents=wave.tangents @ mirror)
+
+
+@lru_cache(maxsize=16)
+def _extent(elements: Elements) -> tuple[int, Floats, Floats]:
+    """How many sensors are live, and how far (3,) m they reach along which axes (3, xyz), widest first."""
+    live = elements.position[elements.gain != 0]
+    about = live - live.mean(axis=0) if len(live) else live
+    _, spread, axes = np.linalg.svd(np.vstack([about, np.zeros((3, 3))]), full_matrices=False)
+    return len(live), spread, axes
 
 
 def hearing_whole(signals: Signals, elements: Elements, times: Floats, half: float) -> Elements | None:

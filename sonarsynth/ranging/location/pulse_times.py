@@ -27,9 +27,9 @@ CUT = 0.1
 """Of the peak of the envelope: what is louder where the window falls is a pulse that lasts longer, whose time and whose
 lags would be in part those of the window: it is looked at in one `LONGER` times as long."""
 LONGER = 3.0
-"""Where faces have a null in the band, the waveform holds much more of what cutting the pulse's tail off adds: its peak
-erred by up to 88 ns (4.2 cm, 70 deg), 2.1 us (11.8 cm, 49 deg, 10 to 34 kHz), and in bands of 2.4 kHz, whose pulses
-last long, by 3 us; and by under 1 ns, 95 ns and 40 ns as measured over a window so many times as long."""
+"""Where faces have a null in the band, or that is low, a window cuts off tails that each hydrophone hears otherwise.
+They move the peak by up to 88 ns (4.2 cm, 70 deg), 2.1 us (11.8 cm, 49 deg, 10 to 34 kHz) and 3 us (a band of 2.4 kHz), and
+bend the wavefront by 3 ns (1.4 m, 49 deg); by under 1 ns, 95 ns, 40 ns and 0.1 ns in one so many times as long."""
 DEAF = 1e-4
 """Mean square response (of one sensor on its axis) below which a bin counts as not heard at all."""
 DEAFEST = 1e-8
@@ -61,8 +61,8 @@ class Pulse:
     rest: float  # (Pa s)^2: the same of all that the model does not explain
     power: Floats  # (bin,) sum over sensors of their responses squared: so much less noise is in the template
     share: float  # of the power of the pulse at the sensors: not explained by the model, or twice what is out of phase
-    longer: Pulse | None = None  # over a longer window, where faces have a null in the band or tails are cut
     deaf: float = DEAF  # as for `waveform`
+    other: Pulse | None = None  # by a longer window, or a shorter, where that of a snap cuts off tails
 
     @property
     def window(self) -> float:
@@ -251,7 +251,7 @@ def measure(
     share = min(left, noise) / power if power > 0 else 1.0
     free = max((int(np.count_nonzero(elements.gain)) - 1) * len(omega), 1)
     many = noise / free, left / free
-    return Pulse(aligned.frequency, wave.template, time, lag, weight, *many, wave.power, share, None, deaf)
+    return Pulse(aligned.frequency, wave.template, time, lag, weight, *many, wave.power, share, deaf)
 
 
 def lag_variance(wave: Wavefront, pulse: Pulse, elements: Elements, rounding: float, half: float = PULSE_HALF) -> float:

@@ -182,12 +182,12 @@ def _straight_covariance(
         full[3, 3] += (bent / (2.0 * np.pi * sonar.band.centre)) ** 2
     elif knowledge.reflected and not knowledge.on_bottom:
         depth, seen = knowledge.bottom_depth, (wave.tangents @ up, up @ wave.direction, wave.curvature, full)
-        both = pulse, pulse.longer or pulse
-        spread = [envelope_spread(p.frequency, p.template, sonar.band.low, sonar.band.high) for p in both]
-        short, time = (_peak(p, sonar, knowledge.rounding)[0] for p in both)
-        windows = pulse.window, both[1].window, LEFT_OF_IMAGE * abs(float(np.nan_to_num(time - short)))
+        spread = envelope_spread(pulse.frequency, pulse.template, sonar.band.low, sonar.band.high)
+        short, time = (_peak(p, sonar, knowledge.rounding)[0] for p in (pulse.other or pulse, pulse))
+        left = LEFT_OF_IMAGE * abs(float(np.nan_to_num(time - short)))
         for height in (-own, -depth - own):
-            full = full + image_covariance(*seen, height, sonar.assumed_sound_speed, spread, windows, deepest=depth)
+            image = height, sonar.assumed_sound_speed, spread, pulse.window
+            full = full + image_covariance(*seen, *image, left=left, deepest=depth)
     return full
 
 
@@ -272,9 +272,9 @@ def _arrival(pulse: Pulse, fitted: float, sonar: Sonar, rounding: float) -> tupl
     The error is that of `_peak` and that of the wavefront's time, of variance `fitted` (s2), which pulses do not show.
     """
     time, error = _peak(pulse, sonar, rounding)
-    if pulse.longer is not None:
-        short, (time, error) = time, _peak(pulse.longer, sonar, rounding)
-        error = float(np.hypot(error, LEFT * np.nan_to_num(time - short)))
+    if pulse.other is not None:
+        left = LEFT if pulse.window > pulse.other.window else 1.0
+        error = float(np.hypot(error, left * np.nan_to_num(time - _peak(pulse.other, sonar, rounding)[0])))
     return time, float(np.hypot(error, np.sqrt(fitted)))
 
 
