@@ -25,7 +25,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.location.plane_waves import PlaneWaveFit, without
+from sonarsynth.ranging.location.plane_waves import PlaneWaveFit, accompanied, without
 from sonarsynth.ranging.location.source_position import (
     ACCEPTED,
     ECHO,
@@ -150,37 +150,39 @@ class Candidates:
         self, signals: Signals, track: Track | None, width: int, least: float,
         look: Callable[[Signals, float, float], Candidate],
     ) -> None:  # fmt: skip
-        """Add pulses that are heard within `width` samples of a louder one, and are louder than `least` (Pa2): by
-        `look` at the signals without that one."""
+        """Add pulses that are heard within `width` samples of louder ones, and are louder than `least` (Pa2): by `look`
+        at the signals without those."""
         elements, sonar, rate = self.known.elements, self.known.sonar, signals.sampling_frequency
-        loudest = max((candidate.power for candidate in self.found), default=0.0)
-        for candidate in tuple(self.found):
-            row, n = candidate.row, self.found.index(candidate)
-            if row.reason not in (ACCEPTED, RANGE) or candidate.power < LOUD * loudest:
-                continue
-            self.found[n] = candidate._replace(centre=row.time)  # the loudest window may have held both
-            front, own = PlaneWaveFit(row.chord, row.curvature[0], row.time), when_heard(self.known, track, row.time)
-            late = front.delays(elements, sonar.assumed_sound_speed) - row.time
-            moved = replace(elements, position=elements.position + late[:, None] * own.velocity)
-            rest = without(signals, moved, sonar, front, width / rate)
-            if rest is None:
-                continue
-            middle = round((row.time - signals.start) * rate)
-            first = max(middle - 2 * width, 0)
-            cut = replace(rest, pressure=np.ascontiguousarray(rest.pressure[:, first : middle + 2 * width]))
-            heard = loudness(cut, elements.gain != 0, width).track
-            beside = heard[max(middle - width - first, 0) : middle + width + 1 - first]
-            top = int(beside.argmax())
-            if beside[top] > least:
-                at = signals.start + (max(middle - width, first) + top) / rate
-                found = look(rest, at, float(beside[top]))
+        loudest, heard = max((candidate.power for candidate in self.found), default=0.0), []
+        for n, (_, power, row) in enumerate(self.found):
+            if row.reason in (ACCEPTED, RANGE) and power >= LOUD * loudest:
+                self.found[n] = Candidate(row.time, power, row)  # the loudest window may have held others
+                front, own = (
+                    PlaneWaveFit(row.chord, row.curvature[0], row.time),
+                    when_heard(self.known, track, row.time),
+                )
+                late = front.delays(elements, sonar.assumed_sound_speed) - row.time
+                heard.append((replace(elements, position=elements.position + late[:, None] * own.velocity), front))
+        crowded = [front.time for moved, front in heard if accompanied(signals, moved, sonar, front, width / rate)]
+        if not crowded:
+            return
+        rest = without(signals, heard, sonar)
+        left = loudness(rest, elements.gain != 0, width).track
+        for time in crowded:
+            middle = round((time - signals.start) * rate)
+            first = max(middle - width, 0)
+            top = first + int(left[first : middle + width + 1].argmax())
+            power = float(left[top])
+            left[max(top - width, 0) : top + width + 1] = 0.0
+            if power > least:
+                found = look(rest, signals.start + top / rate, power)
                 if np.isfinite(found.row.time):
-                    self.add(found._replace(centre=found.row.time), pulse_times.half_length(sonar.band), n)
+                    self.add(found._replace(centre=found.row.time), pulse_times.half_length(sonar.band), time)
 
-    def add(self, found: Candidate, apart: float, cause: int = -1) -> None:
-        """Add a pulse by how loud it is, but none that is within `apart` (s) of any that is known beside its `cause`: a
-        fit to the flank of a pulse leads to that."""
-        known = [other.row.time for n, other in enumerate(self.found) if n != cause]
+    def add(self, found: Candidate, apart: float, beside: float = np.nan) -> None:
+        """Add a pulse by how loud it is, but none that is within `apart` (s) of any that is known, but for the one at
+        `beside` (s): a fit to the flank of a pulse leads to that."""
+        known = [other.row.time for other in self.found if other.row.time != beside]
         if not any(abs(other - found.row.time) < apart for other in known):
             fainter = (n for n, other in enumerate(self.found) if other.power < found.power)
             self.found.insert(next(fainter, len(self.found)), found)

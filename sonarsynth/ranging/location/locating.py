@@ -124,7 +124,7 @@ def locate(
 
 def _loudest(track: Floats, candidates: Candidates, signals: Signals, snaps: int) -> int | None:
     """Where the signals are loudest; once enough snaps are found, before the first of them: it may be an echo."""
-    if candidates.accepted < snaps:
+    if len(candidates.found) < snaps or candidates.accepted < snaps:
         return int(track.argmax())
     first = min(candidate.centre for candidate in candidates.found if candidate.row.reason in (ACCEPTED, RANGE))
     before = track[: max(round((first - signals.start) * signals.sampling_frequency), 0)]
@@ -184,7 +184,9 @@ def fit_pulse(
         heard = _excerpt(signals, rows, wave.time, half + pulse_times.half_length(sonar.band))
         own = velocity[rows] if velocity.any() else velocity
         settled = _aligned(heard, elements.select(rows), sonar, wave, own, quiet)
-        wave = wave if isinstance(settled, int) else settled[0]
+        if isinstance(settled, int):
+            return settled
+        wave = settled[0]
     aligned = _aligned(signals, elements, sonar, wave, velocity, quiet)
     if isinstance(aligned, int):
         return aligned

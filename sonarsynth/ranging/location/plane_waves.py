@@ -159,8 +159,8 @@ def part_of(
     return WindowSegment(front, arrival, irfft(back, 2 * samples, axis=1))
 
 
-def without(signals: Signals, elements: Elements, sonar: Sonar, front: PlaneWaveFit, reach: float) -> Signals | None:
-    """Signals without the pulse on a wavefront; None where nothing within `reach` (s) of it is `BESIDE` as loud."""
+def accompanied(signals: Signals, elements: Elements, sonar: Sonar, front: PlaneWaveFit, reach: float) -> bool:
+    """Whether anything within `reach` (s) of the pulse on a wavefront is `BESIDE` as loud."""
     rate, half = signals.sampling_frequency, OWN * pulse_times.half_length(sonar.band)
     some = np.flatnonzero(elements.gain)[:: max(elements.count // FEW, 1)]
     first = np.floor((front.delays(elements, sonar.assumed_sound_speed) - signals.start) * rate).astype(int)
@@ -168,9 +168,16 @@ def without(signals: Signals, elements: Elements, sonar: Sonar, front: PlaneWave
     index, samples = first[some, None] + late, signals.pressure.shape[1]
     heard = signals.pressure[some[:, None], np.clip(index, 0, samples - 1)] * ((index >= 0) & (index < samples))
     power, own = np.einsum("qt,qt->t", heard, heard), np.abs(late) <= half * rate
-    if not power[~own].sum() > BESIDE * power[own].sum():
-        return None
-    return subtract(signals, part_of(signals, elements, sonar, front, half))[0]
+    return bool(power[~own].sum() > BESIDE * power[own].sum())
+
+
+def without(signals: Signals, pulses: list[tuple[Elements, PlaneWaveFit]], sonar: Sonar) -> Signals:
+    """Signals without the pulses on wavefronts, one after the other; where sensors are as each comes."""
+    rest, half = replace(signals, pressure=signals.pressure.copy()), OWN * pulse_times.half_length(sonar.band)
+    for elements, front in pulses:
+        segment = part_of(rest, elements, sonar, front, half)
+        plane_wave_kernels.add(rest.pressure, segment.place, segment.wave, -1.0)
+    return rest
 
 
 def subtract(signals: Signals, segment: WindowSegment) -> tuple[Signals, float]:

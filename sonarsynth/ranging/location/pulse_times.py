@@ -28,7 +28,7 @@ CUT = 0.1
 lags would be in part those of the window: it is looked at in one `LONGER` times as long."""
 LONGER = 3.0
 """Where faces have a null in the band, or that is low, a window cuts off tails that each hydrophone hears otherwise.
-They move the peak by up to 88 ns (4.2 cm, 70 deg), 2.1 us (11.8 cm, 49 deg, 10 to 34 kHz) and 3 us (a band of 2.4 kHz), and
+They move the peak by up to 88 ns (4.2 cm, 70 deg), 2.1 us (11.8 cm, 49 deg, 10 to 34 kHz) and 3 us (2.4 kHz wide), and
 bend the wavefront by 3 ns (1.4 m, 49 deg); by under 1 ns, 95 ns, 40 ns and 0.1 ns in one so many times as long."""
 DEAF = 1e-4
 """Mean square response (of one sensor on its axis) below which a bin counts as not heard at all."""
