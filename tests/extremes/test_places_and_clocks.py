@@ -43,9 +43,12 @@ def same(one: ss.Recipe, other: ss.Recipe, error: float = 1e-6) -> None:
     peak = np.abs(a["signals/pressure"].values).max()
     assert np.abs(a["signals/pressure"].values - b["signals/pressure"].values).max() <= error * peak > 0.0
     assert int(a["source_estimates/reason"][0]) == 0 and int(a["cloud/count"]) > 0
-    for name in ("signals/start", "source_estimates/time", "source_estimates/position", "cloud/range", "cloud/azimuth"):
+    for name in ("signals/start", "source_estimates/time", "source_estimates/position"):
         largest = np.nanmax(np.abs(a[name].values))
         np.testing.assert_allclose(a[name].values, b[name].values, rtol=0.0, atol=2e-6 * largest, err_msg=name)
+    for name in ("cloud/range", "cloud/azimuth"):  # beams of 4 degrees: of these the rounding of signals moves peaks
+        late = np.abs(a[name].values - b[name].values) / a[f"{name}_error"].values
+        assert np.nanmax(late) < 1e-5 and (np.isnan(a[name].values) == np.isnan(b[name].values)).all(), name
 
 
 @pytest.mark.parametrize("away", [(1e4, 0.0), (9e5, -9e5)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sonarsynth.conventions import Floats
@@ -52,12 +54,12 @@ def bending_covariance(
 
 def image_covariance(
     by_angle: Floats, slope: float, curvature: float, covariance: Floats, height: float, sound_speed: float,
-    spread: float, window: float, *, left: float, deepest: float,
+    spread: Sequence[float], windows: tuple[float, float, float], *, deepest: float,
 ) -> Floats:  # fmt: skip
     """Covariance (4, 4) of a wavefront's parameters where a source may be next to a boundary that mirrors it.
 
     The pulse of its image is later by t = 2 d |sin a|/c, d the distance from the boundary, a the grazing angle. Where t
-    is within half of the window in which they are measured, they are heard as one, from between them by their powers:
+    is within half of the window in which lags are measured, they are heard as one, from between them by their powers:
     off by what the spread (s) of both together says, times c/|sin a|. Of later ones what is left in the window moves
     lags by (window/2t)^4 of that. The time moves by the spread, where pulses overlap and where either may be taken for
     the pulse; of what is heard apart, by (2 spread/t)^2 of that. Errors of 2 000 places 0.02 to 3 m from surface or
@@ -65,17 +67,18 @@ def image_covariance(
 
     slope is the sine of the elevation of the wavefront, by_angle (2,) its derivatives along the tangents, curvature
     that of the wave (1/m), covariance (4, 4) what they err by besides; height (m): of the boundary over the array,
-    negative below it; spread (s): `spherical_wave.envelope_spread` of the pulse; window (s): in which it is measured;
-    left (s): by how much its time errs where that holds the image; deepest (m): most that a source may be from the
-    boundary; sound_speed: m/s.
+    negative below it; spread: `spherical_wave.envelope_spread` of the pulse as lags, and as the time, are measured by;
+    windows (s): of lags, of the time, and by how much that errs where it holds the image; deepest (m): most that a
+    source may be from the boundary; sound_speed: m/s.
     """
     if not slope * height > 0:
         return np.zeros((4, 4))
     near, row = slope / height, np.array([*by_angle, -height])
     error = WITHIN * float(np.sqrt(row @ covariance[:3, :3] @ row))
     later = max(2.0 * (abs(curvature * height - slope) - error) * abs(height) / sound_speed, 1e-300)
-    moved = min(spread * sound_speed / abs(slope) * min(0.5 * window / later, 1.0) ** 4, deepest)
+    moved = min(spread[0] * sound_speed / abs(slope) * min(0.5 * windows[0] / later, 1.0) ** 4, deepest)
     column = moved * np.array([*by_angle * near, -slope * near**2, 0.0])
     covariance = np.outer(column, column)
-    covariance[3, 3] = (spread * min(2.0 * spread / later, 1.0) ** 2) ** 2 + left**2 * (later < 0.5 * window)
+    covariance[3, 3] = (spread[1] * min(2.0 * spread[1] / later, 1.0) ** 2) ** 2
+    covariance[3, 3] += windows[2] ** 2 * (later < 0.5 * windows[1])
     return covariance

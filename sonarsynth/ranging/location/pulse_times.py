@@ -38,9 +38,8 @@ NEXT_TO_NULL = 1e3
 """Next to a null of the faces more is in doubt than noise: it counts as so many times its power. Times of `grid.yaml`
 58 degrees and more off the axis err by 3.0 ns by once, and by that 2.7: 1.2 and 1.1 of what is predicted."""
 FLOOR = 1e-9
-"""Standard error (s) of a lag without any noise: what cutting the pulse's tail off does, by windows of `PULSE_HALF`; by
-longer ones, of pulses that last longer, as much more. Biases of 0.01 to 0.2 ns of curvature at the rim have been seen,
-which is what independent errors six times as large would leave."""
+"""Standard error (s) of a lag without any noise: what cutting the pulse's tail off does, by windows of `PULSE_HALF`;
+more by longer ones of pulses that last. 0.01 to 0.2 ns of curvature at the rim are as of errors six times as large."""
 FINE = 256
 """Samples of an envelope at least: at the 18 of a band of 3 kHz peaks err by 5 us, more than aligning can undo; and
 where there are two, which is the higher follows from where samples fall."""
@@ -68,6 +67,12 @@ class Pulse:
     def window(self) -> float:
         """Length (s) of the window that it was cut out with."""
         return float(1.0 / (self.frequency[1] - self.frequency[0])) if len(self.frequency) > 1 else 0.0
+
+    @property
+    def by_window(self) -> tuple[Pulse, Pulse]:
+        """Itself by the shorter and by the longer window of those that it was measured by."""
+        other = self.other or self
+        return (self, other) if self.window < other.window else (other, self)
 
     @property
     def lasts(self) -> bool:
@@ -111,19 +116,15 @@ def cuts_tails(band: Band) -> bool:
 
 
 def null_in_band(elements: Elements, sonar: Sonar, direction: Floats) -> bool:
-    """Whether faces hear nothing of a wave from a direction (xyz, sonar frame) at a frequency in the band.
-
-    That is where they are a whole number of wavelengths wide along it. The bins, as few as 7, may lie beside it.
-    """
+    """Whether faces hear nothing of a wave from a direction (xyz, sonar frame) at a frequency in the band: they are a
+    whole number of wavelengths wide along it. The bins, as few as 7, may lie beside it."""
     across = np.abs(direction[1:]) * elements.face / sonar.assumed_sound_speed  # s, from edge to edge
     return bool(np.any(np.floor(across * sonar.band.high) > np.floor(across * sonar.band.low)))
 
 
 def rounding(signals: Signals, peak: float, half: float = PULSE_HALF) -> float:
-    """Mean power in a bin, (Pa s)^2, of what the converter (a count) and single precision (of `peak`, Pa) round off.
-
-    Of spectra of 2 `half` (s).
-    """
+    """Mean power in a bin, (Pa s)^2, of what the converter (a count) and single precision (of `peak`, Pa) round off, of
+    spectra of 2 `half` (s)."""
     step = signals.quantum**2 + (float(np.finfo(np.float32).eps) * peak) ** 2
     return step / 12 * 2 * half / signals.sampling_frequency
 

@@ -182,12 +182,12 @@ def _straight_covariance(
         full[3, 3] += (bent / (2.0 * np.pi * sonar.band.centre)) ** 2
     elif knowledge.reflected and not knowledge.on_bottom:
         depth, seen = knowledge.bottom_depth, (wave.tangents @ up, up @ wave.direction, wave.curvature, full)
-        spread = envelope_spread(pulse.frequency, pulse.template, sonar.band.low, sonar.band.high)
-        short, time = (_peak(p, sonar, knowledge.rounding)[0] for p in (pulse.other or pulse, pulse))
-        left = LEFT_OF_IMAGE * abs(float(np.nan_to_num(time - short)))
+        both = pulse, pulse.by_window[1]
+        spread = [envelope_spread(p.frequency, p.template, sonar.band.low, sonar.band.high) for p in both]
+        short, time = (_peak(p, sonar, knowledge.rounding)[0] for p in pulse.by_window)
+        windows = pulse.window, both[1].window, LEFT_OF_IMAGE * abs(float(np.nan_to_num(time - short)))
         for height in (-own, -depth - own):
-            image = height, sonar.assumed_sound_speed, spread, pulse.window
-            full = full + image_covariance(*seen, *image, left=left, deepest=depth)
+            full = full + image_covariance(*seen, height, sonar.assumed_sound_speed, spread, windows, deepest=depth)
     return full
 
 
@@ -271,18 +271,17 @@ def _arrival(pulse: Pulse, fitted: float, sonar: Sonar, rounding: float) -> tupl
 
     The error is that of `_peak` and that of the wavefront's time, of variance `fitted` (s2), which pulses do not show.
     """
-    time, error = _peak(pulse, sonar, rounding)
-    if pulse.other is not None:
-        left = LEFT if pulse.window > pulse.other.window else 1.0
-        error = float(np.hypot(error, left * np.nan_to_num(time - _peak(pulse.other, sonar, rounding)[0])))
+    short, longer = pulse.by_window
+    time, error = _peak(longer, sonar, rounding)
+    if longer is not short:
+        error = float(np.hypot(error, LEFT * np.nan_to_num(time - _peak(short, sonar, rounding)[0])))
     return time, float(np.hypot(error, np.sqrt(fitted)))
 
 
 def _peak(pulse: Pulse, sonar: Sonar, rounding: float) -> tuple[float, float]:
     """When (s) the envelope of the mean pulse peaks, and the standard error of that (s) in all that the model does not
     explain: what is in phase with it changes its shape."""
-    # `waveform` holds it down
-    undamped = np.minimum(1 + pulse.deaf * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)
+    undamped = np.minimum(1 + pulse.deaf * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)  # of `waveform`
     noise = max(pulse.noise, pulse.rest, rounding) / np.maximum(pulse.power, 1e-300)
     low, high = sonar.band.low, sonar.band.high
     time, error = envelope_peak(pulse.frequency, pulse.template * undamped, low, high, noise)
