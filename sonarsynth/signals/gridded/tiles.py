@@ -235,7 +235,8 @@ def tiles(front: Wavefronts, aim: TileSettings) -> list[Tile]:
     kind[front.occluded.any(axis=1)] = -1
     groups = [(np.flatnonzero(~apart & (kind == of)), of < 0) for of in (0, *np.flatnonzero(large).tolist(), -1)]
     groups = [(paths, misses) for paths, misses in groups if paths.size]
-    sound = np.abs(front.amplitude) * (np.linalg.norm(front.modes, axis=1) if front.modes.shape[1] else 1.0)
+    shape = np.einsum("pm,pm->p", front.modes, front.modes) if front.modes.shape[1] else 1.0
+    sound = np.abs(front.amplitude) * np.sqrt(shape)
     loud = np.log2([sound[paths].sum() + 1e-300 for paths, _ in groups])
     views = cache(partial(_views, front, aim))
     fainter = np.minimum(loud.max(initial=-np.inf) - loud, 2.0).astype(int).tolist()
