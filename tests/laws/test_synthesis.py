@@ -281,20 +281,6 @@ def test_kernel_deposit_is_the_exact_sum(distance: float, refracted: bool) -> No
     assert got.pressure.dtype == np.float32
 
 
-@pytest.mark.parametrize("blur", [0.0, 9e-6])
-def test_of_families_all_together_the_bound_is_kept(blur: float) -> None:
-    """Families of many paths are synthesised apart; a fainter one may err by more of its own, beside a louder one, but
-    not beside one of which blur leaves little."""
-    of, faint = target_at(20.0, 1200, 31, direct=False), np.arange(1200) >= 600
-    of = replace(of, lit_by=faint.astype(of.lit_by.dtype), amplitude=of.amplitude * np.where(faint, 0.1, 1.0))
-    of = replace(of, delay_std=np.where(faint, 0.0, blur))
-    hears = hearing(of, SONAR, FACES, absorption)
-    for some in (of, of.select(faint)):
-        exact, _ = DirectSum().pressure(some, SNAPS, hears._replace(elements=some_of(FACES, 127)))
-        for method in (GriddedSynthesis(), GriddedSynthesis(width=8, tolerance=1e-3)):
-            assert error(method.signals(some, SNAPS, hears).pressure[::127], exact) < deposit_error(method)
-
-
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
 @pytest.mark.parametrize("refracted", [False, True])
 def test_few_hydrophones_hear_as_exactly_as_many(count: int, refracted: bool) -> None:

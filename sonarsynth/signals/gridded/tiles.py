@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache, partial
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -226,23 +226,17 @@ def _halves(trial: _Trial, views: _Views, aim: TileSettings) -> tuple[Ints, Ints
 
 def tiles(front: Wavefronts, aim: TileSettings) -> list[Tile]:
     """The tiles of predicted least cost: each is halved while that pays; the first halving may pay only with the
-    second. Paths that miss some hydrophones are apart: each of these is a node of their tiles. Fainter families err as
-    much as the loudest does, by up to four times as much of their own."""
+    second. Paths that miss some hydrophones are apart: each of these is a node of their tiles."""
     apart = steep(front, aim.highest)
     chosen = [_alone(np.flatnonzero(apart), front, aim)] if apart.any() else []
     large = np.bincount(front.family) >= LARGE_FAMILY
     kind = front.family * large[front.family]
     kind[front.occluded.any(axis=1)] = -1
     groups = [(np.flatnonzero(~apart & (kind == of)), of < 0) for of in (0, *np.flatnonzero(large).tolist(), -1)]
-    groups = [(paths, misses) for paths, misses in groups if paths.size]
-    shape = np.einsum("pm,pm->p", front.modes, front.modes) if front.modes.shape[1] else 1.0
-    sound = np.abs(front.amplitude) * np.sqrt(shape)
-    loud = np.log2([sound[paths].sum() + 1e-300 for paths, _ in groups])
-    views = cache(partial(_views, front, aim))
-    fainter = np.minimum(loud.max(initial=-np.inf) - loud, 2.0).astype(int).tolist()
-    for (paths, misses), less in zip(groups, fainter, strict=True):
-        of = replace(aim, tolerance=2.0**less * aim.tolerance) if less else aim
-        chosen += [_alone(paths, front, of)] if paths.size <= FEW else _tiles(paths, views(), of, misses)
+    chosen += [_alone(paths, front, aim) for paths, _ in groups if 0 < paths.size <= FEW]
+    if many := [group for group in groups if group[0].size > FEW]:
+        views = _views(front, aim)
+        chosen += [tile for paths, misses in many for tile in _tiles(paths, views, aim, misses)]
     return chosen
 
 
