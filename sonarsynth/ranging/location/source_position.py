@@ -159,7 +159,7 @@ def place(
         reason=reason,
         curvature=(wave.curvature, float(np.sqrt(full[2, 2]))),
         chord=wave.direction,
-        amplitude=float(np.sqrt(np.sum(np.abs(pulse.template) ** 2))),
+        amplitude=float(np.linalg.norm(pulse.by_window[0].template)),  # all by windows as long
     )
 
 
