@@ -70,6 +70,13 @@ class LateSignals(Signals):
     """Signals that are summed at the hydrophones when their pressure is first looked at. What is made before is small:
     made for some frames, one after the other, it stays in the caches of a core."""
 
+    @classmethod
+    def of(cls, total: Callable[[], npt.NDArray[Any]], start: float, rate: float, outside: int) -> LateSignals:
+        """total: gives the pressure; the others as in `Signals`."""
+        late = object.__new__(cls)
+        vars(late).update(total=total, start=start, sampling_frequency=rate, quantum=0.0, clipped=0, outside=outside)
+        return late
+
     @cached_property
     def pressure(self) -> npt.NDArray[np.float32]:
         """(sensor, sample) Pa."""
@@ -181,10 +188,8 @@ class GriddedSynthesis(UnroundedSynthesis):
     def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
         """As `SignalSynthesis.signals`, with all made but for the sums at the hydrophones."""
         total, first, outside = self._sound(arrivals, snaps, reception)
-        rate, late = reception.sonar.sampling_frequency, object.__new__(LateSignals)
-        begin = {"start": reception.start + first / rate, "sampling_frequency": rate}
-        vars(late).update(begin, quantum=0.0, clipped=0, outside=outside, total=total)
-        return late
+        rate = reception.sonar.sampling_frequency
+        return LateSignals.of(total, reception.start + first / rate, rate, outside)
 
     def _sound(
         self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception

@@ -195,7 +195,7 @@ def image_axes(axes: Axes, azimuth: Floats, elevation: Floats, least: float = -D
 
     colours = colormaps[ENERGY_MAP].with_extremes(bad=ABSENT)
     (left, right), (low, high) = edges(azimuth), edges(elevation)
-    blank = np.ma.masked_all((len(elevation), len(azimuth)))
+    blank = np.ma.array(np.zeros((len(elevation), len(azimuth))), mask=True)
     image = axes.imshow(
         blank,
         extent=(right, left, low, high),
