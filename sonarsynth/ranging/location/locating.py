@@ -53,7 +53,8 @@ Cut aside of its pulse, a tail shifts it by 1 % of that: 16 ns, or 1.5 degrees, 
 CLEAR = 3e4
 """Energy of a pulse at a sensor over that of the noise in a bin, above which so few sensors are tried."""
 ALONE = 2.0
-"""Noise of a longer window, over the share of it that is longer, up to which a pulse is alone in that."""
+"""Noise of a longer window, over the share of it that is longer, up to which a pulse is alone in that, if no more than
+`SHARED` of it is unexplained."""
 ROBUST_ROUNDS = 3
 """Reweightings that turn outliers out of the first fit, at most."""
 FIRST_STEPS = 3
@@ -199,9 +200,10 @@ def fit_pulse(
         window = longer * pulse_times.LONGER, pulse.noise_to_signal
         whole = _aligned(signals, elements, sonar, wave, velocity, quiet, *window)
         if not isinstance(whole, int):
-            quieter = whole[1].noise < ALONE * pulse_times.LONGER * pulse.noise
-            wave, moved = (whole[0], whole[2]) if quieter else (wave, moved)
-            pulse = replace(whole[1], other=pulse) if quieter else replace(pulse, other=whole[1])
+            noise, shared = whole[1].noise, whole[1].share > SHARED
+            alone = noise < (AUDIBLE * whole[3] * quiet if shared else ALONE * pulse_times.LONGER * pulse.noise)
+            wave, moved = (whole[0], whole[2]) if alone else (wave, moved)
+            pulse = replace(whole[1], other=pulse) if alone else replace(pulse, other=whole[1])
     return wave, pulse, moved
 
 
