@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.pictures.figures.frame_figure import Hull, clipped, edges, image_axes, outline_artist, set_outlines
+from sonarsynth.pictures.figures.frame_figure import (
+    Hull,
+    blank,
+    clipped,
+    edges,
+    image_axes,
+    outline_artist,
+    set_outlines,
+)
 from sonarsynth.pictures.figures.ghost_rings import Ghost, GhostMarks
 from sonarsynth.pictures.figures.style import INK, PALE, figure
 
@@ -111,7 +119,7 @@ class BesidePicture:
                 shape = image.get_array()
                 assert shape is not None
                 absent = panel.level is None
-                image.set_data(np.ma.masked_all(shape.shape) if absent else _drawn(panel.level))
+                image.set_data(blank(shape.shape) if absent else _drawn(panel.level))
             for marks, artist, panel in zip(self._ghosts[row], self._outlines[row], moment.panels, strict=True):
                 marks.show(panel.ghosts, panel.lobes, set_outlines(artist, panel.hulls))
 

@@ -130,7 +130,7 @@ class FramePicture:
         if view.level is not None:
             self._image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
         elif shape is not None:
-            self._image.set_data(np.ma.masked_all(shape.shape))
+            self._image.set_data(blank(shape.shape))
         outlines = set_outlines(self._outlines, view.hulls)
         for panel in self._clouds:
             panel.show(view, self.window)
@@ -188,6 +188,11 @@ def clipped(level: Floats) -> Floats:
     return np.where(np.isneginf(level), -10.0 * DYNAMIC_RANGE, level)
 
 
+def blank(shape: tuple[int, ...]) -> np.ma.MaskedArray:
+    """Levels that are all absent; zeros, for memory as it comes may hold numbers that warn."""
+    return np.ma.array(np.zeros(shape), mask=True)
+
+
 def image_axes(axes: Axes, azimuth: Floats, elevation: Floats, least: float = -DYNAMIC_RANGE) -> AxesImage:
     """Axes of an energy image over a beam grid (deg, ascending), port on the left, of levels from least (dB) to 0;
     returns the empty image."""
@@ -195,9 +200,8 @@ def image_axes(axes: Axes, azimuth: Floats, elevation: Floats, least: float = -D
 
     colours = colormaps[ENERGY_MAP].with_extremes(bad=ABSENT)
     (left, right), (low, high) = edges(azimuth), edges(elevation)
-    blank = np.ma.array(np.zeros((len(elevation), len(azimuth))), mask=True)
     image = axes.imshow(
-        blank,
+        blank((len(elevation), len(azimuth))),
         extent=(right, left, low, high),
         origin="lower",
         cmap=colours,
