@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -143,29 +145,14 @@ def candidate(signals: Signals, knowledge: SonarKnowledge, centre: float, half: 
     knowledge = replace(knowledge, rounding=longer * knowledge.rounding, quiet=longer * knowledge.quiet)
     if pulse.share > SHARED and pulse.noise > AUDIBLE * knowledge.quiet:
         return refused(UNRESOLVED)
-    row = _placed(wave, pulse, elements, knowledge, bend)
+    if bend is None:
+        row = place(wave, pulse, knowledge)
+    else:
+        from sonarsynth.ranging.location.refraction import placed_along_rays  # few need it
+
+        row = placed_along_rays(wave, pulse, elements, knowledge, bend)
     clipping = clipping_error(signals, elements, sonar, centre, half)
     return replace(row, time_error=float(np.hypot(row.time_error, clipping)))
-
-
-def _placed(
-    wave: Wavefront, pulse: Pulse, elements: Elements, knowledge: SonarKnowledge, bend: Bend | None
-) -> SourceFix:
-    """A row of a pulse with its wavefront, as `bend` says: where it is undone, no error of the assumed speed is."""
-    if bend is None:
-        return place(wave, pulse, knowledge)
-    c = knowledge.sonar.assumed_sound_speed
-    bent = _refit(pulse, wave, elements, bend.sound_speed, 0.0, c) if bend.undone else wave
-    row = place(wave, pulse, knowledge, bent)
-    for _ in range(3):  # delays beyond straight ones change little with the place: this settles at once
-        extra = bend.delays(row.position, c if bend.undone else bend.sound_speed)
-        if not np.all(np.isfinite(extra)):
-            break
-        straight = _refit(pulse, wave, elements, c, extra)
-        if not bend.undone:
-            return place(wave, pulse, knowledge, unbent=straight)
-        row = place(replace(straight, by_sound_speed=np.zeros(4)), pulse, replace(knowledge, gradient=0.0), bent)
-    return row
 
 
 def fit_pulse(
@@ -181,38 +168,55 @@ def fit_pulse(
     if isinstance(first, int):
         return first
     wave, off, rows, elements = first
+    few: _Aligned | int | None = None
     if not isinstance(rows, slice):
         heard = _excerpt(signals, rows, wave.time, half + pulse_times.half_length(sonar.band))
         own = velocity[rows] if velocity.any() else velocity
-        settled = _aligned(heard, elements.select(rows), sonar, wave, own, quiet)
-        if isinstance(settled, int):
-            return settled
-        wave = settled[0]
-    aligned = _aligned(signals, elements, sonar, wave, velocity, quiet)
-    if isinstance(aligned, int):
-        return aligned
-    wave, pulse, moved, longer = aligned
+        few = _aligned(heard, elements.select(rows), sonar, wave, own, quiet)
+        if isinstance(few, int):
+            return few
+        wave = few.wave
+    by_all = partial(_aligned, signals, elements, sonar, velocity=velocity, quiet=quiet)
+    tails = pulse_times.cuts_tails(sonar.band) or pulse_times.null_in_band(elements, sonar, wave.direction)
+    found = few if few and tails else by_all(wave)
+    other: _Aligned | int | None = None
+    if tails and not isinstance(found, int):
+        other = by_all(found.wave, longer=found.longer * pulse_times.LONGER, deaf=found.pulse.noise_to_signal)
+        if not isinstance(other, int) and _alone(other, found.pulse.noise, quiet):
+            found, other = other, found
+        elif found is few:
+            found = by_all(wave)
+    if isinstance(found, int):
+        return found
+    wave, pulse, moved, _ = found
     if not np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum()) < MAX_LAG / sonar.band.centre:
         return UNFIT
     if pulse.one_tone(SHARED) and not off < PERIODS_OFF / sonar.band.centre:
         return UNRESOLVED
-    if pulse_times.cuts_tails(sonar.band) or pulse_times.null_in_band(elements, sonar, wave.direction):
-        window = longer * pulse_times.LONGER, pulse.noise_to_signal
-        whole = _aligned(signals, elements, sonar, wave, velocity, quiet, *window)
-        if not isinstance(whole, int):
-            noise, shared = whole[1].noise, whole[1].share > SHARED
-            alone = noise < (AUDIBLE * whole[3] * quiet if shared else ALONE * pulse_times.LONGER * pulse.noise)
-            wave, moved = (whole[0], whole[2]) if alone else (wave, moved)
-            pulse = replace(whole[1], other=pulse) if alone else replace(pulse, other=whole[1])
-    return wave, pulse, moved
+    return wave, replace(pulse, other=other.pulse) if isinstance(other, _Aligned) else pulse, moved
+
+
+class _Aligned(NamedTuple):
+    """A pulse, measured with the sensors aligned on its wavefront."""
+
+    wave: Wavefront
+    pulse: Pulse
+    elements: Elements  # where the sensors hear it
+    longer: float  # in a window so many times as long as a snap's
+
+
+def _alone(whole: _Aligned, noise: float, quiet: float) -> bool:
+    """Whether a pulse is alone in a longer window; noise: what is found in the shorter, quiet as for `fit_pulse`."""
+    most = AUDIBLE * whole.longer * quiet if whole.pulse.share > SHARED else ALONE * pulse_times.LONGER * noise
+    return whole.pulse.noise < most
 
 
 def _aligned(
     signals: Signals, elements: Elements, sonar: Sonar, wave: Wavefront, velocity: Floats, quiet: float,
     longer: float = 1.0, deaf: float = pulse_times.DEAF,
-) -> tuple[Wavefront, Pulse, Elements, float] | int:  # fmt: skip
-    """As `fit_pulse`, from a wavefront that sensors are aligned on; and in how many times as long a window as a snap's
-    the pulse was measured: `longer` at least. deaf: as for `pulse_times.waveform`."""
+) -> _Aligned | int:  # fmt: skip
+    """As `fit_pulse`, from a wavefront that sensors are aligned on, in a window at least `longer` times as long as a
+    snap's. deaf: as for `pulse_times.waveform`."""
     c, q, rest = sonar.assumed_sound_speed, elements.position, elements
     aligned, expected = None, _times(wave, q, c)
     for _ in range(ROUNDS):
@@ -234,7 +238,7 @@ def _aligned(
         wave, last, expected = better, expected, _times(better, q, c)
         if np.abs(expected - last).max() < pulse_times.FLOOR / longer**2:  # lags err by more; the next by far less
             break
-    return wave, pulse, elements, longer
+    return _Aligned(wave, pulse, elements, longer)
 
 
 def _first_wave(
@@ -287,13 +291,3 @@ def _whole(
 def _times(wave: Wavefront, position: Floats, sound_speed: float) -> Floats:
     """When (sensor,) s a wave passes sensors."""
     return wave.time + wavefront_delays(position, wave.direction, wave.curvature, sound_speed)
-
-
-def _refit(
-    pulse: Pulse, wave: Wavefront, elements: Elements, speed: float, extra: Floats | float, measured: float = 0.0
-) -> Wavefront:
-    """The straight wave at `speed` (m/s) that is left when delays `extra` (sensor,) in s are taken away; measured: the
-    speed (m/s) that `wave` was fitted with, where it is another."""
-    q = elements.position
-    delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, measured or speed) + wave.residual - extra
-    return spherical_wave(delay, q, speed, pulse.weight, wave.direction, wave.curvature) or wave

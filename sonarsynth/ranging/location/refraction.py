@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.arrays.bistatic_range import bistatic_range
+from sonarsynth.equations.arrays.spherical_wave import Wavefront, spherical_wave, wavefront_delays
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, unit
-from sonarsynth.ranging.location.source_position import Bend
+from sonarsynth.ranging.location.pulse_times import Pulse
+from sonarsynth.ranging.location.source_position import Bend, SonarKnowledge, SourceFix, place
 from sonarsynth.ranging.placing.solution import Solution
 from sonarsynth.receiver import Elements
 
@@ -63,6 +65,34 @@ def bending(profile: Profile, elements: Elements, undone: bool, pose: Pose) -> B
         return np.asarray(extra[:-1] - extra[-1])
 
     return Bend(delays, float(profile.at(-pose.position[2])), undone)
+
+
+def placed_along_rays(
+    wave: Wavefront, pulse: Pulse, elements: Elements, knowledge: SonarKnowledge, bend: Bend
+) -> SourceFix:
+    """A row of a pulse with its wavefront, as `bend` says: where it is undone, no error of the assumed speed is."""
+    c = knowledge.sonar.assumed_sound_speed
+    bent = _unbent(pulse, wave, elements, bend.sound_speed, 0.0, c) if bend.undone else wave
+    row = place(wave, pulse, knowledge, bent)
+    for _ in range(3):  # delays beyond straight ones change little with the place: this settles at once
+        extra = bend.delays(row.position, c if bend.undone else bend.sound_speed)
+        if not np.all(np.isfinite(extra)):
+            break
+        straight = _unbent(pulse, wave, elements, c, extra)
+        if not bend.undone:
+            return place(wave, pulse, knowledge, unbent=straight)
+        row = place(replace(straight, by_sound_speed=np.zeros(4)), pulse, replace(knowledge, gradient=0.0), bent)
+    return row
+
+
+def _unbent(
+    pulse: Pulse, wave: Wavefront, elements: Elements, speed: float, extra: Floats | float, measured: float = 0.0
+) -> Wavefront:
+    """The straight wave at `speed` (m/s) that is left when delays `extra` (sensor,) in s are taken away; measured: the
+    speed (m/s) that `wave` was fitted with, where it is another."""
+    q = elements.position
+    delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, measured or speed) + wave.residual - extra
+    return spherical_wave(delay, q, speed, pulse.weight, wave.direction, wave.curvature) or wave
 
 
 def refracted_solution(
