@@ -2,7 +2,7 @@
 and beams (SONAR-netCDF4), and of the water for Bellhop."""
 
 from sonarsynth.export.bellhop_files import write_bellhop
-from sonarsynth.export.fused_points import points, some_frames
+from sonarsynth.export.fused_points import points
 from sonarsynth.export.point_files import FORMATS, write_points
 
-__all__ = ["FORMATS", "points", "some_frames", "write_bellhop", "write_points"]
+__all__ = ["FORMATS", "points", "write_bellhop", "write_points"]

@@ -11,7 +11,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description import FieldError
 from sonarsynth.geometry import Pose, rotation_matrix, turned
-from sonarsynth.store import built_frames, open_store
+from sonarsynth.store import open_store, some_frames
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,25 +69,6 @@ def points(
         for name, values in columns.items()
     }
     return xr.Dataset(variables, attrs={"relative_to": relative_to})
-
-
-def some_frames(tree: xr.DataTree, frames: int | Iterable[int] | None) -> list[int]:
-    """Numbers of frames of a tree: one, several, or those of a mask (frame,); left out: all that were built.
-
-    Raises IndexError for a frame that is not there, or a mask of another length, TypeError for what is no whole number.
-    """
-    if frames is None:
-        return [int(frame) for frame in built_frames(tree)]
-    listed = list(frames) if isinstance(frames, Iterable) and not hasattr(frames, "__array__") else frames
-    chosen, count = np.atleast_1d(np.asarray(listed)), tree["truth"].sizes["frame"]
-    if chosen.dtype == bool and chosen.shape != (count,):
-        raise IndexError(f"a mask of {chosen.size} frames, where there are {count}")
-    numbers = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
-    if numbers.size and numbers.dtype.kind not in "iu":
-        raise TypeError(f"frames must be whole numbers, not {frames!r}")
-    if len(wrong := numbers[(numbers < 0) | (numbers >= count)]):
-        raise IndexError(f"frame {wrong[0]} is outside 0..{count - 1}")
-    return [int(frame) for frame in numbers]
 
 
 def _attributes(cloud: xr.Dataset, name: str) -> dict[str, object]:

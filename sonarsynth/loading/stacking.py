@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sonarsynth.detection import beam_width
-from sonarsynth.export import some_frames
+from sonarsynth.store import some_frames
 
 if TYPE_CHECKING:
     import xarray as xr

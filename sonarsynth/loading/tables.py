@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 import xarray as xr
 
-from sonarsynth.export import some_frames
+from sonarsynth.store import some_frames
 
 if TYPE_CHECKING:
     import pandas as pd

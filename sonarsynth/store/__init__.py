@@ -14,7 +14,14 @@ from sonarsynth.store.files.place import Folder, absolute, beside, folder_of, he
 from sonarsynth.store.files.remote import Remote, Unreachable
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.marks import Damage, Mark
-from sonarsynth.store.opening import built_frames, chosen_frames, open_store, root_attributes, splits_of
+from sonarsynth.store.opening import (
+    built_frames,
+    chosen_frames,
+    open_store,
+    root_attributes,
+    some_frames,
+    splits_of,
+)
 
 if TYPE_CHECKING:
     from sonarsynth.store.checking.examining import Findings, Problem, examine, must_be_store, ranges
@@ -61,6 +68,7 @@ __all__ = [
     "ranges",
     "root_attributes",
     "shared_lock",
+    "some_frames",
     "splits_of",
     "try_writing",
     "verify",

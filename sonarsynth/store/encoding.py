@@ -77,8 +77,8 @@ def encoded_whole(values: np.ndarray) -> bytes:
 def _compressed(numbers: np.ndarray, how: dict[str, Any]) -> bytes:
     """Numbers as blosc packs them, in one of the ways above."""
     blosc.use_threads = False  # as zarr has it: several threads put blocks into a file in the order in which they end
-    name, level, shuffle, size = how.values()
-    return _checked(bytes(blosc.compress(numbers, name.encode(), level, _SHUFFLES[shuffle], size)))
+    name, shuffle = how["cname"].encode(), _SHUFFLES[how["shuffle"]]
+    return _checked(bytes(blosc.compress(numbers, name, how["clevel"], shuffle, how["blocksize"])))
 
 
 def _checked(data: bytes) -> bytes:

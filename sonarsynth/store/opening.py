@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -96,6 +96,25 @@ def open_store(path: Folder | str) -> xr.DataTree:
 def built_frames(tree: xr.DataTree) -> np.ndarray:
     """Numbers (frame,) of the frames of a tree that were built: the others read as NaN and -1."""
     return np.flatnonzero(np.isfinite(np.asarray(tree["truth/sonar_position"].values)[:, 0]))
+
+
+def some_frames(tree: xr.DataTree, frames: int | Iterable[int] | None) -> list[int]:
+    """Numbers of frames of a tree: one, several, or those of a mask (frame,); left out: all that were built.
+
+    Raises IndexError for a frame that is not there, or a mask of another length, TypeError for what is no whole number.
+    """
+    if frames is None:
+        return [int(frame) for frame in built_frames(tree)]
+    listed = list(frames) if isinstance(frames, Iterable) and not hasattr(frames, "__array__") else frames
+    chosen, count = np.atleast_1d(np.asarray(listed)), tree["truth"].sizes["frame"]
+    if chosen.dtype == bool and chosen.shape != (count,):
+        raise IndexError(f"a mask of {chosen.size} frames, where there are {count}")
+    numbers = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
+    if numbers.size and numbers.dtype.kind not in "iu":
+        raise TypeError(f"frames must be whole numbers, not {frames!r}")
+    if len(wrong := numbers[(numbers < 0) | (numbers >= count)]):
+        raise IndexError(f"frame {wrong[0]} is outside 0..{count - 1}")
+    return [int(frame) for frame in numbers]
 
 
 def chosen_frames(tree: xr.DataTree, split: str | None = None) -> np.ndarray:

@@ -157,12 +157,10 @@ class Candidates:
         for n, (_, power, row) in enumerate(self.found):
             if row.reason in (ACCEPTED, RANGE) and power >= LOUD * loudest:
                 self.found[n] = Candidate(row.time, power, row)  # the loudest window may have held others
-                front, own = (
-                    PlaneWaveFit(row.chord, row.curvature[0], row.time),
-                    when_heard(self.known, track, row.time),
-                )
+                front = PlaneWaveFit(row.chord, row.curvature[0], row.time)
                 late = front.delays(elements, sonar.assumed_sound_speed) - row.time
-                heard.append((replace(elements, position=elements.position + late[:, None] * own.velocity), front))
+                moved = late[:, None] * when_heard(self.known, track, row.time).velocity
+                heard.append((replace(elements, position=elements.position + moved), front))
         crowded = [front.time for moved, front in heard if accompanied(signals, moved, sonar, front, width / rate)]
         if not crowded:
             return

@@ -162,7 +162,8 @@ def fit_pulse(
     it is refused, of REASONS. velocity (sensor, xyz): m/s, sonar frame; quiet as `SonarKnowledge` has it.
 
     Envelope peaks of the sensors give eq. 6 in closed form, then the sphere, robustly; then the sensors are aligned
-    and their lags measured coherently, until these settle: of few sensors first, where these hear it clearly.
+    and their lags measured coherently, until these settle: of few sensors first, where these hear it clearly. A pulse
+    whose tails the window of a snap cuts is measured in a longer one, where it is alone in that.
     """
     first = _first_wave(signals, elements, sonar, centre, half, quiet)
     if isinstance(first, int):
