@@ -166,25 +166,27 @@ def common_wave(
     return shifted, response, total, power
 
 
-@compiled
+@compiled(fastmath={"contract", "reassoc"})
 def lag_sums(spectrum: Any, response: Any, template: Any, omega: Any) -> Any:
     """Sums over bins for each sensor (sensor,), with the model M = response * template and the rest R = spectrum - M:
 
     omega Im(M conj R), |omega M|^2, |R|^2 and Im(M conj R)^2/|M|^2, what is out of phase; spectrum, response (sensor,
-    bin); template, omega (bin,).
+    bin), which is real; template, omega (bin,).
     """
-    sensors, bins = spectrum.shape
-    slope, weight, residual, across = np.zeros(sensors), np.zeros(sensors), np.zeros(sensors), np.zeros(sensors)
-    for q in range(sensors):
-        for k in range(bins):
-            m = response[q, k] * template[k]
-            r = spectrum[q, k] - m
-            turn, loud = m.imag * r.real - m.real * r.imag, m.real**2 + m.imag**2
-            slope[q] += omega[k] * turn
-            weight[q] += omega[k] ** 2 * loud
-            residual[q] += r.real**2 + r.imag**2
-            across[q] += turn**2 / loud if loud > 0.0 else 0.0
-    return slope, weight, residual, across
+    sums, loud = np.zeros((4, len(spectrum))), template.real**2 + template.imag**2
+    inverse = 1.0 / np.where(loud > 0.0, loud, np.inf)
+    for q in range(len(spectrum)):
+        x, h = spectrum[q], response[q]
+        slope = weight = residual = across = 0.0
+        for k in range(len(omega)):
+            r, by_phase = x[k] - h[k] * template[k], omega[k] * h[k]
+            turn = template[k].imag * r.real - template[k].real * r.imag
+            slope += by_phase * turn
+            weight += by_phase * by_phase * loud[k]
+            residual += r.real * r.real + r.imag * r.imag
+            across += turn * turn * inverse[k]
+        sums[:, q] = slope, weight, residual, across
+    return sums
 
 
 @compiled

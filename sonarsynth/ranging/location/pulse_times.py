@@ -281,6 +281,7 @@ def neighbours(elements: Elements) -> tuple[Ints, Ints]:
     return live, live[near]
 
 
+@lru_cache(maxsize=16)
 def _taper(bins: int) -> Floats:
     """Weights (bin,) of the frequencies of a band: those at its edges do not count."""
     return np.asarray(np.sin(np.pi * (np.arange(bins) + 0.5) / bins) ** 2)
