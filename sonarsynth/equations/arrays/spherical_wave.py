@@ -146,21 +146,20 @@ def envelope_peak(
     a = |z| the envelope of z = sum g S exp(i w t) and w0 = Im(z'/z), the noise of its slope is that of
     sum (w - w0) g n / sqrt 2, and the peak moves by that over a'' = Re(z'' conj z)/a + w0^2 a.
     """
-    f, wave = np.asarray(frequency, float), np.asarray(spectrum, complex)
-    nothing = float("nan"), float("nan")
+    f, nothing = np.asarray(frequency, float), (float("nan"), float("nan"))
     taper = np.sin(np.pi * np.clip((f - low) / (high - low), 0.0, 1.0)) ** 2
-    if len(f) < 3 or not np.any(taper * np.abs(wave) > 0):
+    wave = taper * np.asarray(spectrum, complex)
+    if len(f) < 3 or not wave.any():
         return nothing
     count, spacing, omega = 16 * len(f), f[1] - f[0], 2 * np.pi * f
-    top = int(np.abs(np.fft.ifft(taper * wave, count)).argmax())
+    top = int(np.abs(np.fft.ifft(wave, count)).argmax())
     time = float((top if top < count / 2 else top - count) / (count * spacing))
     from sonarsynth.equations.arrays.spherical_wave_kernel import climb_envelope
 
-    time, curve, carrier = climb_envelope(taper * wave, omega, time, 0.5 / (count * spacing))
+    time, curve, carrier = climb_envelope(wave, omega, time, 0.5 / (count * spacing))
     if not curve < 0:
         return nothing
-    power = np.broadcast_to(np.asarray(noise, float), f.shape)
-    return time, float(np.sqrt(0.5 * np.sum(((omega - carrier) * taper) ** 2 * power)) / abs(curve))
+    return time, float(np.sqrt(0.5 * np.sum(((omega - carrier) * taper) ** 2 * noise)) / abs(curve))
 
 
 def envelope_spread(frequency: Floats, spectrum: Complexes, low: float, high: float) -> float:

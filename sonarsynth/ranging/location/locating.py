@@ -249,11 +249,11 @@ def _first_wave(
     mean square over the sensors, which sensors it is of, and those that hear it whole; or why it is refused."""
     c, (cut, start), settled = sonar.assumed_sound_speed, pulse_times.excerpt(signals, centre, half), pulse_times.FLOOR
     few = scattered(FEW, elements.count) if elements.count >= 2 * FEW else slice(None)
-    energy = float(np.square(cut[few]).sum(axis=1).mean()) / signals.sampling_frequency
-    clear = energy * 2.0 * pulse_times.half_length(sonar.band) > CLEAR * quiet
+    heard, rate = cut[few], signals.sampling_frequency
+    clear = np.vdot(heard, heard) * 2.0 * pulse_times.half_length(sonar.band) > CLEAR * quiet * rate * len(heard)
     for rows in (few, slice(None)) if clear else (slice(None),):
         q, live = elements.position[rows], elements.gain[rows] != 0
-        delay, height = pulse_times.envelope_peaks(cut[rows], signals.sampling_frequency, sonar.band)
+        delay, height = pulse_times.envelope_peaks(cut[rows], rate, sonar.band)
         loud = height**2 * live  # who hears more counts more
         wave = robust_wave(start + delay, q, c, loud, steps=FIRST_STEPS, rounds=ROBUST_ROUNDS, settled=settled)
         if wave is not None:
