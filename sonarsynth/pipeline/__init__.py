@@ -249,7 +249,7 @@ def _beamformed_values(
         cloud = (cloud_of(plan, frame, beamformed) if cloud is None else cloud).loudest(plan.sizes["point"])
         scattered = scattered_paths(plan, traced.arrivals, traced.reverberation)
         labels = point_labels(plan, frame, traced.arrivals, beamformed.estimates, cloud, scattered)
-        values |= cloud_values(cloud, labels, plan.sizes["point"], len(frame.moment.bodies))
+        values |= cloud_values(cloud, labels, len(frame.moment.bodies))
     return values
 
 

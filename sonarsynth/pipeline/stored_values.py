@@ -31,7 +31,7 @@ from sonarsynth.products import (
 from sonarsynth.receiver.sensor_errors import DrawnErrors
 
 Values = dict[tuple[str, str], np.ndarray]
-"""(group, name) to the array of one frame, without the frame axis."""
+"""(group, name) to the array of one frame, without the frame axis; of points and paths as many as there are."""
 
 
 def table(group: str, **columns: object) -> Values:
@@ -143,23 +143,21 @@ def range_image_values(plan: Plan, energy: npt.NDArray[np.float32] | None, truth
     return table("/range_image", energy=energy, target=target)
 
 
-def cloud_values(cloud: PointCloud, labels: PointLabels, size: int, targets: int) -> Values:
-    """The cloud, each coordinate apart, and whose echo each point is, padded to `size` points; how many points each of
-    so many targets has."""
+def cloud_values(cloud: PointCloud, labels: PointLabels, targets: int) -> Values:
+    """The cloud, each coordinate apart, and whose echo each point is; how many points each of so many targets has."""
     x, y, z = cloud.position.T
     columns = {name: value for name, value in vars(cloud).items() if name not in ("position", "overflow")}
     columns["estimate"] = np.broadcast_to(cloud.estimate, len(cloud)).astype(np.int8)
     angles = ("azimuth", "azimuth_error", "elevation", "elevation_error")
     columns |= {name: np.rad2deg(columns[name]).astype(np.float32) for name in angles}
     columns |= {"x": x, "y": y, "z": z, **vars(labels)}
-    padded = {name: _padded(values, size) for name, values in columns.items()}
     of_targets = np.bincount(labels.target[labels.target >= 0], minlength=targets).astype(np.int32)
-    values = table("/cloud", count=np.int32(len(cloud)), overflow=np.int32(cloud.overflow), **padded)
+    values = table("/cloud", count=np.int32(len(cloud)), overflow=np.int32(cloud.overflow), **columns)
     return values | table("/truth/targets", points=of_targets)
 
 
 def path_values(arrivals: Arrivals, size: int, sensors: int) -> Values:
-    """Paths as they reach the middle of the array, padded to `size` of them: the loudest, in the order of arrivals."""
+    """Paths as they reach the middle of the array, at most `size` of them: the loudest, in the order of arrivals."""
     order = np.argsort(-np.abs(arrivals.amplitude), kind="stable")
     kept = arrivals.select(np.sort(order[:size]))
     azimuth, elevation = azimuth_elevation(kept.direction)
@@ -176,15 +174,8 @@ def path_values(arrivals: Arrivals, size: int, sensors: int) -> Values:
     how = dict.fromkeys(("family", "lit_by", "surface", "bottom"), np.int8)
     own_names = {"emission": "snap", "family": "arrives_by"}
     columns |= {n: getattr(kept, own_names.get(n, n)).astype(dtype) for n, dtype in {**whose, **how}.items()}
-    padded = {name: _padded(values, size) for name, values in columns.items()}
     count, overflow = len(kept.delay), len(arrivals.delay) - len(kept.delay)
-    return table("/paths", count=count, overflow=overflow, delay=_padded(kept.delay, size), **padded)
-
-
-def _padded(values: np.ndarray, size: int) -> np.ndarray:
-    rows = np.full(size, NO_TARGET if values.dtype.kind == "i" else np.nan, values.dtype)
-    rows[: len(values)] = values
-    return rows
+    return table("/paths", count=count, overflow=overflow, delay=kept.delay, **columns)
 
 
 INDICES = (("/truth/beams", "target"), ("/cloud", "target"), ("/paths", "target"), ("/range_image", "target"))

@@ -79,7 +79,8 @@ class ArrayLayout:
         """A frame's value in the array's own type (the same array where it has that); raises ValueError where shape or
         type do not fit."""
         value = np.asarray(value)
-        if value.shape != self.inner:
+        short = self.variable.listed and value.ndim == 1 and len(value) < self.inner[0]
+        if value.shape != self.inner and not short:
             raise ValueError(f"{self.path} has shape {value.shape}, but the store is laid out for {self.inner}")
         if value.dtype == self.dtype:
             return value
@@ -134,7 +135,8 @@ class Layout:
         """The chunks (frame, ...) of a shard of an array: the frames given, as `check` returns them, the fill value
         elsewhere."""
         fill = np.broadcast_to(np.asarray(array.variable.fill, array.dtype), array.inner)
-        rows = [frames[frame][array.key] if frame in frames else fill for frame in self.region(shard)]
+        given = {frame: array.variable.padded(values[array.key], array.inner) for frame, values in frames.items()}
+        rows = [given.get(frame, fill) for frame in self.region(shard)]
         if array.chunk == 1:
             return [row[None] for row in rows]
         return [np.array(rows[first : first + array.chunk]) for first in range(0, len(rows), array.chunk)]

@@ -63,6 +63,22 @@ def test_what_is_written_is_what_is_read(laid_out: Path, small_plan: Plan, made_
             np.testing.assert_array_equal(tree[array.path].values[frame], values[frame][array.key])
 
 
+def test_lists_are_handed_on_as_long_as_they_are_and_filled_where_they_are_stored(
+    laid_out: Path, small_plan: Plan, made_up: MadeUp
+) -> None:
+    """Room for 4096 points is no reason to hold 4096 of them in each frame that waits for its shard."""
+    arrays = [array for array in layout_of(small_plan).arrays if array.variable.dims == ("frame", "point")]
+    values = made_up(small_plan, 3)
+    given = {array.key: values[array.key][:2] for array in arrays}
+    store.write_shard(laid_out, small_plan, 0, {3: values | given})
+    tree = opened(laid_out)
+    for array in arrays:
+        stored = tree[array.path].values[3]
+        assert (
+            (stored[:2] == given[array.key]).all() and len(stored) > 2 and array.is_fill(stored[2:].astype(array.dtype))
+        )
+
+
 def test_a_converter_stores_counts_that_read_as_pascals(tmp_path: Path, small_text: str, made_up: MadeUp) -> None:
     made = plan(loads(small_text.replace("  sonar:\n", "  sonar:\n    converter: {bits: 12, full_scale: 100}\n")))
     store.create(tmp_path / "s.zarr", made)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class Variable:
@@ -19,6 +21,19 @@ class Variable:
     fill: float | int = float("nan")
     attributes: tuple[tuple[str, Any], ...] = ()
     product: str = ""  # of a build; "truth": always there; "levels": of what is traced, there with any other product
+
+    @property
+    def listed(self) -> bool:
+        """Whether a frame has as many rows of it as there are points or paths; the rest reads as `fill`."""
+        return self.dims in (POINT, PATH)
+
+    def padded(self, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+        """Values of a frame in the shape that the store has room for."""
+        if values.shape == shape:
+            return values
+        rows = np.full(shape, self.fill, values.dtype)
+        rows[: len(values)] = values
+        return rows
 
 
 LOUDEST = ("frame", "loudest")
