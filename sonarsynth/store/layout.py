@@ -79,8 +79,7 @@ class ArrayLayout:
         """A frame's value in the array's own type (the same array where it has that); raises ValueError where shape or
         type do not fit."""
         value = np.asarray(value)
-        short = self.variable.listed and value.ndim == 1 and len(value) < self.inner[0]
-        if value.shape != self.inner and not short:
+        if value.shape != self.inner and not (self.variable.listed and value.ndim == 1 and value.shape < self.inner):
             raise ValueError(f"{self.path} has shape {value.shape}, but the store is laid out for {self.inner}")
         if value.dtype == self.dtype:
             return value

@@ -38,15 +38,16 @@ def hearing(
     met: (snap, target) s when the sound of each snap meets each target; there: of each snap, `met_at` that; snap_level:
     (snap,) dB.
     """
-    track, lights = context.receiver.track, [n for n, snap in enumerate(context.snaps) if snap.illuminates]
-    lights = [n for n in lights if np.isfinite(met[n]).any()]
+    track, snaps, known = context.receiver.track, context.snaps, np.isfinite(met)
+    lights = [n for n, snap in enumerate(snaps) if snap.illuminates and known[n].any()]
     if track is None or not lights:
         return None
-    away = [float(np.linalg.norm(snap.position - track.pose.position)) for snap in context.snaps]
-    loudest = max(lights, key=lambda n: float(snap_level[n]) - 20.0 * math.log10(max(away[n], TINY)))
-    known = np.isfinite(met[loudest])
-    times = np.where(known, met[loudest], np.nanmean(met[loudest]))
-    bodies = there[loudest] if known.all() else met_at(context.bodies, times)
+    away = [max(math.dist(snap.position, track.pose.position), TINY) for snap in snaps]
+    loudest = max(lights, key=lambda n: snap_level[n] - 20.0 * math.log10(away[n]))
+    times, bodies = met[loudest], there[loudest]
+    if not known[loudest].all():
+        times = np.where(known[loudest], times, times[known[loudest]].mean())
+        bodies = met_at(context.bodies, times)
     place, heard = np.array([body.pose.position for body in bodies]), times
     for _ in range(1 if track.still else ROUNDS):
         away = np.linalg.norm(place - track.positions(heard), axis=1)
