@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Final
@@ -15,18 +15,17 @@ STAGES: Final = ("trace", "label", "synthesise", "measure", "locate", "beamform"
 class _Watch:
     """Seconds by stage, and when the last stage ended."""
 
-    def __init__(self) -> None:
-        self.cpu: dict[str, float] = {}
-        self.last = time.thread_time()
+    def __init__(self, before: Mapping[str, float] | tuple[()]) -> None:
+        self.cpu, self.last = dict[str, float](before), time.thread_time()
 
 
 _watch: ContextVar[_Watch | None] = ContextVar("watch", default=None)
 
 
 @contextmanager
-def stage_timer() -> Iterator[dict[str, float]]:
-    """Give seconds of processor time by stage; the dictionary fills while the block runs."""
-    watch = _Watch()
+def stage_timer(before: Mapping[str, float] | tuple[()] = ()) -> Iterator[dict[str, float]]:
+    """Give seconds of processor time by stage, with those of before; the dictionary fills while the block runs."""
+    watch = _Watch(before)
     token = _watch.set(watch)
     try:
         yield watch.cpu

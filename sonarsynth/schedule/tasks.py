@@ -67,7 +67,7 @@ class StageResult:
     failure: Failure | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)  # by stage, wall clock
     cpu: Mapping[str, float] = field(default_factory=dict)  # by stage, of the thread
-    parts: Mapping[str, float] = field(default_factory=dict)  # of that, by what was done: render.LAPS
+    parts: Mapping[str, float] = field(default_factory=dict)  # of that, by what was done: `pipeline.STAGES`
 
 
 @dataclass(frozen=True)
@@ -241,20 +241,17 @@ def _step(job: Job, name: str, step: Step, before: StageResult, note: worker_sta
     """A step of the stage `name` of a frame."""
     if before.failure is not None:
         return before
-    wall, cpu = time.perf_counter(), time.thread_time()
-    with pipeline.stage_timer() as laps:
+    wall, cpu, begun = time.perf_counter(), time.thread_time(), before.seconds.get(name, 0.0)
+    with pipeline.stage_timer(before.parts) as parts:  # labels come twice
         try:
-            begun = before.seconds.get(name, 0.0)
             note(before.frame, name, _limit(job, step, begun), begun)
             value, failure = step(plan_of(job), before.frame, before.value), None
             _warm.add(step)
         except Exception as error:
             value, failure = None, failure_of(before.frame, name, error)
-    wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
-    seconds = {**before.seconds, name: before.seconds.get(name, 0.0) + wall}
-    spent = {**before.cpu, name: before.cpu.get(name, 0.0) + cpu}
-    laps = {n: before.parts.get(n, 0.0) + laps.get(n, 0.0) for n in {**before.parts, **laps}}  # labels come twice
-    return StageResult(before.frame, value, failure, seconds, spent, laps)
+    seconds = {**before.seconds, name: begun + time.perf_counter() - wall}
+    spent = {**before.cpu, name: before.cpu.get(name, 0.0) + time.thread_time() - cpu}
+    return StageResult(before.frame, value, failure, seconds, spent, parts)
 
 
 _warm: set[Step] = set()
