@@ -10,8 +10,7 @@ Coherent paths so far apart in time that their pulses do not overlap add by powe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,31 +24,20 @@ FEWEST, MOST = 16, SLICES
 of 60 kHz, a body of 12 m); of longer ones they are a sample, which errs by 0.12 dB rms, 0.26 dB at most in 16."""
 
 
-@dataclass(frozen=True, eq=False)
-class Powers:
+class Powers(NamedTuple):
     """Powers of paths over that of the snap at 1 m, in the band."""
 
     steps: Floats  # (step, path) with one factor more in each: scattering, way out, way in, absorption, boundaries
-    whole: Ints  # (group,) a path of each group: coherent paths of a snap, target and family that overlap in time
-    whole_power: Floats  # (group,) of their sum
-    part: Ints  # (part,) a path of each part of the groups: those that touched the same boundaries last
-    part_power: Floats  # (part,) of their sum
-    part_direction: Floats  # (part, xyz) directions weighted by the share of each path in that power, times the power
+    whole: Ints = np.zeros(0, np.int64)  # (group,) a path of each: coherent, of a snap, target and family, overlapping
+    whole_power: Floats = np.zeros(0)  # (group,) of their sum
+    part: Ints = np.zeros(0, np.int64)  # (part,) a path of each part of a group: by the boundaries touched last
+    part_power: Floats = np.zeros(0)  # (part,) of their sum
+    part_direction: Floats = np.zeros((0, 3))  # (part, xyz) by the share of each path in that power, times the power
 
 
 def family(arrivals: Arrivals) -> Ints:
     """Index into FAMILIES of each arrival (path,)."""
     return np.asarray((arrivals.surface > 0) + 2 * (arrivals.bottom > 0))
-
-
-class _CoherentPaths(NamedTuple):
-    """Coherent paths together, as `Powers` has them."""
-
-    whole: Ints = np.zeros(0, np.int64)
-    whole_power: Floats = np.zeros(0)
-    part: Ints = np.zeros(0, np.int64)
-    part_power: Floats = np.zeros(0)
-    part_direction: Floats = np.zeros((0, 3))
 
 
 def path_powers(arrivals: Arrivals, band: Band) -> Powers:
@@ -60,7 +48,7 @@ def path_powers(arrivals: Arrivals, band: Band) -> Powers:
     bins = few.frequency, few.relative, few.weight
     # echo: with the facet's own roughness, which is no loss at a boundary
     facet, *means = mean_powers(arrivals.snap, *columns, *blurs, *bins, arrivals.centre)
-    together = _CoherentPaths()
+    together: tuple[Any, ...] = ()
     if arrivals.coherent.any():
         rows = np.flatnonzero(arrivals.coherent)
         mean, together = _coherent(arrivals, rows, band)
@@ -104,8 +92,9 @@ def _runs(sorted_values: Ints) -> zip[tuple[int, int]]:
     return zip([0, *edges.tolist()], [*edges.tolist(), len(sorted_values)], strict=True)
 
 
-def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, _CoherentPaths]:
-    """Mean power (row,) of what each facet does to the pulse, and the powers of the paths of these rows together."""
+def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, tuple[Any, ...]]:
+    """Mean power (row,) of what each facet does to the pulse, and, as `Powers` has them, the paths of these rows
+    together."""
     apart = band.pulse
     group, part, middle, longest = _groups(arrivals, rows, apart)
     fine = band.sliced(float(np.clip((band.high - band.low) * (longest + apart), FEWEST, MOST)))
@@ -139,7 +128,7 @@ def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, _Cohe
     np.add.at(total, owner, sums[:, 0])
     whole_power = (np.abs(total) ** 2 * share).sum(axis=1)
     products = (np.conj(sums[:, :1]) * sums).real @ share[owner][:, :, None]
-    return mean, _CoherentPaths(rows[representative], whole_power, rows[first], products[:, 0, 0], products[:, 1:, 0])
+    return mean, (rows[representative], whole_power, rows[first], products[:, 0, 0], products[:, 1:, 0])
 
 
 def _least(values: Floats, group: Ints) -> Floats:
