@@ -24,7 +24,7 @@ def points_table(tree: xr.DataTree, frames: int | Iterable[int] | None) -> pd.Da
     """The points of some frames, a row each; see `SonarAccessor.points`."""
     if "cloud" not in tree.children:
         raise ValueError("the store has no cloud: it was built without that product")
-    cloud = _of_frames(tree, tree.children["cloud"].to_dataset(inherit=True), frames)
+    cloud = tree.children["cloud"].to_dataset(inherit=True).isel(frame=some_frames(tree, frames))
     own = [name for name, values in cloud.data_vars.items() if values.dims == ("frame", "point")]
     counts = cloud["count"].values
     cloud = cloud[own].isel(point=slice(0, int(counts.max(initial=0)))).load()
@@ -44,7 +44,7 @@ def as_table(
     node, rows = cast(xr.DataTree, tree[path]), (rows,) if isinstance(rows, str) else rows
     dataset = node.to_dataset(inherit=True)
     if "frame" in node.to_dataset(inherit=False).dims:
-        dataset = _of_frames(tree, dataset, frames)
+        dataset = dataset.isel(frame=some_frames(tree, frames))
     axes = {name: _axes(values) for name, values in dataset.data_vars.items()}
     wanted = Counter(axes.values()).most_common(1)[0][0] if rows is None and axes else tuple(rows or ())
     if unknown := [name for name in wanted if name not in dataset.dims]:
@@ -85,11 +85,6 @@ def _columns(name: str, values: xr.DataArray) -> dict[str, xr.DataArray]:
     for i, word in enumerate(values[axis].values):
         columns |= _columns(f"{name}_{word}", values.isel({axis: i}, drop=True))
     return columns
-
-
-def _of_frames(tree: xr.DataTree, dataset: xr.Dataset, frames: int | Iterable[int] | None) -> xr.Dataset:
-    """Some frames of a dataset; left out: those that were built."""
-    return dataset.isel(frame=some_frames(tree, frames))
 
 
 def _described(table: pd.DataFrame, dataset: xr.Dataset) -> pd.DataFrame:

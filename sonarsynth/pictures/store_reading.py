@@ -16,7 +16,6 @@ from sonarsynth.geometry import Pose
 from sonarsynth.pictures.figures.frame_figure import Hull
 from sonarsynth.pictures.figures.ghost_rings import Ghost
 from sonarsynth.store import Folder, Mismatch, folder_of, named_after, open_store
-from sonarsynth.store.frame_reading import hold
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,13 +35,10 @@ class NothingToDraw(ValueError):
 
 def opened(store: str | Folder) -> xr.DataTree:
     """The store as a DataTree. Raises NothingToDraw when it is not one."""
-    path = folder_of(store)
     try:
-        tree = open_store(path)
-        hold(tree, path)
+        return open_store(folder_of(store))
     except Mismatch as problem:
         raise NothingToDraw(str(problem)) from None
-    return tree
 
 
 def pictures_of(store: str | Folder, name: str = "") -> Path:

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sonarsynth.store.encoding import PLAIN, compression
-from sonarsynth.store.layout import ArrayLayout
+
+if TYPE_CHECKING:
+    from sonarsynth.store.layout import ArrayLayout
 
 Document = dict[str, Any]
 """Metadata of an array or a group: what its zarr.json says."""
@@ -40,17 +42,33 @@ def _consolidated(metadata: dict[str, Any]) -> Document:
 
 def framed_array(array: ArrayLayout) -> Document:
     """An array that frames are written to."""
-    variable, inner = array.variable, tuple(max(1, n) for n in array.shape[1:])
+    variable = array.variable
     attrs: dict[str, Any] = {"units": variable.units, "long_name": variable.long_name, **dict(variable.attributes)}
     if "scale_factor" in attrs:  # packed: readers must know the fill value to give NaN
         attrs["_FillValue"] = int(variable.fill)
-    chunk, codecs = (array.chunk, *inner), _codecs(array.dtype, compression(array))
-    if array.chunk != array.shard:
-        index = [{"name": "bytes", "configuration": {"endian": "little"}}, {"name": "crc32c"}]
-        sharding = {"chunk_shape": chunk, "codecs": codecs, "index_codecs": index, "index_location": "end"}
-        chunk, codecs = (array.shard, *inner), [{"name": "sharding_indexed", "configuration": sharding}]
+    where = lies(array.shape, array.dtype, array.shard, array.chunk, compression(array))
     fill = "NaN" if variable.fill != variable.fill else array.dtype.type(variable.fill).item()
-    return _document(array.shape, array.dtype.name, chunk, codecs, fill, variable.dims, attrs)
+    return _document(array.shape, array.dtype.name, where, fill, variable.dims, attrs)
+
+
+def lies(shape: tuple[int, ...], dtype: np.dtype[Any], shard: int, chunk: int, how: dict[str, Any]) -> Document:
+    """Where the numbers of an array lie, so many frames in a shard and in a chunk, and `how` blosc compresses them."""
+    inner, codecs = [max(1, n) for n in shape[1:]], _codecs(dtype, how)
+    if chunk != shard:
+        index = [{"name": "bytes", "configuration": {"endian": "little"}}, {"name": "crc32c"}]
+        sharding = {"chunk_shape": [chunk, *inner], "codecs": codecs, "index_codecs": index, "index_location": "end"}
+        codecs = [{"name": "sharding_indexed", "configuration": sharding}]
+    return _where([shard, *inner], codecs)
+
+
+def _where(chunk: list[int], codecs: list[dict[str, Any]]) -> Document:
+    """Shards lie in the folder of their array: with the usual "/", each has as many folders of its own as axes."""
+    return {
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}},
+        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
+        "codecs": codecs,
+        "storage_transformers": [],
+    }
 
 
 def fixed_array(dims: tuple[str, ...], values: np.ndarray, attrs: dict[str, Any]) -> Document:
@@ -59,34 +77,26 @@ def fixed_array(dims: tuple[str, ...], values: np.ndarray, attrs: dict[str, Any]
     words: list[dict[str, Any]] = [{"name": "vlen-utf8", "configuration": {}}, {"name": "crc32c"}]
     codecs = words if text else _codecs(values.dtype, PLAIN)
     name, fill = ("string", "") if text else (values.dtype.name, values.dtype.type(0).item())
-    return _document(values.shape, name, tuple(max(1, n) for n in values.shape), codecs, fill, dims, attrs)
+    where = _where([max(1, n) for n in values.shape], codecs)
+    return _document(values.shape, name, where, fill, dims, attrs)
 
 
 def _document(
-    shape: tuple[int, ...],
-    dtype: str,
-    chunk: tuple[int, ...],
-    codecs: list[dict[str, Any]],
-    fill: Any,
-    dims: tuple[str, ...],
-    attrs: dict[str, Any],
+    shape: tuple[int, ...], dtype: str, where: Document, fill: Any, dims: tuple[str, ...], attrs: dict[str, Any]
 ) -> Document:
-    """The metadata of an array.
-
-    Shards lie in the folder of their array: with the usual "/", each has as many folders of its own as axes.
-    """
+    """The metadata of an array."""
     return {
         "shape": shape,
         "data_type": dtype,
-        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}},
-        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
+        "chunk_grid": where["chunk_grid"],
+        "chunk_key_encoding": where["chunk_key_encoding"],
         "fill_value": fill,
-        "codecs": codecs,
+        "codecs": where["codecs"],
         "attributes": attrs,
         "dimension_names": dims,
         "zarr_format": 3,
         "node_type": "array",
-        "storage_transformers": [],
+        "storage_transformers": where["storage_transformers"],
     }
 
 

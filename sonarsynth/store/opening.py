@@ -70,7 +70,7 @@ def open_store(path: Folder | str) -> xr.DataTree:
     import xarray as xr
     import zarr
 
-    from sonarsynth.store.files.decoding import NAMING, opens_whole
+    from sonarsynth.store.files.decoding import NAMING, opens_whole, read_from_disk
 
     folder = absolute(path)
     must_be_folder(folder)
@@ -80,6 +80,7 @@ def open_store(path: Folder | str) -> xr.DataTree:
             stored = xr.open_datatree(opens_whole(folder), engine="zarr", decode_cf=False)
         if "truth" not in stored.children or "frame" not in stored["truth"].sizes:
             raise Mismatch(f"{folder}: a store has a group /truth with frames; this has none")
+        read_from_disk(stored, folder)
         tree = stored.map_over_datasets(_decoded)
     except (Mismatch, Damage):
         raise

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +14,6 @@ from sonarsynth import planning, schedule
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.recipe import reading
-from sonarsynth.store.files import decoding
 
 BUILT = [2, 3]
 TWO = """  - name: two
@@ -165,18 +162,3 @@ def test_it_says_which_frames_were_built_and_which_failed(
     log.unlink()
     assert run(app, ["export", str(place), "--to", "coco", "--out", str(tmp_path / "coco")]) == 0
     assert "note: 18 of 20 frames have not been built, and are left out" in capsys.readouterr().out
-
-
-def test_each_file_of_a_table_is_read_once(tree: xr.DataTree, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not once for each component: a table of 100 032 frames takes 5 s of one core so, and 11.5 otherwise."""
-    read, opened = Counter[str](), decoding.WholeReads.get
-
-    async def get(store: decoding.WholeReads, key: str, *rest: Any, **more: Any) -> Any:
-        read[key] += 1
-        return await opened(store, key, *rest, **more)
-
-    monkeypatch.setattr(decoding.WholeReads, "get", get)
-    with ss.open(tree.encoding["source"]) as again:
-        again.sonar.table("truth/targets")
-    counts = {key: count for key, count in read.items() if key.startswith("truth/targets/") and "/c." in key}
-    assert len(counts) > 20 and set(counts.values()) == {1}
