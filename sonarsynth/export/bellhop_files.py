@@ -29,6 +29,7 @@ from sonarsynth.environment.sea import Absorption
 from sonarsynth.equations.rays.ray_solutions import Water, water
 from sonarsynth.equations.water.boundary_reflection import SEDIMENTS
 from sonarsynth.planning import Plan
+from sonarsynth.store.files.place import write_atomically
 
 DECIBELS_A_WAVELENGTH: Final = 40.0 * np.pi / np.log(10.0)
 """Of a loss tangent of 1: 54.58."""
@@ -103,7 +104,7 @@ def write_bellhop(plan: Plan, index: int, folder: Path, name: str) -> tuple[list
             "  ! step (m), box (m, km)",
         ]
         files.append(stem.with_suffix(".env"))
-        files[-1].write_text("\n".join(lines) + "\n", encoding="ascii")
+        write_atomically(files[-1], ("\n".join(lines) + "\n").encode("ascii"))
     return files, _unsaid(plan)
 
 
@@ -134,7 +135,7 @@ def _boundary(
             return "R", []
         case ReflectionTable():
             files.append(table)
-            table.write_text(_table(boundary), encoding="ascii")
+            write_atomically(table, _table(boundary).encode("ascii"))
             return "F", []
         case Sediment(name=name):
             density, ratio, loss = SEDIMENTS[name]

@@ -16,6 +16,7 @@ from sonarsynth.evaluation.detectors import true_objects
 from sonarsynth.evaluation.detectors.true_objects import TrueObjects, category_names
 from sonarsynth.labels.views.range_cells_met import box_of
 from sonarsynth.store import splits_of
+from sonarsynth.store.files.place import write_atomically
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -77,7 +78,7 @@ def write_coco(
                 progress(n * len(frames) + done, len(there) * len(frames), 0)
         for split_name, entry in entries.items():
             files.append(folder / f"{split_name}{pictures.file}.json")
-            files[-1].write_text(json.dumps(entry), encoding="utf-8")
+            write_atomically(files[-1], json.dumps(entry).encode())
     return tuple(files)
 
 

@@ -11,6 +11,8 @@ from typing import Final
 from sonarsynth.frontiers import AccuracyReport
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.pictures.figures.frontier_figure import Line, Panel, frontier_figure
+from sonarsynth.pictures.figures.style import save
+from sonarsynth.store.files.place import write_atomically
 
 TITLES: Final = {
     "trace": "signals: tracing and synthesis, by how paths are traced",
@@ -26,7 +28,7 @@ def write(measured: AccuracyReport, out: Path, name: str = "recipe") -> list[Pat
     """Write <name>.json and <name>.png into a folder; their paths."""
     out.mkdir(parents=True, exist_ok=True)
     files = [out / f"{name}.json", out / f"{name}.png"]
-    files[0].write_text(json.dumps(measured.as_json(), indent=2, allow_nan=False) + "\n")
+    write_atomically(files[0], (json.dumps(measured.as_json(), indent=2, allow_nan=False) + "\n").encode())
     panels = [panel for stage in TITLES if (panel := _panel(stage, measured.points)) is not None]
     if not panels:
         return files[:1]
@@ -35,7 +37,7 @@ def write(measured: AccuracyReport, out: Path, name: str = "recipe") -> list[Pat
         f"Frames {frames}; {measured.hydrophones} hydrophones computed exactly. An error is the largest of the frames, "
         "a time the mean of them. Points without error are drawn on the dotted line."
     )
-    frontier_figure(f"{measured.title}: error against run time", panels, note).savefig(files[1])
+    save(frontier_figure(f"{measured.title}: error against run time", panels, note), files[1])
     return files
 
 

@@ -15,11 +15,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import sonarsynth as ss
 from sonarsynth import planning, schedule
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.detection import from_rows
-from sonarsynth.export import FORMATS, coco_files, sonar_netcdf, write_points
+from sonarsynth.export import FORMATS, coco_files, sonar_netcdf, write_bellhop, write_points
+from sonarsynth.frontiers import AccuracyReport, Point, frontier_report
 from sonarsynth.pictures.figures.style import figure, save
 from sonarsynth.pictures.film import write_film
 from sonarsynth.recipe import reading
@@ -107,6 +109,31 @@ def test_a_film_and_a_picture_are_all_there_or_as_they_were(tmp_path: Path, monk
         with files_of_at_most(len(whole) - 1), pytest.raises(OSError) as raised:
             write()
         assert raised.value.filename == str(file) and file.read_bytes() == whole
+
+
+@pytest.mark.parametrize("what", ["bellhop", "frontiers", "coco"])
+def test_what_is_written_over_an_earlier_export_is_all_there_or_as_it_was(
+    store: Path, tmp_path: Path, what: str
+) -> None:
+    """From Python, into a folder that has files: an environment, a table of reflection, rows or a picture was cut."""
+    table = "{kind: table, grazing: [0 deg, 90 deg], modulus: [1, 1], phase: [180 deg, 180 deg]}"
+    below = BELOW.replace("{depth: 12 m", f"{{surface: {{reflection: {table}}}, depth: 12 m")
+    points = [Point("synthesis", "knob", str(n), 1e-3 * n, "1", 1.0, 1.0 / n, chosen=n == 2) for n in (1, 2, 3)]
+    report = AccuracyReport("a recipe", (0,), 4, tuple(points), ())
+    write = {
+        "bellhop": lambda: write_bellhop(planning.plan(reading.loads(below)), 0, tmp_path, "below")[0],
+        "frontiers": lambda: frontier_report.write(report, tmp_path),
+        "coco": lambda: coco_files.write_coco(ss.open(store), tmp_path, np.array([2, 3])),
+    }[what]
+    files = write()
+    assert len(files) > (what != "coco")
+    whole = {file: file.read_bytes() for file in files}
+    for cut in files:
+        for file in files:
+            file.write_bytes(whole[file] + b" ")  # an earlier one, which is not what is written now
+        with files_of_at_most(len(whole[cut]) - 1), pytest.raises(OSError):
+            write()
+        assert all(file.read_bytes().rstrip(b" ") == whole[file].rstrip(b" ") for file in files)
 
 
 def test_a_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:

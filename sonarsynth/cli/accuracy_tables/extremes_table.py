@@ -10,6 +10,7 @@ import typer
 from rich.table import Table
 
 from sonarsynth.cli.printing import console, overwrite
+from sonarsynth.store.files.place import write_atomically
 from sonarsynth.validation.extremes import extremes, groups
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ def extremes_table(out: Path, *, as_json: bool) -> None:
     text = json.dumps([row.as_json() for row in rows], indent=2)
     out.mkdir(parents=True, exist_ok=True)
     file = out / "extremes.json"
-    file.write_text(text + "\n")
+    write_atomically(file, f"{text}\n".encode())
     if as_json:
         typer.echo(text)
     else:
