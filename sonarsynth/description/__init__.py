@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from typing import Any, TypeVar, cast, dataclass_transform
+from typing import Any, Final, TypeVar, cast, dataclass_transform
 
 from pydantic import ConfigDict, Discriminator, Field
 from pydantic.dataclasses import dataclass
@@ -28,6 +28,9 @@ def _one_or_several(value: object) -> str:
 
 ONE_OR_SEVERAL: Any = Discriminator(_one_or_several)
 """Annotation of a union of one (`Tag("one")`) and a tuple of such (`Tag("several")`)."""
+
+SYNONYMS: Final = {"file": "path", "filename": "path"}
+"""What people write for a field, and its name, which is not spelt alike."""
 
 _CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True)
 
@@ -48,7 +51,8 @@ class FieldError(ValueError):
 
 def unknown(name: str, names: Iterable[str], noun: str = "field") -> str:
     """That there is no such name, and which one it may be."""
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    meant = [word for word in names if word == SYNONYMS.get(name)]
+    close = meant or difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(names)}"
     return f"'{name}' is not a {noun} here; {hint}"
 

@@ -15,7 +15,7 @@ from sonarsynth.description import named_files
 from sonarsynth.environment.down_cast import PLAUSIBLE, Selection, averaged, left_out, select
 from sonarsynth.environment.hydrography import SpeedFormula, sea_water_speed
 from sonarsynth.environment.profiles import nearest
-from sonarsynth.environment.readers import READ, CastError, CastTable, files_of, read_cast
+from sonarsynth.environment.readers import READ, CastError, CastTable, called, files_of, read_cast
 from sonarsynth.environment.sound_speed import (
     Cast,
     Catenary,
@@ -141,12 +141,13 @@ def _needed(cast: Cast, table: CastTable) -> tuple[str, ...]:
     has = table.columns
     level = next((name for name in ("depth", "pressure") if name in has), None)
     if level is None:
-        raise CastError(f"{table.where()}: no column of depth or pressure among {table.shown_names}; read are {READ}")
+        line = f"{table.where()}: no column of depth or pressure among {table.shown_names}"
+        raise CastError(f"{line}; read are {READ}{called('depth', 'pressure')}")
     usable = "sound speed" in has and np.isfinite(has["sound speed"].values).any()
     if usable and cast.quantity != "temperature_salinity":
         return level, "sound speed"
     if cast.quantity == "sound_speed":
-        raise CastError(f"{table.where()}: no column of sound speed among {table.shown_names}")
+        raise CastError(f"{table.where()}: no column of sound speed among {table.shown_names}{called('sound speed')}")
     if "temperature" in has and ("salinity" in has or cast.salinity is not None):
         return level, "temperature", *(("salinity",) if "salinity" in has else ())
     if "temperature" in has and "conductivity" in has:
@@ -154,7 +155,8 @@ def _needed(cast: Cast, table: CastTable) -> tuple[str, ...]:
         return level, "temperature", "conductivity"
     missing = "" if cast.quantity == "temperature_salinity" else "sound speed, or of "
     comma = "," if missing else ""
-    hint = "; give the `salinity`" if "temperature" in has else ""
+    wanted = called("sound speed" if missing else "temperature")
+    hint = "; give the `salinity`" if "temperature" in has else wanted
     raise CastError(
         f"{table.where()}: no columns of {missing}temperature and salinity{comma} among {table.shown_names}{hint}"
     )

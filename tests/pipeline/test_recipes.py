@@ -74,6 +74,11 @@ WRONG = [
         "{kind: tabulated, depth: [5, 0], speed: [1500, 1500]}",
         "depth: must not decrease",
     ),
+    (
+        "{kind: isovelocity, speed: 1540}",
+        "{kind: cast, file: cast.csv}",
+        "5: scene.world.environment.sound_speed.file: 'file' is not a field here; did you mean 'path'?",
+    ),
 ]
 
 

@@ -178,6 +178,11 @@ BAD = {
         "line 1: 3 column names, but rows of 6 numbers: are these decimal commas?",
     ),
     "no depth": ("c,temperature\n1500,9\n", "line 1: no column of depth or pressure among 'c', 'temperature'"),
+    "another speed": (
+        "depth,speed\n1,1500\n",
+        "among 'depth', 'speed'; a sound speed may be called sound speed, sound velocity, speed of sound, ",
+    ),
+    "another depth": ("z,c\n1,1500\n", "; a depth may be called depth, dep, depsm, "),
     "no speed": ("depth,salinity\n1,35\n", "line 1: no columns of sound speed, or of temperature and salinity"),
 }
 
@@ -209,5 +214,5 @@ def test_columns_that_were_asked_for_must_be_there(tmp_path):
     with pytest.raises(CastError, match="no columns of temperature and salinity among 'depth', 'c'"):
         profile_of(Cast(path=path, quantity="temperature_salinity"))
     path = str(written(tmp_path, "depth,temperature,salinity\n1,10,35\n", "other.csv"))
-    with pytest.raises(CastError, match="no column of sound speed"):
+    with pytest.raises(CastError, match=r"no column of sound speed among .*; a sound speed may be called sound speed"):
         profile_of(Cast(path=path, quantity="sound_speed"))

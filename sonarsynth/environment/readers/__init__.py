@@ -14,13 +14,14 @@ from typing import Any, Final
 
 from sonarsynth.description import named_files
 from sonarsynth.environment.readers.bellhop_env import is_bellhop, is_range_dependent, ranges_beside, read_bellhop
+from sonarsynth.environment.readers.cast_columns import called
 from sonarsynth.environment.readers.cast_netcdf import read_netcdf
 from sonarsynth.environment.readers.cast_table import MAX_ROWS, CastError, CastTable
 from sonarsynth.environment.readers.fixed_columns import read_fixed_columns
 from sonarsynth.environment.readers.named_columns import read_named_columns
 from sonarsynth.environment.readers.sea_bird import is_sea_bird, read_sea_bird
 
-__all__ = ["READ", "CastError", "CastTable", "files_of", "read_cast"]
+__all__ = ["READ", "CastError", "CastTable", "called", "files_of", "read_cast"]
 
 READ: Final = (
     "Sea-Bird CNV, ROS and BTL; CastAway, Valeport, AML, RBR, Sippican EDF, MVP, SAIV, Idronaut, Sea and Sun, "

@@ -134,6 +134,11 @@ def meaning(column: str, unit: str | None = None) -> Meaning | None:
     return Meaning(quantity, *_conversion(quantity, stated, column), stated=stated is not None)
 
 
+def called(*quantities: str) -> str:
+    """What columns of some quantities are called, for messages."""
+    return "".join(f"; a {quantity} may be called {', '.join(NAMES[quantity][:7])}" for quantity in quantities)
+
+
 def is_unit(text: str) -> bool:
     """Whether a text is one of the units, of any quantity."""
     return any(knows_unit(quantity, _clean_unit(text)) for quantity in UNITS)
