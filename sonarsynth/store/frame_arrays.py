@@ -107,11 +107,9 @@ class FrameArray:
         """Chunk `number` of the array, (frame, ...) as stored."""
         own = self._chunks
         shard, row = divmod(number, own.shard // own.chunk)
-        file = self._content(own.file(shard))
-        shape = (own.chunk, *own.shape[1:])
-        if file is None:
+        path, shape = own.file(shard), (own.chunk, *own.shape[1:])
+        if (file := self._content(path)) is None:
             return np.full(shape, own.fill, own.dtype)
-        path = own.file(shard)
         first, length = (0, file.size) if own.shard == own.chunk else file.entry(row, own.shard // own.chunk, path)
         if first == NOT_THERE and length == NOT_THERE:
             return np.full(shape, own.fill, own.dtype)
@@ -120,7 +118,7 @@ class FrameArray:
             raise Damage(f"{path}: a chunk is not of the size that the array has: {RESTORES}")
         block = np.empty(shape, own.dtype)
         try:
-            (_large if own.chunk_bytes > self._large else blosc.decompress)(data, block)
+            (_decoder() if own.chunk_bytes > self._large else blosc.decompress)(data, block)
         except (RuntimeError, ValueError, TypeError) as error:
             raise Damage(f"{path}: a chunk cannot be decoded: {RESTORES} ({error})") from None
         return block
@@ -174,23 +172,14 @@ def file_of(root: Path, written: WrittenFiles, name: str) -> ArrayFile | None:
         return None
 
 
-def _large(data: bytes, block: np.ndarray) -> None:
-    """Decode a large chunk into an array."""
-    blosc2 = _blosc2()
-    if blosc2 is None:
-        blosc.decompress(data, block)
-    else:
-        blosc2.decompress2(data, dst=block, nthreads=1)
-
-
 @cache
-def _blosc2() -> Any:
-    """blosc2, which decodes in under half the time of numcodecs, but takes a second to import; None without it."""
+def _decoder() -> Callable[[bytes, np.ndarray], object]:
+    """That of large chunks: blosc2, in under half the time of numcodecs, but it takes a second to import."""
     try:
         import blosc2
     except ImportError:
-        return None
-    return blosc2
+        return blosc.decompress  # type: ignore[no-any-return]
+    return lambda data, block: blosc2.decompress2(data, dst=block, nthreads=1)
 
 
 def _checked(data: bytes, path: str) -> bytes:
