@@ -168,7 +168,8 @@ def _steered(plan: Plan) -> str:
         return NOT_STATED
     if plan.errors.image == 0.0:
         return "rounding"
-    return f"{plan.errors.image:.1g} dB rms of beams within 20 dB of the brightest, measured in some frames"
+    measured = f"{plan.errors.image:.1g} dB rms of beams within 20 dB of the brightest, in the worst frame measured"
+    return f"{measured}; others may err two to three times as much"
 
 
 def _bent(plan: Plan) -> str:
