@@ -8,12 +8,14 @@ rays that pass a silhouette closer than 1e-6 of the body's size may go either wa
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from sonarsynth.columns import alike
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Int32s, Ints
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh
@@ -249,3 +251,31 @@ def occluded(
             continue
         hidden[segment[:count]] = ready.within(origin[:count], heading[:count], far[:count], any_hit=True)[0] >= 0
     return hidden
+
+
+def facets_in_sight(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], rows: Ints, to: Floats) -> tuple[Ints, Bools]:
+    """Those of facets (row,) on whose outer side a place (xyz), world, is, and which of them no body hides from it."""
+    mesh, pose, offset, others = body.mesh, body.pose, start_offset(body), _between(body, bodies, to)
+    facet, hidden = faced_from(mesh, rows, offset, pose.to_body(to))
+    if others:
+        start = pose.to_world(mesh.centroid[facet] + offset * mesh.normal[facet])
+        hidden |= occluded(others, start, alike(to, len(facet)))
+    return facet, ~hidden
+
+
+def _between(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], to: Floats) -> tuple[PlacedTarget, ...]:
+    """Those of other bodies that may hide one from a place (xyz), world: by spheres about their origins, with room
+    for where rays start."""
+    line, near = to - body.pose.position, []
+    for other in bodies:
+        away = other.pose.position - body.pose.position
+        beside = away - min(max(float(away @ line) / max(float(line @ line), 1e-300), 0.0), 1.0) * line
+        if other is not body and math.sqrt(beside @ beside) <= 1.001 * (body.mesh.radius + other.mesh.radius):
+            near.append(other)
+    return tuple(near)
+
+
+def start_offset(body: PlacedTarget) -> float:
+    """How far (m) off the facets of a body rays start: more than places in the world are rounded by."""
+    farthest = float(np.abs(body.pose.position).max()) + body.mesh.radius
+    return max(OFFSET * body.mesh.radius, 8.0 * np.finfo(float).eps * farthest)

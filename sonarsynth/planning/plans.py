@@ -110,10 +110,8 @@ class Plan:
 
     def frame(self, index: int) -> Frame:
         """Frame number `index`, which is one of the sequence."""
-        frame = self.recipe.frame(index)[1]
-        if self.sources is None:
-            return frame
-        return self.scene.frame(frame.step, index=index, trajectory=frame.trajectory, seed=frame.seed, key=frame.key)
+        step, key = index - self.recipe.first_frame(self.sequence), self.recipe.spanned.key(self.sequence)
+        return self.scene.frame(step, index=index, trajectory=self.sequence, seed=self.recipe.seed, key=key)
 
     def at(self, index: int) -> Plan:
         """The plan for a frame: with the scene, the water and the propagation of its sequence. Raises FieldError."""

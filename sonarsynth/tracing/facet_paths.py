@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import occluded
-from sonarsynth.columns import alike, picked
+from sonarsynth.casting.ray_casting import facets_in_sight, occluded
+from sonarsynth.columns import alike
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.environment.sea import Profile
@@ -164,13 +164,14 @@ def facet_paths(
         if (owners is not None and number not in owners) or (snaps is not None and not lights):
             return rows[:0]
         rows = rows[rows % tolerances.every == 0] if tolerances.every > 1 else rows
-        return _in_front(context.scattering[number], rows, receiver, slack, lights) if straight else rows
+        rows = _in_front(context.scattering[number], rows, receiver, slack, lights) if straight else rows
+        for place in [receiver.pose.position, *lights] if one_snap else ():
+            rows = _in_sight(context, number, rows, place)
+        return rows
 
     for block in in_blocks(sum(map(len, context.scattering))):
         every, lit = facets_of(context.scattering, block, chosen), None
-        if one_snap:  # what is hidden from either is left out before anything is known of it
-            every = every.select(picked(~_hidden(every, bodies, [receiver.pose.position, *lights])))
-        elif propagation.layered and not straight:
+        if propagation.layered and not straight:
             every, lit = _facing(every, context, propagation, lights, slack)
         leaving = receive_paths(every, medium, receiver, propagation, slack, lit).by(families)
         leaving = leaving if one_snap else view.visible(leaving, every.starts(leaving.row, leaving.departure))
@@ -202,11 +203,15 @@ def _facing(
     return (facets, lit) if propagation.bounces else (facets.select(lit), None)
 
 
-def _hidden(facets: Facets, bodies: tuple[PlacedTarget, ...], places: list[Floats]) -> Bools:
-    """Which facets (facet,) a body hides from any of some places (xyz), by straight lines."""
-    of = facets.owner, facets.facet
-    hides = [occluded(bodies, facets.clear, alike(place, len(facets.facet)), *of) for place in places]
-    return np.asarray(np.logical_or.reduce(hides))
+def _in_sight(context: FrameContext, number: int, rows: Ints, place: Floats) -> Ints:
+    """Those of some elements (row,) of what scatters, by its number, that no body hides from a place (xyz), by straight
+    lines."""
+    surface, bodies = context.scattering[number], context.bodies
+    if number < len(bodies):
+        facet, clear = facets_in_sight(bodies[number], bodies, rows, place)
+        return facet[clear]
+    start = surface.pose.to_world(surface.position[rows])
+    return rows[~occluded(bodies, start, alike(place, len(rows)))]
 
 
 def _in_front(surface: Scatterers, rows: Ints, receiver: Receiver, slack: float, lights: list[Floats]) -> Ints:

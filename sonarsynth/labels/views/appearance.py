@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import OFFSET, faced_from, occluded
+from sonarsynth.casting.ray_casting import facets_in_sight, start_offset
 from sonarsynth.columns import alike, picked
 from sonarsynth.conventions import Bools, Floats, Int32s, Ints
 from sonarsynth.geometry import Pose
@@ -97,39 +96,11 @@ def _visible(
     unshadowed: (facet,) whether rays arrive from them, None where rays are straight."""
     mesh, visible, facing = body.mesh, [], []
     for block in in_blocks(len(mesh.faces)):
-        rows, clear = _leaving(body, bodies, np.arange(block.start, block.stop), sonar_pose.position)
+        rows, clear = facets_in_sight(body, bodies, np.arange(block.start, block.stop), sonar_pose.position)
         facing.append(mesh.area[rows])
         visible.append(rows[clear if unshadowed is None else clear & unshadowed[rows]])
     seen = np.concatenate(visible)
     return seen, float(mesh.area[seen].sum() / np.concatenate(facing).sum()) if len(seen) else 0.0
-
-
-def _leaving(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], rows: Ints, to: Floats) -> tuple[Ints, Bools]:
-    """Those of facets (row,) on whose outer side a place (xyz), world, is, and which of them no body hides from it."""
-    mesh, pose, offset, others = body.mesh, body.pose, _offset(body), _between(body, bodies, to)
-    facet, hidden = faced_from(mesh, rows, offset, pose.to_body(to))
-    if others:
-        start = pose.to_world(mesh.centroid[facet] + offset * mesh.normal[facet])
-        hidden |= occluded(others, start, alike(to, len(facet)))
-    return facet, ~hidden
-
-
-def _between(body: PlacedTarget, bodies: tuple[PlacedTarget, ...], to: Floats) -> tuple[PlacedTarget, ...]:
-    """Those of other bodies that may hide one from a place (xyz), world: by spheres about their origins, with room
-    for where rays start."""
-    line, near = to - body.pose.position, []
-    for other in bodies:
-        away = other.pose.position - body.pose.position
-        beside = away - min(max(float(away @ line) / max(float(line @ line), 1e-300), 0.0), 1.0) * line
-        if other is not body and math.sqrt(beside @ beside) <= 1.001 * (body.mesh.radius + other.mesh.radius):
-            near.append(other)
-    return tuple(near)
-
-
-def _offset(body: PlacedTarget) -> float:
-    """How far (m) off the facets of a body rays start: more than places in the world are rounded by."""
-    farthest = float(np.abs(body.pose.position).max()) + body.mesh.radius
-    return max(OFFSET * body.mesh.radius, 8.0 * np.finfo(float).eps * farthest)
 
 
 def lit_fraction(
@@ -152,10 +123,10 @@ def lit_fraction(
     for block in in_blocks(len(visible)):
         rows = visible[block]
         if bent is None:
-            faced, clear = _leaving(body, bodies, rows, snap.position)
+            faced, clear = facets_in_sight(body, bodies, rows, snap.position)
         else:
             position, normal = body.pose.to_world(mesh.centroid[rows]), body.pose.turn_to_world(mesh.normal[rows])
-            facets = Facets(alike(number, len(rows)), rows, position, position + _offset(body) * normal, normal)
+            facets = Facets(alike(number, len(rows)), rows, position, position + start_offset(body) * normal, normal)
             if bent.layered:
                 facets = facets.select(may_face_receiver(facets, snap.position, 0, medium))
             paths = bent.connect(medium.profile, medium.depth, alike(snap.position, len(facets.facet)), facets.point)
