@@ -55,9 +55,6 @@ class Straight(PathModel):
 
         layers = water(profile.depth, profile.speed, environment_depth)
         z1, z2 = within(layers, depth(start), "start"), within(layers, depth(end), "end")
-        away = np.asarray(end, float) - np.asarray(start, float)
-        if not np.isfinite(away).all():
-            raise ValueError("paths need finite ends")
         ways = images(z1, z2, environment_depth, self.bounces)
         climb = np.array([image.climb for image in ways])
         mean = np.broadcast_to(1.0 / profile.speed[0], climb.shape)
@@ -70,8 +67,10 @@ class Straight(PathModel):
             mean = np.divide(crossed, height, out=np.tile(own, (len(ways), 1)), where=height > 0)
         surface, bounced = (np.array(n) for n in zip(*((w.surface, w.bottom) for w in ways), strict=True))
         family, time, length, departure, arrival, spreading, grazing = straight_rays(
-            away, climb, mean, (surface + bounced) % 2
+            np.asarray(start, float), np.asarray(end, float), climb, mean, (surface + bounced) % 2
         )
+        if not np.isfinite(time).all():
+            raise ValueError("paths need finite ends")
         pair, none, missing = np.arange(len(z1)), alike(0, len(length)), alike(np.nan, len(length))
         met = {"surface": none, "bottom": none, "surface_grazing": missing, "bottom_grazing": missing}
         if self.bounces:

@@ -140,7 +140,7 @@ def direct_sound(of: _DirectSound) -> tuple[ReceivePaths, Arrivals]:
     """Rays from a snap to the array centre, and what is heard of them where there are no bodies: that of the last
     frame, where the sonar and the snap are where they were."""
     receiver, snap = of.context.receiver, of.context.snaps[of.index]
-    rays = rays_to_centre(of.context.medium, snap.position[None, :], receiver, of.propagation).by(of.ways)
+    rays = rays_to_centre(snap.position[None, :], of.context.medium, receiver, of.propagation).by(of.ways)
     rays = rays.select(picked(directed(snap, rays.departure)[0] * rays.spreading != 0.0))
     return rays, _heard(of, rays)
 

@@ -110,13 +110,15 @@ def velocities(scattering: tuple[Scatterers, ...], owner: Ints, point: Floats) -
 
 def meets(
     out: TransmitPaths, met: Floats, velocity: Floats, time: float, speed: Floats
-) -> tuple[TransmitPaths, Floats]:
-    """Ways to facets that move, when and where the sound of a snap at `time` (s) meets them, and by how much after
-    `met` (way,) s, where ways lead to where they are then; velocity (way, xyz) of the facets, speed (way,) of sound
-    there, m/s."""
-    late, arrival, length = moving_ends.meet(out.length, out.arrival, time + out.travel_time - met, speed, velocity)
+) -> tuple[TransmitPaths, Floats, Floats]:
+    """Ways to facets that move, when and where the sound of a snap at `time` (s) meets them, by how much after `met`
+    (way,) s, where ways lead to where they are then, and how far from there (way, xyz) m; velocity (way, xyz) of the
+    facets, speed (way,) of sound there, m/s."""
+    late, arrival, length, apart = moving_ends.meet(
+        out.length, out.arrival, time + out.travel_time - met, speed, velocity
+    )
     spreading, travel_time = out.spreading * (out.length / length), (met - time) + late
-    return out.but(arrival=arrival, length=length, travel_time=travel_time, spreading=spreading), late
+    return out.but(arrival=arrival, length=length, travel_time=travel_time, spreading=spreading), late, apart
 
 
 def bounced_anew(paths: Bounced, z: Floats, before: Floats, after: Floats, medium: Medium, centre: float) -> Bounced:
@@ -146,15 +148,13 @@ def mirrored(velocity: Floats, bounces: Ints) -> Floats:
     return image
 
 
-def met_paths(
-    legs: ReceivePaths, leg: Ints, met: Floats, late: Floats, velocity: Floats, spin: Floats, meeting: Meeting
-) -> MotionTerms:
-    """The remainder of paths (path,) that go on by a leg each; `late` s after `met` their facets are met."""
-    apart = -velocity * late[:, None]
-    if not meeting.sonar.still:
-        arrival_time = met + late + legs.travel_time[leg] - meeting.arrival_time
-        apart += mirrored(meeting.sonar.velocity * arrival_time[:, None], legs.bounces[leg])
-    return MotionTerms(met, late, velocity, spin, apart)
+def met_paths(legs: ReceivePaths, leg: Ints, of: MotionTerms, meeting: Meeting) -> MotionTerms:
+    """The remainder of paths (path,) that go on by a leg each, from that of an array at rest."""
+    if meeting.sonar.still:
+        return of
+    arrival_time = of.met + of.late + legs.travel_time[leg] - meeting.arrival_time
+    gone = mirrored(meeting.sonar.velocity * arrival_time[:, None], legs.bounces[leg])
+    return of.but(apart=of.apart + gone)
 
 
 def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, medium: Medium, centre: float) -> ReceivePaths:
@@ -163,9 +163,10 @@ def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, medium: Medi
     profile = medium.profile
     pose, u = meeting.sonar.pose, meeting.sonar.velocity
     c_facet, c_array = profile.at(depth(legs.point)), float(profile.at(depth(pose.position)))
-    moved, begun = of.velocity * of.late[:, None], of.met + of.late
-    gone = begun - meeting.arrival_time + legs.travel_time - dot(moved, legs.departure) / c_facet
-    late, arrival, radius = moving_ends.hear(legs.length, legs.arrival, gone, u, c_array, moved, legs.bounces)
+    begun = of.met + of.late
+    rays = legs.length, legs.arrival, begun - meeting.arrival_time + legs.travel_time, u, c_array, legs.bounces
+    points = legs.point, legs.departure, of.late, of.velocity, c_facet
+    late, arrival, radius, there = moving_ends.hear(*rays, *points)
     departure = of.departure(legs.length, legs.departure)
     legs = bounced_anew(legs, depth(legs.point), legs.departure, departure, medium, centre)
     direction = -pose.turn_to_body(arrival)
@@ -173,7 +174,7 @@ def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, medium: Medi
         direction = direction - np.cross(pose.turn_to_body(meeting.sonar.spin), direction) * late[:, None]
         direction /= np.sqrt(dot(direction, direction))[:, None]
     return legs.but(
-        point=legs.point + moved, departure=departure, arrival=arrival,
+        point=there, departure=departure, arrival=arrival,
         direction=direction, radius=radius, length=legs.length + (radius - legs.radius),
         spreading=legs.spreading * (legs.radius / radius), travel_time=meeting.arrival_time - begun + late,
     )  # fmt: skip

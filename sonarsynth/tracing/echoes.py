@@ -210,25 +210,25 @@ def _carried(
     velocity, spin = velocities(array.context.scattering, owner, point)
     met = meeting.met[owner]
     medium, z = array.context.medium, depth(point)
-    met_out, late = meets(out, met, velocity, snap.time, medium.profile.at(z))
+    met_out, late, apart = meets(out, met, velocity, snap.time, medium.profile.at(z))
     met_out = bounced_anew(met_out, z, out.arrival, met_out.arrival, medium, array.context.receiver.centre)
     if snap.directivity is not None or snap.velocity.any():
         departure = unit(out.departure + mirrored(met_out.arrival - out.arrival, out.bounces))
         met_out = met_out.leaving(departure, snap, float(medium.profile.at(depth(snap.position))))
-    met, late, velocity, spin = (rows_of(column, way) for column in (met, late, velocity, spin))
-    return met_out, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
+    return met_out, met_paths(array.legs, leg, MotionTerms(met, late, velocity, spin, apart).select(way), meeting)
 
 
 def _towards_probes(array: FacetPaths, leg: Ints, carried: MotionTerms | None, group: EchoBatch, some: slice) -> Floats:
     """Where some probes are seen from the facets of a group (echo, probe, xyz), in the frame of its body; leg, carried:
     of all pairs (pair,)."""
-    rows, body, fronts, legs = leg[group.row], group.surface.pose, array.fronts, array.legs
-    motion = MotionTerms.none(len(rows)) if carried is None else carried.select(group.row)
+    body, fronts, legs = group.surface.pose, array.fronts, array.legs
+    motion = MotionTerms.none(len(leg)) if carried is None else carried
     if fronts.probe_departure is not None:
-        return motion.departure(legs.length[rows], fronts.departure(rows, some), body)
+        rows = leg[group.row]
+        return motion.select(group.row).departure(legs.length[rows], fronts.departure(rows, some), body)
     offset = array.context.receiver.pose.turn_to_world(fronts.place.probe.position[some])
-    ray = legs.length[rows], rows_of(legs.departure, rows), legs.bounces[rows] % 2 == 1
-    return np.asarray(to_moved_images(*ray, offset, motion.apart, motion.late, motion.spin, body.rotation))
+    ray = legs.length, legs.departure, legs.bounces, offset, group.row, leg
+    return np.asarray(to_moved_images(*ray, motion.apart, motion.late, motion.spin, body.rotation))
 
 
 def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:

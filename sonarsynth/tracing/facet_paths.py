@@ -29,6 +29,7 @@ from sonarsynth.tracing.receive_paths import (
     concatenate,
     facets_of,
     may_face_receiver,
+    rays_to_centre,
     receive_paths,
     require_in_water,
 )
@@ -159,6 +160,7 @@ def facet_paths(
     one_snap = straight and tolerances.occlusion == "centre" and snaps is not None and len(snaps) == 1
     families = None if ways is None else {on for _, on in ways}
     lights = [snap.position for snap in snaps or () if snap.illuminates]
+    ends = medium, receiver, propagation  # straight rays to there all leave on the outer side: `chosen` sees to it
 
     def chosen(number: int, rows: Ints) -> Ints:
         if (owners is not None and number not in owners) or (snaps is not None and not lights):
@@ -173,7 +175,8 @@ def facet_paths(
         every, lit = facets_of(context.scattering, block, chosen), None
         if propagation.layered and not straight:
             every, lit = _facing(every, context, propagation, lights, slack)
-        leaving = receive_paths(every, medium, receiver, propagation, slack, lit).by(families)
+        legs = rays_to_centre(every.point, *ends) if straight else receive_paths(every, *ends, slack, lit)
+        leaving = legs.by(families)
         leaving = leaving if one_snap else view.visible(leaving, every.starts(leaving.row, leaving.departure))
         first = np.diff(leaving.row, prepend=-1) > 0
         reached = leaving.row[first]

@@ -143,7 +143,7 @@ def apart(row: Ints, travel_time: Floats, arrival: Floats) -> Bools:
 
 
 def rays_to_centre(
-    medium: Medium, point: Floats, receiver: Receiver, propagation: Propagation,
+    point: Floats, medium: Medium, receiver: Receiver, propagation: Propagation,
     chosen: Callable[[Paths], Bools] = usable,
 ) -> ReceivePaths:  # fmt: skip
     """Rays from points (point, xyz) in the world to the array centre, sorted by point: all, or those that are chosen
@@ -232,7 +232,7 @@ def receive_paths(
         seen = np.asarray((ahead > -slack) | facets.sideless[paths.pair])
         return seen & (direct[paths.pair] | (paths.surface + paths.bottom < propagation.bounces))
 
-    return rays_to_centre(medium, facets.point, receiver, propagation, chosen)
+    return rays_to_centre(facets.point, medium, receiver, propagation, chosen)
 
 
 def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Medium, slack: float = 0.0) -> Ints:

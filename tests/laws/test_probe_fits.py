@@ -88,12 +88,18 @@ def test_images_of_probes_are_seen_from_where_a_facet_has_moved_to() -> None:
     image = np.where(mirrored[:, None, None], offset * [1.0, 1.0, -1.0], offset)
     towards = (length[:, None] * departure)[:, None] + image + apart[:, None]
     expected = unit(towards - np.cross((late[:, None] * spin)[:, None], towards)) @ axes
-    ray = length, departure, mirrored, offset
-    np.testing.assert_allclose(to_moved_images(*ray, apart, late, spin, axes), expected, atol=1e-14)
+    ray, ends, every = (length, departure), (mirrored.astype(int), offset), (np.arange(6), np.arange(6))
+    np.testing.assert_allclose(to_moved_images(*ray, *ends, *every, apart, late, spin, axes), expected, atol=1e-14)
+    some = np.array([4, 1]), np.array([5, 0, 3, 3, 2])
+    of_some = to_moved_images(*ray, *ends, *some, *(of[:5] for of in (apart, late, spin)), axes)
+    legs = some[1][some[0]]
+    alone = length[legs], departure[legs], ends[0][legs], offset, np.arange(2), np.arange(2)
+    np.testing.assert_array_equal(of_some, to_moved_images(*alone, *(of[some[0]] for of in (apart, late, spin)), axes))
     still = np.zeros((6, 3))
-    np.testing.assert_allclose(to_moved_images(*ray, still, late, still, np.eye(3)), to_images(*ray), atol=1e-15)
+    straight = to_moved_images(*ray, *ends, *every, still, late, still, np.eye(3))
+    np.testing.assert_allclose(straight, to_images(*ray, mirrored, offset), atol=1e-15)
     centre = departure[:, None].copy()
-    at_centre = to_moved_images(length, departure, mirrored, np.zeros((1, 3)), apart, late, spin, axes)
+    at_centre = to_moved_images(*ray, ends[0], np.zeros((1, 3)), *every, apart, late, spin, axes)
     np.testing.assert_allclose(moved(length, centre, apart, late, spin, axes), at_centre, atol=1e-14)
 
 

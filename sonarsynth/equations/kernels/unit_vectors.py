@@ -12,18 +12,18 @@ from sonarsynth.conventions import Bools, Floats, Ints
 
 @compiled
 def straight_rays(
-    away: Floats, climb: Floats, mean: Floats, odd: Ints
+    start: Floats, end: Floats, climb: Floats, mean: Floats, odd: Ints
 ) -> tuple[Ints, Floats, Floats, Floats, Floats, Floats, Floats]:
-    """Ways as far over ground as `away` (pair, xyz) m and up (family, pair) m at a mean slowness (family, pair) s/m,
-    sorted by pair, then by travel time: family, travel times, lengths, unit vectors along them (ray, xyz) where they
-    begin, NaN of none, and where they end, there upside down of odd (family,) ones, one over the lengths, and grazing
+    """Ways from start to end (pair, xyz) m that climb (family, pair) m, at a mean slowness (family, pair) s/m, sorted
+    by pair, then by travel time: family, travel times, lengths, unit vectors along them (ray, xyz) where they begin,
+    NaN of none, and where they end, there upside down of odd (family,) ones, one over the lengths, and grazing
     angles."""
     families, count = climb.shape
     family, first = np.empty(families * count, np.int64), 0
     time, length, inverse, grazing = np.empty((4, families * count))
     departure, arrival = np.empty((2, families * count, 3))
     for i in range(count):
-        x, y = away[i, 0], away[i, 1]
+        x, y = end[i, 0] - start[i, 0], end[i, 1] - start[i, 1]
         for n in range(families):
             far = math.sqrt(x * x + y * y + climb[n, i] * climb[n, i])
             late, k = far * mean[n, i], first + n
@@ -99,16 +99,18 @@ def moved(length: Floats, away: Floats, apart: Floats, late: Floats, spin: Float
 
 @compiled
 def to_moved_images(
-    length: Floats, departure: Floats, mirrored: Bools, offset: Floats, apart: Floats, late: Floats, spin: Floats,
-    rotation: Floats,
+    length: Floats, departure: Floats, bounces: Ints, offset: Floats, rows: Ints, leg: Ints, apart: Floats,
+    late: Floats, spin: Floats, rotation: Floats,
 ) -> Floats:  # fmt: skip
-    """As `to_images`, of places that are farther by apart (leg, xyz), turned back and in axes as of `moved`."""
-    out = np.empty((len(length), len(offset), 3))
-    for i in range(len(length)):
+    """As `to_images`, (row, place, xyz) of the legs (path,) of some paths (row,): to places that are farther by apart
+    (path, xyz), turned back and in axes as of `moved`; bounces (leg,): an odd number mirrors."""
+    out = np.empty((len(rows), len(offset), 3))
+    for k in range(len(rows)):
+        n, i = rows[k], leg[rows[k]]
         for j in range(len(offset)):
-            up = -offset[j, 2] if mirrored[i] else offset[j, 2]
-            x = length[i] * departure[i, 0] + offset[j, 0] + apart[i, 0]
-            y = length[i] * departure[i, 1] + offset[j, 1] + apart[i, 1]
-            z = length[i] * departure[i, 2] + up + apart[i, 2]
-            _put_turned(x, y, z, late[i], spin[i], rotation, out[i, j])
+            up = -offset[j, 2] if bounces[i] % 2 == 1 else offset[j, 2]
+            x = length[i] * departure[i, 0] + offset[j, 0] + apart[n, 0]
+            y = length[i] * departure[i, 1] + offset[j, 1] + apart[n, 1]
+            z = length[i] * departure[i, 2] + up + apart[n, 2]
+            _put_turned(x, y, z, late[n], spin[n], rotation, out[k, j])
     return out

@@ -54,7 +54,7 @@ def forward_paths(array: FacetPaths) -> FacetPaths | None:
     owners = range(len(laws)) if array.owners is None else array.owners
     scatters = np.array([bool(shadow_parts(law)) and number in owners for number, law in enumerate(laws)])
     every = every.select(scatters[every.owner])
-    legs = rays_to_centre(context.medium, every.point, receiver, propagation)
+    legs = rays_to_centre(every.point, context.medium, receiver, propagation)
     view = array.view(solid)
     legs = view.visible(legs, Starts(every.clear[legs.row]))
     legs = view.settled(legs, Starts(every.clear[legs.row]))
