@@ -86,19 +86,9 @@ class CastingMesh:
         vars(copy).update(around=self.around, tree=self.tree, horizon=self.horizon)
         return copy
 
-    def cast(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
-        """Facet (ray,) and distance of the nearest hit for rays in this mesh's frame and unit; -1 and NaN for none."""
-        facet, distance = np.full(len(origin), NO_TARGET), np.full(len(origin), np.nan)
-        entry, leave = _through_unit_sphere(origin, direction, far)
-        open_rays = np.flatnonzero(entry < leave)
-        start = origin[open_rays] + entry[open_rays, None] * direction[open_rays]
-        facet[open_rays], along = self.within(start, direction[open_rays], (far - entry)[open_rays])
-        distance[open_rays] = along + entry[open_rays]
-        return facet, distance
-
     def within(self, start: Floats, heading: Floats, limit: Floats, *, any_hit: bool = False) -> tuple[Ints, Floats]:
-        """The same of rays that start at the bounding sphere or within it, and end within `limit`; any_hit: of another
-        hit perhaps than the nearest."""
+        """Facet (ray,) and distance of the nearest hit within `limit`, in the unit of this mesh, or with any_hit of
+        another, of rays that start at its bounding sphere or within it; -1 and NaN for none."""
         from sonarsynth.casting import intersections
 
         facet, distance = np.full(len(start), NO_TARGET), np.full(len(start), np.nan)
@@ -123,15 +113,6 @@ class CastingMesh:
         intersections.search(start, heading, np.zeros(len(start)), limit, self.vertices, self.faces, 1.0, hit, along)
         facet[rays], distance[rays] = hit, along
         return facet, distance
-
-
-def _through_unit_sphere(origin: Floats, direction: Floats, far: Floats) -> tuple[Floats, Floats]:
-    """Where rays enter and leave a sphere a little over the unit sphere, within [0, far]; entry >= leave: a miss."""
-    nearest = -np.einsum("ij,ij->i", origin, direction)
-    foot = origin + nearest[:, None] * direction
-    square = 1.0 + 1e-5 - np.einsum("ij,ij->i", foot, foot)
-    half = np.sqrt(np.maximum(square, 0.0))
-    return np.maximum(nearest - half, 0.0), np.where(square > 0, np.minimum(nearest + half, far), -1.0)
 
 
 @dataclass(frozen=True)
@@ -198,11 +179,21 @@ def first_hit(mesh: Mesh, origin: Floats, direction: Floats) -> tuple[Ints, Floa
     length = np.linalg.norm(d, axis=1)
     if not (np.isfinite(o).all() and np.isfinite(length).all() and (length > 0).all()):
         raise ValueError("rays need a finite origin and a direction")
+    facet, distance = np.full(len(o), NO_TARGET), np.full(len(o), np.nan)
     if not len(mesh.faces) or not len(o):
-        return np.full(len(o), NO_TARGET), np.full(len(o), np.nan)
-    ready = casting_mesh(mesh)
-    facet, distance = ready.cast((o - ready.centre) / ready.size, d / length[:, None], np.full(len(o), np.inf))
-    return facet, distance * ready.size
+        return facet, distance
+    from sonarsynth.casting import intersections
+
+    ready, (start, heading) = casting_mesh(mesh), np.empty((2, *o.shape))
+    far, ray = np.linalg.norm(o - ready.centre, axis=1) + 2.0 * ready.size, np.empty(len(o), np.int64)
+    count = intersections.into_mesh(
+        o, o + (far / length)[:, None] * d, np.zeros(len(o), bool), facet, mesh.normal, np.empty((0, 8)), np.eye(3),
+        np.zeros(3), ready.centre, ready.size, start, heading, far, ray,
+    )  # fmt: skip
+    ray, start = ray[:count], start[:count]
+    facet[ray], along = ready.within(start, heading[:count], far[:count])
+    distance[ray] = along * ready.size + np.linalg.norm(start * ready.size + ready.centre - o[ray], axis=1)
+    return facet, distance
 
 
 def faced_from(mesh: Mesh, rows: Ints, offset: float, place: Floats) -> tuple[Ints, Bools]:

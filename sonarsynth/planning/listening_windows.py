@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
@@ -232,12 +233,9 @@ def _span(frame: Frame, sonar: Sonar, profile: Profile, bottom_depth: float, bou
     late_direct = direct
     if bounces:
         late_direct, late_echo = _reflected(frame, profile, bottom_depth, bounces)
-    last = np.array([max(d, e) for d, e in zip(late_direct, late_echo, strict=True)])
-    received_level = [
-        level - 20 * np.log10(max(float(np.linalg.norm(s.position - array)), 1e-9))
-        for s, level in zip(snaps, snap_levels(snaps), strict=True)
-    ]
-    loudest = int(np.argmax(received_level))
+    last = np.maximum(late_direct, late_echo)
+    away = [max(math.dist(s.position, array), 1e-9) for s in snaps]
+    loudest = int(np.argmax(snap_levels(snaps) - 20.0 * np.log10(away)))
     clock = direct + [lateness(s.waveform, sonar) for s in snaps]
     latest = float(np.max(np.asarray(late_echo) - clock)) if echoes else np.nan
     others = tuple((float(direct[n]), float(last[n])) for n in range(len(snaps)) if n != loudest)

@@ -46,11 +46,6 @@ class EchoBatch(Columns):
         """(echo,) whether it falls to 0 at the limb of the body, rather than ending there."""
         return self.part.tapers(self.patch)
 
-    @property
-    def turns(self) -> bool:
-        """Whether the phase of its reflections differs from direction to direction."""
-        return self.part.turns
-
     def turned(self, away: Floats) -> Floats:
         """Phase (echo, probe) in directions (echo, probe, xyz) more than in that of the array centre."""
         if not self.part.turns:

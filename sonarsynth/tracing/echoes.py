@@ -91,13 +91,9 @@ class _EchoBlock:
         row, amplitude, tapered = _columns(self.groups, "row", "amplitude", "tapered")
         law, gain = self.few, self.array.fronts.gain(self.leg[row], few)
         if few is None:
-            more = [g.over(self.towards_probes(g, MORE)) for g in self.groups]
+            more = [g.over(_towards_probes(self.array, self.leg, self.carried, g, MORE)) for g in self.groups]
             law = np.concatenate([law, _joined(more)], axis=1)
         return probe_fits.gains(law, amplitude, gain, tapered, self.strength)
-
-    def towards_probes(self, group: EchoBatch, some: slice = slice(None)) -> Floats:
-        """Where some probes are seen from the facets of a group (echo, probe, xyz), as `_towards_probes`."""
-        return _towards_probes(self.array, self.leg, self.carried, group, some)
 
     def levels(self) -> EchoLevels:
         """What decides which echoes are kept."""
@@ -284,11 +280,11 @@ def _with_reflection_phases(block: _EchoBlock, strongest: float) -> ArrayExpansi
     is as strong as the strongest. Where the coefficient passes near 0 its phase leaps: there all sensors have that of
     the centre.
     """
-    array, (row,) = block.array, _columns(block.groups, "row")
-    over = array.fronts.expansion[block.leg[row]]
-    if not any(g.turns for g in block.groups):
+    (row,), array, leg = _columns(block.groups, "row"), block.array, block.leg
+    over = array.fronts.expansion[leg[row]]
+    if not any(g.part.turns for g in block.groups):
         return over
-    shift = _joined([g.turned(block.towards_probes(g)) for g in block.groups])
+    shift = _joined([g.turned(_towards_probes(array, leg, block.carried, g, slice(None))) for g in block.groups])
     leaps = np.abs(shift).max(axis=1, initial=0.0) > MAX_PHASE_CHANGE
     if not shift.any():
         return over

@@ -158,7 +158,7 @@ def test_copies_of_other_sizes_share_what_is_known_of_their_original() -> None:
     assert twice is ray_casting.casting_mesh(SPHERE.scaled(2.0))
 
 
-def test_a_wrong_proposal_is_passed_over() -> None:
+def test_a_wrong_proposal_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
     ready = ray_casting.casting_mesh(RING)
 
     class Liar:
@@ -173,9 +173,12 @@ def test_a_wrong_proposal_is_passed_over() -> None:
             return ready.caster.nearest(origin, direction, far)
 
     lying = ray_casting.CastingMesh(ready.centre, ready.size, ready.vertices, ready.faces, Liar())  # type: ignore[arg-type]
-    origin, direction = rays_at(1.0, 3.0, 300, 5)
-    honest, at = ready.cast(origin, direction, np.full(300, np.inf))
-    facet, distance = lying.cast(origin, direction, np.full(300, np.inf))
+    rays = rays_at(RING.radius, 3.0 * RING.radius, 300, 5)
+    honest, at = first_hit(RING, *rays)
+    assert (honest >= 0).sum() > 50
+    monkeypatch.setattr(ray_casting, "casting_mesh", lambda _: lying)
+    facet, distance = first_hit(RING, *rays)
+    assert lying.caster.rounds > 3
     np.testing.assert_array_equal(facet, honest)
     np.testing.assert_allclose(distance, at, rtol=1e-12)
 
