@@ -29,6 +29,7 @@ from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import add_noise, channel_errors, convert
 from sonarsynth.signals.electronics import ElectronicNoise
 from sonarsynth.signals.noise.point_sources import add_noise_source
+from sonarsynth.signals.segments import LateSignals
 from sonarsynth.sources.noise_source import NoiseSource
 from sonarsynth.sources.snap_models import Ricker
 from sonarsynth.sources.sound_source import Emission
@@ -86,10 +87,11 @@ def frame_signals(
                     heard[target] = Signals(_silence(plan, sensors), start, rate, 0.0, 0, 0)
                 _add(heard[target], signals, part.sensor)
             outside = max(outside, lost)
+        heard = {target: replace(signals, outside=outside) for target, signals in heard.items()}
     for target, signals in heard.items():
         recorder.echo(target, signals)
     if not plan.scene.sound_parts:
-        return replace(heard[NO_TARGET], outside=outside)
+        return heard[NO_TARGET]
     total = Signals(_silence(plan, sensors), start, rate, 0.0, 0, outside)
     for signals in heard.values():
         _add(total, signals)
@@ -140,8 +142,10 @@ def _prepared(
 
     def signals() -> Signals:
         made = copy(late)  # what is summed is not kept
-        samples = (reception.samples,) if whole else np.shape(getattr(made, "pressure", 0))[1:]
         refused = plan.scene.sonar.converter is not None  # NaN, without a look at all samples here
+        if refused and isinstance(made, LateSignals):
+            return made
+        samples = (reception.samples,) if whole else np.shape(getattr(made, "pressure", 0))[1:]
         checked: Signals = returned(method, "signals", made, (sensors.count, *samples), "pressure", unknown=refused)
         return checked
 

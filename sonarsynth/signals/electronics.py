@@ -18,7 +18,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Converter, Electronics, Elements, Filter, Sonar
 from sonarsynth.signals.filtered_pulse import filter_response, fir
-from sonarsynth.signals.segments import fast_length
+from sonarsynth.signals.segments import LateSignals, fast_length
 
 QUIETEST = 1e-7
 """Bins of less noise power than this, relative to the loudest, are left empty."""
@@ -151,11 +151,16 @@ def convert(signals: Signals, converter: Converter | None) -> Signals:
         return signals
     from sonarsynth.equations.kernels.rounding import round_off
 
-    largest = 2 ** (converter.bits - 1) - 1
     exact = np.float32 if converter.bits <= 16 else np.float64  # in which every count and its half are numbers
-    analog = signals.pressure.astype(exact, copy=False)
-    pressure = np.empty(analog.shape, np.float32)
-    clipped, unknown = round_off(analog, exact(converter.quantum), exact(largest), pressure)
-    if unknown:
-        raise ValueError("the signals hold NaN: they cannot be converted")
-    return replace(signals, pressure=pressure, quantum=converter.quantum, clipped=signals.clipped + clipped)
+    step, largest = exact(converter.quantum), exact(2 ** (converter.bits - 1) - 1)
+    if isinstance(signals, LateSignals) and "pressure" not in vars(signals):
+        pressure, stretches = np.zeros(signals.shape, np.float32), signals.stretches()
+    else:
+        pressure, stretches = np.empty(signals.pressure.shape, np.float32), [(0, signals.pressure)]
+    clipped = signals.clipped
+    for first, analog in stretches:
+        more, unknown = round_off(analog.astype(exact, copy=False), step, largest, pressure, first)
+        clipped += more
+        if unknown:
+            raise ValueError("the signals hold NaN: they cannot be converted")
+    return Signals(pressure, signals.start, signals.sampling_frequency, converter.quantum, clipped, signals.outside)

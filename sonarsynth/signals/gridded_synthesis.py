@@ -3,16 +3,16 @@ domain."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache, partial
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 
-from sonarsynth.conventions import Number
+from sonarsynth.conventions import Ints, Number
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize
 from sonarsynth.products import Arrivals, Signals
@@ -23,7 +23,7 @@ from sonarsynth.signals.gridded.bins import bins_of
 from sonarsynth.signals.gridded.deposit import Waves, add, prepared
 from sonarsynth.signals.gridded.tiles import FEW
 from sonarsynth.signals.pulse_variation import from_the_sharpest
-from sonarsynth.signals.segments import GUARD, Layout, Reception, Segment, layout
+from sonarsynth.signals.segments import GUARD, LateSignals, Layout, Reception, Segment, layout, overlapping
 from sonarsynth.state import Emission
 
 ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
@@ -59,29 +59,12 @@ def deposit_error(method: GriddedSynthesis, bandwidth: float = np.inf) -> float:
     return kernel + error_over_tolerance(bandwidth) * method.tolerance + ROUNDING[method.precision]
 
 
-def _sounding(plan: Layout, front: ArrayPaths, sampling_frequency: float, samples: int) -> list[tuple[int, int]]:
-    """Of each stretch, the first sample of the window where it is at any hydrophone, and the one after the last."""
+def _sounding(plan: Layout, front: ArrayPaths, sampling_frequency: float, samples: int) -> Ints:
+    """Of each stretch (2, stretch), the first sample of the window where it is at any hydrophone, and the one after the
+    last; of none, the first few."""
     apart = int(np.ceil(reach(front).max(initial=0.0) * sampling_frequency)) + 2 * GUARD
     ends = [(span.first - apart, span.first + span.samples + apart) for span in plan.stretches] or [(0, apart)]
-    return [(min(max(low, 0), samples), min(max(high, 0), samples)) for low, high in ends]
-
-
-class LateSignals(Signals):
-    """Signals that are summed at the hydrophones when their pressure is first looked at. What is made before is small:
-    made for some frames, one after the other, it stays in the caches of a core."""
-
-    @classmethod
-    def of(cls, total: Callable[[], npt.NDArray[Any]], start: float, rate: float, outside: int) -> LateSignals:
-        """total: gives the pressure; the others as in `Signals`."""
-        late = object.__new__(cls)
-        vars(late).update(total=total, start=start, sampling_frequency=rate, quantum=0.0, clipped=0, outside=outside)
-        return late
-
-    @cached_property
-    def pressure(self) -> npt.NDArray[np.float32]:
-        """(sensor, sample) Pa."""
-        total: Callable[[], npt.NDArray[Any]] = vars(self).pop("total")
-        return total().astype(np.float32, copy=False)
+    return np.asarray(np.clip(np.array(ends).T, 0, samples))
 
 
 @dataclass(frozen=True)
@@ -89,26 +72,22 @@ class _FewPaths:
     """Few paths of a stretch, the same as others where all that is known of them is: in each frame of a still snap."""
 
     known: tuple[Any, ...]
-    within: tuple[int, int]  # of the window: the first sample where they are heard, and the one after the last
-    span: Segment = field(compare=False)
-    paths: ArrayPaths = field(compare=False)
+    waves: Callable[[], Waves] = field(compare=False)
 
     @staticmethod
-    def of(span: Segment, within: tuple[int, int], paths: ArrayPaths) -> _FewPaths:
-        """Those of a stretch."""
+    def of(method: GriddedSynthesis, span: Segment, paths: ArrayPaths, reception: Reception) -> _FewPaths:
+        """As `GriddedSynthesis.waves` has them."""
         tables = paths.but(expansion=None), paths.expansion, replace(span, paths=span.paths[:0])
         held = [value for table in tables for value in vars(table).values()]
-        known = tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in held)
-        return _FewPaths(known, within, span, paths)
+        known = (value.tobytes() if isinstance(value, np.ndarray) else value for value in held)
+        return _FewPaths((method, reception, *known), partial(method.waves, span, paths, reception))
 
 
 @lru_cache(maxsize=4)
-def sound_of_few(few: _FewPaths, method: GriddedSynthesis, reception: Reception) -> npt.NDArray[Any]:
-    """Pressure (sensor, sample) of few paths, where they are heard."""
-    first, stop = few.within
-    out = np.zeros((reception.elements.count, stop - first), method.precision)
-    add(out, first, method.waves(few.span, few.paths, reception))
-    return out
+def waves_of_few(few: _FewPaths) -> Waves:
+    """The waves of few paths."""
+    made = tuple(few.waves()())
+    return lambda: made
 
 
 @description
@@ -182,43 +161,34 @@ class GriddedSynthesis(UnroundedSynthesis):
         self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
     ) -> tuple[npt.NDArray[Any], int]:
         """As `UnroundedSynthesis.pressure`: silence, and stretches of it that hold whole pulses."""
-        total, _, outside = self._sound(arrivals, snaps, reception._replace(whole=True))
-        return total(), outside
+        late = self.signals(arrivals, snaps, reception._replace(whole=True))
+        assert isinstance(late, LateSignals)
+        return late.total(self.precision), late.outside
 
     def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
         """As `SignalSynthesis.signals`, with all made but for the sums at the hydrophones."""
-        total, first, outside = self._sound(arrivals, snaps, reception)
-        rate = reception.sonar.sampling_frequency
-        return LateSignals.of(total, reception.start + first / rate, rate, outside)
-
-    def _sound(
-        self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
-    ) -> tuple[Callable[[], npt.NDArray[Any]], int, int]:
-        """What gives the pressure (sensor, sample), the sample of the window where it begins, and the number of
-        arrivals that the window cuts."""
-        elements, sonar, absorption, _, samples, whole, still = reception
+        elements, sonar, absorption, start, samples, whole, still = reception
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
         front = from_the_sharpest(front, stop_frequency(sonar.antialias))
         plan = layout(arrivals, front, snaps, reception, tolerance=0.01 * self.tolerance)
-        sounding = _sounding(plan, front, sonar.sampling_frequency, samples)
-        low, high = (0, samples) if whole else (min(low for low, _ in sounding), max(high for _, high in sounding))
-        parts: list[Waves | _FewPaths] = []
-        for span, within in zip(plan.stretches, sounding, strict=False):
+        first, stop = _sounding(plan, front, sonar.sampling_frequency, samples)
+        low, high = (0, samples) if whole else (int(first.min()), int(stop.max()))
+        waves: list[Waves] = []
+        for span in plan.stretches:
             paths = front.select(span.paths)
-            few = still and paths.count <= FEW
-            parts.append(_FewPaths.of(span, within, paths) if few else self.waves(span, paths, reception))
+            known = _FewPaths.of(self, span, paths, reception) if still and paths.count <= FEW else None
+            waves.append(waves_of_few(known) if known else self.waves(span, paths, reception))
 
-        def total() -> npt.NDArray[Any]:
-            out = np.zeros((elements.count, high - low), self.precision)
-            for part in parts:
-                if isinstance(part, _FewPaths):
-                    first, stop = part.within
-                    out[:, first - low : stop - low] += sound_of_few(part, self, reception)
-                else:
-                    add(out, low, part)
-            return out
+        def stretches() -> Iterator[tuple[int, npt.NDArray[Any]]]:
+            for some in overlapping(np.arange(len(waves)), first, stop):
+                begin, end = int(first[some].min()), int(stop[some].max())
+                out = np.zeros((elements.count, end - begin), self.precision)
+                for n in some:
+                    add(out, begin, waves[n])
+                yield begin - low, out
 
-        return total, low, plan.outside
+        late = start + low / sonar.sampling_frequency
+        return LateSignals.of(stretches, (elements.count, high - low), late, sonar.sampling_frequency, plan.outside)
 
     def waves(self, span: Segment, paths: ArrayPaths, reception: Reception) -> Waves:
         """The waves of the paths of a stretch."""

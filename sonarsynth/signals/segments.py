@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from math import dist
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.noise.filters import SUPPORT_TOLERANCE
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
-from sonarsynth.products import Arrivals, Kind
+from sonarsynth.products import Arrivals, Kind, Signals
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths, Wavefronts, delay_and_gain, face_reach, reach
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, pulse_support, silencing_blur
@@ -64,6 +66,40 @@ class Layout:
     support: Floats  # (before or after, path) s: how far a pulse reaches from its arrival
 
 
+Stretches = Callable[[], Iterable[tuple[int, npt.NDArray[Any]]]]
+"""Gives first samples of stretches that have sound, and their pressure (sensor, sample): all else is silent."""
+
+
+class LateSignals(Signals):
+    """Signals that are summed at the hydrophones when they are looked at. What is made before is small: made for some
+    frames, one after the other, it stays in the caches of a core."""
+
+    stretches: Stretches
+    shape: tuple[int, int]  # (sensor, sample)
+
+    @classmethod
+    def of(cls, stretches: Stretches, shape: tuple[int, int], start: float, rate: float, outside: int) -> LateSignals:
+        """As above, and as in `Signals`."""
+        late, columns = object.__new__(cls), {"start": start, "sampling_frequency": rate, "outside": outside}
+        vars(late).update(stretches=stretches, shape=shape, quantum=0.0, clipped=0, **columns)
+        return late
+
+    def total(self, dtype: str = "float32") -> npt.NDArray[Any]:
+        """Pressure (sensor, sample) in Pa."""
+        made = list(self.stretches())
+        if len(made) == 1 and made[0][1].shape == self.shape:
+            return made[0][1].astype(dtype, copy=False)
+        total = np.zeros(self.shape, dtype)
+        for first, stretch in made:
+            total[:, first : first + stretch.shape[1]] = stretch
+        return total
+
+    @cached_property
+    def pressure(self) -> npt.NDArray[np.float32]:
+        """(sensor, sample) Pa."""
+        return self.total()
+
+
 def fast_length(samples: int) -> int:
     """The smallest even length of the list `FAST` times a power of two that holds so many samples."""
     scale = 2
@@ -103,7 +139,7 @@ def layout(
         same = np.array([w == waveform for w in waveforms])[arrivals.snap] & audible
         for number in range(4):
             rows = np.flatnonzero(same & (kind == number))
-            for chosen in _runs(rows, begin, end):
+            for chosen in overlapping(rows, begin, end):
                 sooner, later = np.take(longer, chosen, axis=1).max(axis=1)
                 delay, spread = front.delay[chosen] - start, steered_spread(front, ends_of(front, chosen))
                 first = int(np.floor((delay.min() - sooner - spread) * fs)) - GUARD
@@ -163,7 +199,7 @@ def _extent(
     return early, late
 
 
-def _runs(rows: Ints, early: Floats, late: Floats) -> Iterator[Ints]:
+def overlapping(rows: Ints, early: Floats | Ints, late: Floats | Ints) -> Iterator[Ints]:
     """Rows in runs that overlap in time; each run keeps the order of the arrivals."""
     if not rows.size:
         return

@@ -18,7 +18,7 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.auto_synthesis import AutoSynthesis
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.signals.gridded.nodes import chebyshev, interpolation, nodes_for
-from sonarsynth.signals.gridded_synthesis import deposit_error, sound_of_few
+from sonarsynth.signals.gridded_synthesis import deposit_error, waves_of_few
 from sonarsynth.signals.segments import Reception
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
@@ -557,6 +557,6 @@ def test_few_paths_that_differ_in_anything_are_heard_anew() -> None:
         first = method.signals(of, SNAPS, hears).pressure
         other = method.signals(replace(of, **change), SNAPS, hears).pressure
         assert not np.array_equal(first, other)
-        sound_of_few.cache_clear()
+        waves_of_few.cache_clear()
         np.testing.assert_array_equal(method.signals(replace(of, **change), SNAPS, hears).pressure, other)
         np.testing.assert_array_equal(method.signals(of, SNAPS, hears).pressure, first)

@@ -26,12 +26,12 @@ def _multiples(values: npt.NDArray[Any], step: Any, out: npt.NDArray[np.int16]) 
 
 
 @compiled
-def round_off(values: npt.NDArray[Any], step: Any, limit: Any, out: npt.NDArray[Any]) -> tuple[int, int]:
-    """Write values (row, column) rounded to whole steps, at most `limit` steps either way, into out. Returns how
-    many were beyond that, and how many are not a number."""
+def round_off(values: npt.NDArray[Any], step: Any, limit: Any, out: npt.NDArray[Any], first: int) -> tuple[int, int]:
+    """Write values (row, column) rounded to whole steps, at most `limit` steps either way, into out, from its column
+    `first` on. Returns how many were beyond that, and how many are not a number."""
     clipped = unknown = 0
     for i in range(values.shape[0]):
-        row, rounded = values[i], out[i]
+        row, rounded = values[i], out[i, first : first + values.shape[1]]
         beyond: Any = np.int32(0)  # one count of the size of the numbers: what is beyond is seldom
         for j in range(len(row)):
             count = np.rint(row[j] / step)
