@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 
-from sonarsynth.conventions import Ints, Number
+from sonarsynth.conventions import Number
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize
 from sonarsynth.products import Arrivals, Signals
@@ -23,7 +23,7 @@ from sonarsynth.signals.gridded.bins import bins_of
 from sonarsynth.signals.gridded.deposit import Waves, add, prepared
 from sonarsynth.signals.gridded.tiles import FEW
 from sonarsynth.signals.pulse_variation import from_the_sharpest
-from sonarsynth.signals.segments import GUARD, LateSignals, Layout, Reception, Segment, layout, overlapping
+from sonarsynth.signals.segments import GUARD, LateSignals, Reception, Segment, layout, overlapping
 from sonarsynth.state import Emission
 
 ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
@@ -57,14 +57,6 @@ def deposit_error(method: GriddedSynthesis, bandwidth: float = np.inf) -> float:
     `GriddedSynthesis`)."""
     kernel = kernel_error(method.width, method.oversampling, bandwidth)
     return kernel + error_over_tolerance(bandwidth) * method.tolerance + ROUNDING[method.precision]
-
-
-def _sounding(plan: Layout, front: ArrayPaths, sampling_frequency: float, samples: int) -> Ints:
-    """Of each stretch (2, stretch), the first sample of the window where it is at any hydrophone, and the one after the
-    last; of none, the first few."""
-    apart = int(np.ceil(reach(front).max(initial=0.0) * sampling_frequency)) + 2 * GUARD
-    ends = [(span.first - apart, span.first + span.samples + apart) for span in plan.stretches] or [(0, apart)]
-    return np.asarray(np.clip(np.array(ends).T, 0, samples))
 
 
 @dataclass(frozen=True)
@@ -161,8 +153,7 @@ class GriddedSynthesis(UnroundedSynthesis):
         self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception
     ) -> tuple[npt.NDArray[Any], int]:
         """As `UnroundedSynthesis.pressure`: silence, and stretches of it that hold whole pulses."""
-        late = self.signals(arrivals, snaps, reception._replace(whole=True))
-        assert isinstance(late, LateSignals)
+        late: Any = self.signals(arrivals, snaps, reception._replace(whole=True))
         return late.total(self.precision), late.outside
 
     def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
@@ -171,7 +162,10 @@ class GriddedSynthesis(UnroundedSynthesis):
         front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
         front = from_the_sharpest(front, stop_frequency(sonar.antialias))
         plan = layout(arrivals, front, snaps, reception, tolerance=0.01 * self.tolerance)
-        first, stop = _sounding(plan, front, sonar.sampling_frequency, samples)
+        rate = sonar.sampling_frequency
+        apart = int(np.ceil(reach(front).max(initial=0.0) * rate)) + 2 * GUARD  # any hydrophone from the centre
+        ends = [(span.first - apart, span.first + span.samples + apart) for span in plan.stretches] or [(0, apart)]
+        first, stop = np.clip(np.array(ends).T, 0, samples)
         low, high = (0, samples) if whole else (int(first.min()), int(stop.max()))
         waves: list[Waves] = []
         for span in plan.stretches:
@@ -187,8 +181,8 @@ class GriddedSynthesis(UnroundedSynthesis):
                     add(out, begin, waves[n])
                 yield begin - low, out
 
-        late = start + low / sonar.sampling_frequency
-        return LateSignals.of(stretches, (elements.count, high - low), late, sonar.sampling_frequency, plan.outside)
+        of_record = {"start": start + low / rate, "sampling_frequency": rate, "outside": plan.outside}
+        return LateSignals.of(stretches=stretches, shape=(elements.count, high - low), **of_record)
 
     def waves(self, span: Segment, paths: ArrayPaths, reception: Reception) -> Waves:
         """The waves of the paths of a stretch."""

@@ -66,22 +66,19 @@ class Layout:
     support: Floats  # (before or after, path) s: how far a pulse reaches from its arrival
 
 
-Stretches = Callable[[], Iterable[tuple[int, npt.NDArray[Any]]]]
-"""Gives first samples of stretches that have sound, and their pressure (sensor, sample): all else is silent."""
-
-
 class LateSignals(Signals):
     """Signals that are summed at the hydrophones when they are looked at. What is made before is small: made for some
     frames, one after the other, it stays in the caches of a core."""
 
-    stretches: Stretches
-    shape: tuple[int, int]  # (sensor, sample)
+    stretches: Callable[[], Iterable[tuple[int, npt.NDArray[Any]]]]
+    """Gives first samples of what has sound, and its pressure (sensor, sample): all else is silent."""
+    shape: tuple[int, int]
 
     @classmethod
-    def of(cls, stretches: Stretches, shape: tuple[int, int], start: float, rate: float, outside: int) -> LateSignals:
-        """As above, and as in `Signals`."""
-        late, columns = object.__new__(cls), {"start": start, "sampling_frequency": rate, "outside": outside}
-        vars(late).update(stretches=stretches, shape=shape, quantum=0.0, clipped=0, **columns)
+    def of(cls, **columns: Any) -> LateSignals:
+        """columns: as above, and as in `Signals`."""
+        late = object.__new__(cls)
+        vars(late).update(quantum=0.0, clipped=0, **columns)
         return late
 
     def total(self, dtype: str = "float32") -> npt.NDArray[Any]:

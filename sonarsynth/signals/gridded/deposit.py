@@ -97,10 +97,17 @@ def prepared(
     return lambda: made
 
 
-def add(out: npt.NDArray[Any], first: int, waves: Waves) -> None:
-    """Add waves to the pressure in out (sensor, sample), whose sample 0 is sample `first` of the window."""
-    for wave in waves():
-        _hear(out, first, wave)
+def add(out: npt.NDArray[Any], sample: int, some: Waves) -> None:
+    """Add waves to the pressure in out (sensor, sample), whose sample 0 is sample `sample` of the window."""
+    from sonarsynth.signals.gridded.deposit_kernels import hear
+
+    for wave, begin, late, gain, axes, stage in some():
+        length, first = wave.shape[2] // 2, begin - sample
+        onto, column, weight = to_sensors(stage.aim.elements, axes, stage.dtype)
+        for n, whole in enumerate(wave):
+            halves = whole.reshape(-1, length, 2).swapaxes(1, 2).reshape(-1, weight.shape[1] * 2 * length)
+            field = (halves if onto is None else onto @ halves).reshape(-1, weight.shape[1], 2, length)
+            hear(field, column, weight, late[n], gain[n], stage.wave.taps, stage.wave.lanes, int(first[n]), out)
 
 
 def _waves(front: Wavefronts, chosen: list[Tile], stage: Stage) -> Iterator[Wave]:
@@ -176,19 +183,6 @@ def _lasting(tile: Tile, paths: Wavefronts, stage: Stage) -> tuple[Ints, int]:
     begin = np.maximum(((early - segment.before - spread) * rate).astype(int) - spare, 0)
     length = int((segment.before + segment.after + 2.0 * spread + wide) * rate) + 2 * spare + 2
     return begin, min(length, segment.samples)
-
-
-def _hear(out: npt.NDArray[Any], sample: int, some: Wave) -> None:
-    """Add a wave to out (sensor, sample), whose sample 0 is sample `sample` of the window."""
-    from sonarsynth.signals.gridded.deposit_kernels import hear
-
-    wave, begin, late, gain, axes, stage = some
-    length, first = wave.shape[2] // 2, begin - sample
-    onto, column, weight = to_sensors(stage.aim.elements, axes, stage.dtype)
-    for n, whole in enumerate(wave):
-        halves = whole.reshape(-1, length, 2).swapaxes(1, 2).reshape(-1, weight.shape[1] * 2 * length)
-        field = (halves if onto is None else onto @ halves).reshape(-1, weight.shape[1], 2, length)
-        hear(field, column, weight, late[n], gain[n], stage.wave.taps, stage.wave.lanes, int(first[n]), out)
 
 
 def _shorter(stage: Stage, length: int) -> Stage:
