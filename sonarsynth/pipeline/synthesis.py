@@ -278,5 +278,4 @@ def known_signals(plan: Plan, frame: Frame, signals: Signals) -> Signals:
     errors, drawn = plan.scene.sonar.sensor_errors, errors_of(plan, frame)
     if errors is None or drawn is None:
         return signals
-    sound_speed = plan.scene.sonar.assumed_sound_speed
-    return channel_errors.corrected(signals, errors, drawn, sound_speed)
+    return channel_errors.corrected(signals, errors, drawn, plan.scene.sonar.assumed_sound_speed)

@@ -157,10 +157,8 @@ def convert(signals: Signals, converter: Converter | None) -> Signals:
         pressure, stretches = np.zeros(signals.shape, np.float32), signals.stretches()
     else:
         pressure, stretches = np.empty(signals.pressure.shape, np.float32), [(0, signals.pressure)]
-    clipped = signals.clipped
-    for first, analog in stretches:
-        more, unknown = round_off(analog.astype(exact, copy=False), step, largest, pressure, first)
-        clipped += more
-        if unknown:
-            raise ValueError("the signals hold NaN: they cannot be converted")
+    counts = [round_off(some.astype(exact, copy=False), step, largest, pressure, first) for first, some in stretches]
+    if any(unknown for _, unknown in counts):
+        raise ValueError("the signals hold NaN: they cannot be converted")
+    clipped = signals.clipped + sum(clipped for clipped, _ in counts)
     return Signals(pressure, signals.start, signals.sampling_frequency, converter.quantum, clipped, signals.outside)

@@ -91,10 +91,7 @@ class LateSignals(Signals):
             total[:, first : first + stretch.shape[1]] = stretch
         return total
 
-    @cached_property
-    def pressure(self) -> npt.NDArray[np.float32]:
-        """(sensor, sample) Pa."""
-        return self.total()
+    pressure = cached_property(total)
 
 
 def fast_length(samples: int) -> int:

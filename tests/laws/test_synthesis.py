@@ -13,8 +13,8 @@ from sonarsynth.description.method import Demand
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.kernels.fourier_sums import waves
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind
-from sonarsynth.receiver import POINT, Band, BandPass, Elements, PositionTable, Romanis, Sonar, elements
-from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
+from sonarsynth.receiver import POINT, Band, BandPass, Converter, Elements, PositionTable, Romanis, Sonar, elements
+from sonarsynth.signals import DirectSum, GriddedSynthesis, convert, pulse_support
 from sonarsynth.signals.auto_synthesis import AutoSynthesis
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.signals.gridded.nodes import chebyshev, interpolation, nodes_for
@@ -535,8 +535,11 @@ def test_dead_elements_give_nothing_and_change_no_other() -> None:
 def test_the_same_bits_every_time() -> None:
     of = target_at(20.0, 300, 16)
     hears = hearing(of, SONAR, FACES, absorption)
-    a, b = (GriddedSynthesis().signals(of, SNAPS, hears).pressure for _ in range(2))
-    np.testing.assert_array_equal(a, b)
+    a, b, late = (GriddedSynthesis().signals(of, SNAPS, hears) for _ in range(3))
+    np.testing.assert_array_equal(a.pressure, b.pressure)
+    whole, in_stretches = (convert(some, Converter(bits=10, full_scale=0.5 * a.pressure.max())) for some in (a, late))
+    assert whole.clipped == in_stretches.clipped > 0
+    np.testing.assert_array_equal(whole.pressure, in_stretches.pressure)
 
 
 def test_few_paths_that_differ_in_anything_are_heard_anew() -> None:
