@@ -20,7 +20,7 @@ from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.planning import Plan, arrivals_of, behind_baffle, context_of, frame_start
 from sonarsynth.planning.measured.sampled_arrivals import reception_of
 from sonarsynth.planning.noise_rows import ELECTRONICS, SENSORS, part_names
-from sonarsynth.products import Arrivals, Kind, Signals
+from sonarsynth.products import Arrivals, Kind, LateSignals, Signals
 from sonarsynth.randomness import stream
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.sensor_errors import DrawnErrors, SensorState, drawn_errors
@@ -29,7 +29,6 @@ from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import add_noise, channel_errors, convert
 from sonarsynth.signals.electronics import ElectronicNoise
 from sonarsynth.signals.noise.point_sources import add_noise_source
-from sonarsynth.signals.segments import LateSignals
 from sonarsynth.sources.noise_source import NoiseSource
 from sonarsynth.sources.snap_models import Ricker
 from sonarsynth.sources.sound_source import Emission
@@ -143,10 +142,11 @@ def _prepared(
     def signals() -> Signals:
         made = copy(late)  # what is summed is not kept
         refused = plan.scene.sonar.converter is not None  # NaN, without a look at all samples here
-        if refused and isinstance(made, LateSignals):
+        samples = (reception.samples,) if whole else getattr(made, "shape", (0, 0))[1:]
+        shape = sensors.count, *samples
+        if refused and isinstance(made, LateSignals) and made.shape == shape:
             return made
-        samples = (reception.samples,) if whole else np.shape(getattr(made, "pressure", 0))[1:]
-        checked: Signals = returned(method, "signals", made, (sensors.count, *samples), "pressure", unknown=refused)
+        checked: Signals = returned(method, "signals", made, shape, "pressure", unknown=refused)
         return checked
 
     return signals

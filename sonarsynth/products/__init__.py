@@ -9,7 +9,15 @@ the instant of the frame; a snap at `Emission.time` is heard a travel time later
 from sonarsynth.products.array_expansion import ArrayExpansion
 from sonarsynth.products.labels import LINK_BUDGET, ORIGINS, SPLITS, VIEWS, Echoes, LinkBudget, PointLabels, Truth, View
 from sonarsynth.products.paths import DIRECT, FAMILIES, Arrivals, Kind, Paths
-from sonarsynth.products.results import REASONS, EnergyImage, PointCloud, Signals, SourceEstimates, no_points
+from sonarsynth.products.results import (
+    REASONS,
+    EnergyImage,
+    LateSignals,
+    PointCloud,
+    Signals,
+    SourceEstimates,
+    no_points,
+)
 from sonarsynth.products.steered_spectra import BeamSpectra, Snapshots
 
 __all__ = [
@@ -26,6 +34,7 @@ __all__ = [
     "Echoes",
     "EnergyImage",
     "Kind",
+    "LateSignals",
     "LinkBudget",
     "Paths",
     "PointCloud",

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +26,51 @@ class Signals:
     quantum: float  # Pa of one count; 0 without a converter
     clipped: int  # samples at full scale
     outside: int  # arrivals that fell outside the window: counted, never wrapped
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the pressure."""
+        return np.shape(self.pressure)
+
+    def stretches(self) -> Iterable[Stretch]:
+        """What has sound, in the order of time: all else is silent."""
+        return [(0, self.pressure)]
+
+
+Stretch = tuple[int, npt.NDArray[Any]]
+"""The first sample of a stretch of signals, and its pressure (sensor, sample) Pa."""
+
+
+class LateSignals(Signals):
+    """Signals that are summed at the hydrophones when they are looked at. What is made before is small: made for some
+    frames, one after the other, it stays in the caches of a core."""
+
+    @classmethod
+    def of(cls, summed: Callable[[], Iterable[Stretch]], shape: tuple[int, int], **columns: Any) -> LateSignals:
+        """summed: gives stretches as `Signals.stretches` does; shape (sensor, sample); columns as in `Signals`."""
+        late = object.__new__(cls)
+        vars(late).update(summed=summed, late_shape=shape, quantum=0.0, clipped=0, **columns)
+        return late
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """As `Signals.shape`, without a sum."""
+        return np.shape(self.pressure) if "pressure" in vars(self) else vars(self)["late_shape"]
+
+    def stretches(self) -> Iterable[Stretch]:
+        """As `Signals.stretches`, summed one by one."""
+        return super().stretches() if "pressure" in vars(self) else vars(self)["summed"]()
+
+    def total(self, dtype: str = "float32") -> npt.NDArray[Any]:
+        """Pressure (sensor, sample) in Pa."""
+        total = np.zeros(self.shape, dtype)
+        for first, stretch in self.stretches():
+            if stretch.shape == self.shape:
+                return stretch.astype(dtype, copy=False)
+            total[:, first : first + stretch.shape[1]] = stretch
+        return total
+
+    pressure = cached_property(total)
 
 
 REASONS = (

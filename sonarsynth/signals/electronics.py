@@ -18,7 +18,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Converter, Electronics, Elements, Filter, Sonar
 from sonarsynth.signals.filtered_pulse import filter_response, fir
-from sonarsynth.signals.segments import LateSignals, fast_length
+from sonarsynth.signals.segments import fast_length
 
 QUIETEST = 1e-7
 """Bins of less noise power than this, relative to the loudest, are left empty."""
@@ -153,12 +153,12 @@ def convert(signals: Signals, converter: Converter | None) -> Signals:
 
     exact = np.float32 if converter.bits <= 16 else np.float64  # in which every count and its half are numbers
     step, largest = exact(converter.quantum), exact(2 ** (converter.bits - 1) - 1)
-    if isinstance(signals, LateSignals) and "pressure" not in vars(signals):
-        pressure, stretches = np.zeros(signals.shape, np.float32), signals.stretches()
-    else:
-        pressure, stretches = np.empty(signals.pressure.shape, np.float32), [(0, signals.pressure)]
-    counts = [round_off(some.astype(exact, copy=False), step, largest, pressure, first) for first, some in stretches]
-    if any(unknown for _, unknown in counts):
-        raise ValueError("the signals hold NaN: they cannot be converted")
-    clipped = signals.clipped + sum(clipped for clipped, _ in counts)
+    pressure, done, clipped = np.empty(signals.shape, np.float32), 0, signals.clipped
+    for first, analog in signals.stretches():
+        pressure[:, done:first], done = 0.0, first + analog.shape[1]
+        beyond, unknown = round_off(analog.astype(exact, copy=False), step, largest, pressure, first)
+        if unknown:
+            raise ValueError("the signals hold NaN: they cannot be converted")
+        clipped += beyond
+    pressure[:, done:] = 0.0
     return Signals(pressure, signals.start, signals.sampling_frequency, converter.quantum, clipped, signals.outside)

@@ -15,7 +15,7 @@ from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 from sonarsynth.conventions import Number
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize
-from sonarsynth.products import Arrivals, Signals
+from sonarsynth.products import Arrivals, LateSignals, Signals
 from sonarsynth.receiver import stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths, array_paths, reach
 from sonarsynth.signals.direct_sum import UnroundedSynthesis, attenuation
@@ -23,7 +23,7 @@ from sonarsynth.signals.gridded.bins import bins_of
 from sonarsynth.signals.gridded.deposit import Waves, add, prepared
 from sonarsynth.signals.gridded.tiles import FEW
 from sonarsynth.signals.pulse_variation import from_the_sharpest
-from sonarsynth.signals.segments import GUARD, LateSignals, Reception, Segment, layout, overlapping
+from sonarsynth.signals.segments import GUARD, Reception, Segment, layout, overlapping
 from sonarsynth.state import Emission
 
 ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
@@ -181,8 +181,8 @@ class GriddedSynthesis(UnroundedSynthesis):
                     add(out, begin, waves[n])
                 yield begin - low, out
 
-        of_record = {"start": start + low / rate, "sampling_frequency": rate, "outside": plan.outside}
-        return LateSignals.of(stretches=stretches, shape=(elements.count, high - low), **of_record)
+        shape, late = (elements.count, high - low), start + low / rate
+        return LateSignals.of(stretches, shape, start=late, sampling_frequency=rate, outside=plan.outside)
 
     def waves(self, span: Segment, paths: ArrayPaths, reception: Reception) -> Waves:
         """The waves of the paths of a stretch."""

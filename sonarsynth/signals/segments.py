@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from math import dist
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.noise.filters import SUPPORT_TOLERANCE
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
-from sonarsynth.products import Arrivals, Kind, Signals
+from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths, Wavefronts, delay_and_gain, face_reach, reach
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, pulse_support, silencing_blur
@@ -64,34 +62,6 @@ class Layout:
     audible: Bools  # (path,) some of the pulse is in the window at some hydrophone
     outside: int  # paths but reverberation whose pulse is not wholly in the window at every hydrophone
     support: Floats  # (before or after, path) s: how far a pulse reaches from its arrival
-
-
-class LateSignals(Signals):
-    """Signals that are summed at the hydrophones when they are looked at. What is made before is small: made for some
-    frames, one after the other, it stays in the caches of a core."""
-
-    stretches: Callable[[], Iterable[tuple[int, npt.NDArray[Any]]]]
-    """Gives first samples of what has sound, and its pressure (sensor, sample): all else is silent."""
-    shape: tuple[int, int]
-
-    @classmethod
-    def of(cls, **columns: Any) -> LateSignals:
-        """columns: as above, and as in `Signals`."""
-        late = object.__new__(cls)
-        vars(late).update(quantum=0.0, clipped=0, **columns)
-        return late
-
-    def total(self, dtype: str = "float32") -> npt.NDArray[Any]:
-        """Pressure (sensor, sample) in Pa."""
-        made = list(self.stretches())
-        if len(made) == 1 and made[0][1].shape == self.shape:
-            return made[0][1].astype(dtype, copy=False)
-        total = np.zeros(self.shape, dtype)
-        for first, stretch in made:
-            total[:, first : first + stretch.shape[1]] = stretch
-        return total
-
-    pressure = cached_property(total)
 
 
 def fast_length(samples: int) -> int:
