@@ -14,7 +14,9 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from sonarsynth import pipeline, schedule, store
 from sonarsynth.planning import Plan, plan
+from sonarsynth.planning.costs import frame_size
 from sonarsynth.products import Arrivals
+from sonarsynth.ranging.picking.peaks import Peaks
 from sonarsynth.recipe import Recipe, reading
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.schedule import benchmark_frames
@@ -209,3 +211,10 @@ def test_the_commands_predict_and_compare(small_file: Path, tmp_path: Path, capf
     assert "predicted" not in quiet  # nor timed: it takes less than that would
     assert store.verify(tmp_path / "s", quick=True).ok
     assert reading.load(small_file).frames == 20
+
+
+def test_ranging_is_counted_by_the_frequencies_of_the_window(small_plan: Plan) -> None:
+    """As long windows take longer: `survey.yaml` was counted as `remus.yaml` is, where it takes 16 times the time."""
+    size = frame_size(small_plan)
+    short, long = (replace(size, bins=bins, beams=beams) for bins, beams in ((343, 10_201), (1819, 1271)))
+    assert Peaks().cost(long) > 3.0 * Peaks().cost(short) > 0.0

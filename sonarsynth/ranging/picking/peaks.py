@@ -13,8 +13,9 @@ from sonarsynth.description.method import FrameSize, Method
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes
 from sonarsynth.ranging.received_window import ReceivedWindow
 
-RANGED_BEAMS = 60
-"""Beams over threshold round one glint."""
+RANGED_BEAMS = 300
+"""Beams about those over threshold, round the glints of a body: 180 to 420 in six shipped recipes. More where noise,
+reverberation or a large target is heard in most: that no count tells."""
 
 
 @description
@@ -49,8 +50,8 @@ class Peaks(Method):
         return levels | {f"false alarms at {x:g}": replace(self, false_alarms=x) for x in (1e-4, 1e-2, 1.0)}
 
     def cost(self, size: FrameSize) -> float:
-        """As `Method.cost`: beams about one glint."""
-        return RANGED_BEAMS * 70e-6
+        """As `Method.cost`: beams about the glints of a body."""
+        return 2.4e-3 + min(RANGED_BEAMS, size.beams) * size.bins * 27e-9
 
     def picks(self, window: ReceivedWindow) -> PickedEchoes:
         """See `PickingMethod`."""
