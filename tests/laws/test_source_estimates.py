@@ -22,7 +22,8 @@ from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.pulse_times import Pulse, lag_variance
-from sonarsynth.receiver import Band, PlanarLattice, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import Band, Converter, PlanarLattice, PositionTable, Romanis, Sonar, elements
+from sonarsynth.signals.electronics import convert
 from sonarsynth.state import Receiver, Survey
 from tests.heard import RATE, add_noise, envelope_late, hear, hear_direct, silence
 from tests.scenes import point_scene
@@ -236,6 +237,23 @@ def test_the_predicted_error_of_a_time_is_what_it_errs_by() -> None:
             found = SensorDelays().locate(signals, Receiver(pose, heard, sonar), Survey(10.0, WATER), 1)
             off.append((found.time[0] - distance / C - envelope_late()) / found.time_error[0])
     assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.3
+    assert np.max(np.abs(off)) < 4.0
+
+
+def test_the_predicted_errors_of_directions_are_what_a_converter_makes_them_err_by() -> None:
+    """Where faces have a null in the band, and a longer window cuts off no tails: without noise, the speed of sound
+    known, what is rounded off is all that is left."""
+    sonar = Sonar(assumed_sound_speed=C, sound_speed_error=0.0, converter=Converter(bits=16, full_scale=3.0))
+    heard, random, off = elements(sonar.array), np.random.default_rng(8), []
+    for distance in random.uniform(10.0, 40.0, 16):
+        source = distance * direction(random.choice((-1, 1)) * random.uniform(0.6, 1.0), random.uniform(-0.5, -0.2))
+        signals = convert(hear_direct(heard, source), sonar.converter)
+        receiver = Receiver(POSE, heard, sonar)
+        found = SensorDelays(on_bottom=False).locate(signals, receiver, Survey(400.0, WATER), 1)
+        azimuth, elevation = azimuth_elevation(source)
+        off.append((found.azimuth[0] - azimuth) / found.azimuth_error[0])
+        off.append((found.elevation[0] - elevation) / found.elevation_error[0])
+    assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.4
     assert np.max(np.abs(off)) < 4.0
 
 

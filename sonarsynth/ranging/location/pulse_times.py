@@ -39,7 +39,7 @@ NEXT_TO_NULL = 1e3
 58 degrees and more off the axis err by 3.0 ns by once, and by that 2.7: 1.2 and 1.1 of what is predicted."""
 FLOOR = 1e-9
 """Standard error (s) of a lag without any noise: what cutting the pulse's tail off does, by windows of `PULSE_HALF`;
-more by longer ones of pulses that last. 0.01 to 0.2 ns of curvature at the rim are as of errors six times as large."""
+more by longer ones of pulses that last, over the square of `LONGER` by those for tails."""
 FINE = 256
 """Samples of an envelope at least: at the 18 of a band of 3 kHz peaks err by 5 us, more than aligning can undo; and
 where there are two, which is the higher follows from where samples fall."""
@@ -243,7 +243,7 @@ def measure(
     lags are small after alignment, and the caller iterates.
     """
     wave = waveform(aligned, elements, sound_speed, direction, curvature, time, deaf)
-    omega = 2 * np.pi * aligned.frequency
+    f, omega = aligned.frequency, 2 * np.pi * aligned.frequency
     slope, weight, unexplained, across = ranging_kernels.lag_sums(wave.spectrum, wave.response, wave.template, omega)
     lag = slope / np.where(weight > 0, weight, np.inf)
     # gains and responses that are not the model's are in phase, and no noise; half of noise, or of another wave, is not
@@ -251,8 +251,7 @@ def measure(
     power = left + float(wave.power @ np.abs(wave.template) ** 2)
     share = min(left, noise) / power if power > 0 else 1.0
     free = max((int(np.count_nonzero(elements.gain)) - 1) * len(omega), 1)
-    many = noise / free, left / free
-    return Pulse(aligned.frequency, wave.template, time, lag, weight, *many, wave.power, share, deaf)
+    return Pulse(f, wave.template, time, lag, weight, noise / free, left / free, wave.power, share, deaf)
 
 
 def lag_variance(wave: Wavefront, pulse: Pulse, elements: Elements, rounding: float, half: float = PULSE_HALF) -> float:
@@ -262,7 +261,8 @@ def lag_variance(wave: Wavefront, pulse: Pulse, elements: Elements, rounding: fl
     below that of `rounding`, (Pa s)^2 in a bin. half (s): of the windows that pulses were cut out by.
     """
     count = int(np.sum(pulse.weight > 0))
-    least = (FLOOR * half / PULSE_HALF) ** 2 * float(np.sum(pulse.weight)) / max(count, 1)
+    floor = FLOOR * half / PULSE_HALF / (1.0 if pulse.by_window[0] is pulse else LONGER**2)
+    least = floor**2 * float(np.sum(pulse.weight)) / max(count, 1)
     shown = float(pulse.weight @ wave.residual**2) / max(count - 4, 1)
     if shown > least and np.count_nonzero(elements.gain) > 2:
         error = np.sqrt(pulse.weight) * wave.residual
