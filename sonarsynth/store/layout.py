@@ -134,11 +134,11 @@ class Layout:
         """The chunks (frame, ...) of a shard of an array: the frames given, as `check` returns them, the fill value
         elsewhere."""
         fill = np.broadcast_to(np.asarray(array.variable.fill, array.dtype), array.inner)
-        given = {frame: array.variable.padded(values[array.key], array.inner) for frame, values in frames.items()}
-        rows = [given.get(frame, fill) for frame in self.region(shard)]
-        if array.chunk == 1:
+        rows = [frames[frame][array.key] if frame in frames else fill for frame in self.region(shard)]
+        if array.chunk == 1 and not array.variable.listed:
             return [row[None] for row in rows]
-        return [np.array(rows[first : first + array.chunk]) for first in range(0, len(rows), array.chunk)]
+        blocks = (rows[first : first + array.chunk] for first in range(0, len(rows), array.chunk))
+        return [array.variable.stacked(block, array.inner) for block in blocks]
 
 
 @lru_cache(maxsize=8)

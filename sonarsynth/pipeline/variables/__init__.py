@@ -107,7 +107,7 @@ def frame_tree(plan: Plan, index: int, values: Mapping[tuple[str, str], npt.NDAr
     for v in variables(plan):
         attrs = {"units": v.units, "long_name": v.long_name, **dict(v.attributes)}
         data = values[v.group, v.name]
-        data = v.padded(data, (plan.sizes[v.dims[1]],)) if v.listed else data
+        data = v.stacked([data], (plan.sizes[v.dims[1]],))[0] if v.listed else data
         if "scale_factor" in attrs:
             packed = data * attrs.pop("scale_factor")
             data = np.where(data == v.fill, np.nan, packed).astype(np.float32)

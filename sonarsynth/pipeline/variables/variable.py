@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,12 +28,13 @@ class Variable:
         """Whether a frame has as many rows of it as there are points or paths; the rest reads as `fill`."""
         return self.dims in (POINT, PATH)
 
-    def padded(self, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Values of a frame in the shape that the store has room for."""
-        if values.shape == shape:
-            return values
-        rows = np.full(shape, self.fill, values.dtype)
-        rows[: len(values)] = values
+    def stacked(self, frames: Sequence[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
+        """Values of frames together (frame, ...), each in the shape that the store has room for."""
+        if not self.listed:
+            return np.array(frames)
+        rows = np.full((len(frames), *shape), self.fill, frames[0].dtype)
+        for n, values in enumerate(frames):
+            rows[n, : len(values)] = values
         return rows
 
 
