@@ -83,8 +83,7 @@ def loudness(signals: Signals, live: Bools, length: int) -> PowerTrack:
     track = uniform_filter1d(power, min(length, len(power)), mode="constant")
     short = min(16, len(power))
     means = np.sort(power[: len(power) // short * short].reshape(-1, short).mean(axis=1))
-    quiet = means[len(means) // 10]
-    return PowerTrack(np.maximum(track, 0.0), float(quiet), peak)
+    return PowerTrack(np.maximum(track, 0.0), float(means[len(means) // 10]), peak)
 
 
 def quiet_bin(quiet: float, live: int, band: Band, half: float) -> float:
