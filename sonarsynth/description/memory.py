@@ -25,7 +25,7 @@ TOGETHER_BYTES: Final = 160e6
 """Of memory at most that frames take that go through each stage together."""
 SHARD_COPIES: Final = 3
 """Times the bytes of a shard that a process takes to keep its frames and to write them; measured 2.3 to 2.9,
-0.7 where most of a shard is room for points that are not there."""
+1.2 to 1.5 where most of a shard is room for points that are not there."""
 
 
 def frame_bytes(facets: int, samples: int, parts: int = 0) -> float:
