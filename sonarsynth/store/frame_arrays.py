@@ -108,7 +108,8 @@ class FrameArray:
         own = self._chunks
         shard, row = divmod(number, own.shard // own.chunk)
         path, shape = own.file(shard), (own.chunk, *own.shape[1:])
-        if (file := self._content(path)) is None:
+        file = self._content(path) if own.chunk_bytes else None  # of no numbers there is no file
+        if file is None:
             return np.full(shape, own.fill, own.dtype)
         first, length = (0, file.size) if own.shard == own.chunk else file.entry(row, own.shard // own.chunk, path)
         if first == NOT_THERE and length == NOT_THERE:
