@@ -122,9 +122,9 @@ def _trace(plan: Plan, frame: int, before: Any) -> Any:
 
 
 def _label(plan: Plan, frame: int, paths: Any) -> Any:
-    """What was traced, and measured of it; where nothing is heard, truth."""
+    """What was traced; where nothing is heard, truth."""
     if plan.makes_sound:
-        return pipeline.measured(plan, frame, pipeline.trace_at(plan.at(frame), *paths))
+        return pipeline.trace_at(plan.at(frame), *paths)
     return layout_of(plan).check(pipeline.silent_frame(plan, frame))
 
 
@@ -154,7 +154,7 @@ def _values(plan: Plan, frame: int, before: Any) -> Any:
 Step = Callable[[Plan, int, Any], Any]
 """A part of a stage: of the plan, the number of a frame and what the step before made of it, what this one makes."""
 STAGES: Final[Mapping[str, Sequence[Step]]] = {
-    "trace": (_trace, _label),
+    "trace": (_trace, _label, pipeline.measured),
     "beamform": (_prepare, _beamform),
     "range": (_range, _values),
 }
