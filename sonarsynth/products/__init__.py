@@ -12,6 +12,7 @@ from sonarsynth.products.paths import DIRECT, FAMILIES, Arrivals, Kind, Paths
 from sonarsynth.products.results import (
     REASONS,
     EnergyImage,
+    LatePart,
     LateSignals,
     PointCloud,
     Signals,
@@ -34,6 +35,7 @@ __all__ = [
     "Echoes",
     "EnergyImage",
     "Kind",
+    "LatePart",
     "LateSignals",
     "LinkBudget",
     "Paths",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -39,6 +39,8 @@ class Signals:
 
 Stretch = tuple[int, npt.NDArray[Any]]
 """The first sample of a stretch of signals, and its pressure (sensor, sample) Pa."""
+LatePart = tuple[int, int, Callable[[npt.NDArray[Any], int], None]]
+"""The first sample of a stretch and the one after its last, and what adds it to pressure from a first sample on."""
 
 
 class LateSignals(Signals):
@@ -46,10 +48,11 @@ class LateSignals(Signals):
     frames, one after the other, it stays in the caches of a core."""
 
     @classmethod
-    def of(cls, summed: Callable[[], Iterable[Stretch]], shape: tuple[int, int], **columns: Any) -> LateSignals:
-        """summed: gives stretches as `Signals.stretches` does; shape (sensor, sample); columns as in `Signals`."""
+    def of(cls, parts: Sequence[LatePart], shape: tuple[int, int], dtype: str, **columns: Any) -> LateSignals:
+        """parts: in the order of time, none beside another; shape (sensor, sample), dtype: of the sums; columns as in
+        `Signals`."""
         late = object.__new__(cls)
-        vars(late).update(summed=summed, late_shape=shape, quantum=0.0, clipped=0, **columns)
+        vars(late).update(parts=parts, late_shape=shape, dtype=dtype, quantum=0.0, clipped=0, **columns)
         return late
 
     @property
@@ -59,18 +62,25 @@ class LateSignals(Signals):
 
     def stretches(self) -> Iterable[Stretch]:
         """As `Signals.stretches`, summed one by one."""
-        return super().stretches() if "pressure" in vars(self) else vars(self)["summed"]()
+        if "pressure" in vars(self):
+            yield from super().stretches()
+            return
+        for first, stop, add in vars(self)["parts"]:
+            stretch = np.zeros((self.shape[0], stop - first), vars(self)["dtype"])
+            add(stretch, first)
+            yield first, stretch
 
-    def total(self, dtype: str = "float32") -> npt.NDArray[Any]:
-        """Pressure (sensor, sample) in Pa."""
-        total = np.zeros(self.shape, dtype)
-        for first, stretch in self.stretches():
-            if stretch.shape == self.shape:
-                return stretch.astype(dtype, copy=False)
-            total[:, first : first + stretch.shape[1]] = stretch
+    def total(self) -> npt.NDArray[Any]:
+        """Pressure (sensor, sample) in Pa, as it is summed."""
+        total = np.zeros(self.shape, vars(self)["dtype"])
+        for *_, add in vars(self)["parts"]:
+            add(total, 0)
         return total
 
-    pressure = cached_property(total)
+    @cached_property
+    def pressure(self) -> npt.NDArray[np.float32]:
+        """(sensor, sample) Pa."""
+        return self.total().astype(np.float32, copy=False)
 
 
 REASONS = (

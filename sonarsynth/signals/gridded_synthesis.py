@@ -3,7 +3,7 @@ domain."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import Annotated, Any, Final, Literal
@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 
-from sonarsynth.conventions import Number
+from sonarsynth.conventions import Ints, Number
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize
-from sonarsynth.products import Arrivals, LateSignals, Signals
+from sonarsynth.products import Arrivals, LatePart, LateSignals, Signals
 from sonarsynth.receiver import stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths, array_paths, reach
 from sonarsynth.signals.direct_sum import UnroundedSynthesis, attenuation
@@ -154,7 +154,7 @@ class GriddedSynthesis(UnroundedSynthesis):
     ) -> tuple[npt.NDArray[Any], int]:
         """As `UnroundedSynthesis.pressure`: silence, and stretches of it that hold whole pulses."""
         late: Any = self.signals(arrivals, snaps, reception._replace(whole=True))
-        return late.total(self.precision), late.outside
+        return late.total(), late.outside
 
     def signals(self, arrivals: Arrivals, snaps: tuple[Emission, ...], reception: Reception) -> Signals:
         """As `SignalSynthesis.signals`, with all made but for the sums at the hydrophones."""
@@ -173,16 +173,17 @@ class GriddedSynthesis(UnroundedSynthesis):
             known = _FewPaths.of(self, span, paths, reception) if still and paths.count <= FEW else None
             waves.append(waves_of_few(known) if known else self.waves(span, paths, reception))
 
-        def stretches() -> Iterator[tuple[int, npt.NDArray[Any]]]:
-            for some in overlapping(np.arange(len(waves)), first, stop):
-                begin, end = int(first[some].min()), int(stop[some].max())
-                out = np.zeros((elements.count, end - begin), self.precision)
+        def summed(some: Ints) -> LatePart:
+            def add_all(out: npt.NDArray[Any], begin: int) -> None:
                 for n in some:
-                    add(out, begin, waves[n])
-                yield begin - low, out
+                    add(out, low + begin, waves[n])
 
+            return int(first[some].min()) - low, int(stop[some].max()) - low, add_all
+
+        parts = [summed(some) for some in overlapping(np.arange(len(waves)), first, stop)]
         shape, late = (elements.count, high - low), start + low / rate
-        return LateSignals.of(stretches, shape, start=late, sampling_frequency=rate, outside=plan.outside)
+        columns = {"start": late, "sampling_frequency": rate, "outside": plan.outside}
+        return LateSignals.of(parts, shape, self.precision, **columns)
 
     def waves(self, span: Segment, paths: ArrayPaths, reception: Reception) -> Waves:
         """The waves of the paths of a stretch."""
