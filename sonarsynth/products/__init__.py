@@ -12,7 +12,7 @@ from sonarsynth.products.paths import DIRECT, FAMILIES, Arrivals, Kind, Paths
 from sonarsynth.products.results import (
     REASONS,
     EnergyImage,
-    LatePart,
+    LateSegment,
     LateSignals,
     PointCloud,
     Signals,
@@ -35,7 +35,7 @@ __all__ = [
     "Echoes",
     "EnergyImage",
     "Kind",
-    "LatePart",
+    "LateSegment",
     "LateSignals",
     "LinkBudget",
     "Paths",

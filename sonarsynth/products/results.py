@@ -32,15 +32,15 @@ class Signals:
         """Of the pressure."""
         return np.shape(self.pressure)
 
-    def stretches(self) -> Iterable[Stretch]:
+    def segments(self) -> Iterable[SignalSegment]:
         """What has sound, in the order of time: all else is silent."""
         return [(0, self.pressure)]
 
 
-Stretch = tuple[int, npt.NDArray[Any]]
-"""The first sample of a stretch of signals, and its pressure (sensor, sample) Pa."""
-LatePart = tuple[int, int, Callable[[npt.NDArray[Any], int], None]]
-"""The first sample of a stretch and the one after its last, and what adds it to pressure from a first sample on."""
+SignalSegment = tuple[int, npt.NDArray[Any]]
+"""The first sample of a segment of signals, and its pressure (sensor, sample) Pa."""
+LateSegment = tuple[int, int, Callable[[npt.NDArray[Any], int], None]]
+"""The first sample of a segment and the one after its last, and what adds it to pressure from a first sample on."""
 
 
 class LateSignals(Signals):
@@ -48,11 +48,11 @@ class LateSignals(Signals):
     frames, one after the other, it stays in the caches of a core."""
 
     @classmethod
-    def of(cls, parts: Sequence[LatePart], shape: tuple[int, int], dtype: str, **columns: Any) -> LateSignals:
-        """parts: in the order of time, none beside another; shape (sensor, sample), dtype: of the sums; columns as in
+    def of(cls, segments: Sequence[LateSegment], shape: tuple[int, int], dtype: str, **columns: Any) -> LateSignals:
+        """segments: in the order of time, none overlaps another; shape (sensor, sample), dtype: of sums; columns as in
         `Signals`."""
         late = object.__new__(cls)
-        vars(late).update(parts=parts, late_shape=shape, dtype=dtype, quantum=0.0, clipped=0, **columns)
+        vars(late).update(late=segments, late_shape=shape, dtype=dtype, quantum=0.0, clipped=0, **columns)
         return late
 
     @property
@@ -60,20 +60,20 @@ class LateSignals(Signals):
         """As `Signals.shape`, without a sum."""
         return np.shape(self.pressure) if "pressure" in vars(self) else vars(self)["late_shape"]
 
-    def stretches(self) -> Iterable[Stretch]:
-        """As `Signals.stretches`, summed one by one."""
+    def segments(self) -> Iterable[SignalSegment]:
+        """As `Signals.segments`, summed one by one."""
         if "pressure" in vars(self):
-            yield from super().stretches()
+            yield from super().segments()
             return
-        for first, stop, add in vars(self)["parts"]:
-            stretch = np.zeros((self.shape[0], stop - first), vars(self)["dtype"])
-            add(stretch, first)
-            yield first, stretch
+        for first, stop, add in vars(self)["late"]:
+            segment = np.zeros((self.shape[0], stop - first), vars(self)["dtype"])
+            add(segment, first)
+            yield first, segment
 
     def total(self) -> npt.NDArray[Any]:
         """Pressure (sensor, sample) in Pa, as it is summed."""
         total = np.zeros(self.shape, vars(self)["dtype"])
-        for *_, add in vars(self)["parts"]:
+        for *_, add in vars(self)["late"]:
             add(total, 0)
         return total
 

@@ -154,7 +154,7 @@ def convert(signals: Signals, converter: Converter | None) -> Signals:
     exact = np.float32 if converter.bits <= 16 else np.float64  # in which every count and its half are numbers
     step, largest = exact(converter.quantum), exact(2 ** (converter.bits - 1) - 1)
     pressure, done, clipped = np.empty(signals.shape, np.float32), 0, signals.clipped
-    for first, analog in signals.stretches():
+    for first, analog in signals.segments():
         pressure[:, done:first], done = 0.0, first + analog.shape[1]
         beyond, unknown = round_off(analog.astype(exact, copy=False), step, largest, pressure, first)
         if unknown:

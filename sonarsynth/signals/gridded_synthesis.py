@@ -15,7 +15,7 @@ from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 from sonarsynth.conventions import Ints, Number
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize
-from sonarsynth.products import Arrivals, LatePart, LateSignals, Signals
+from sonarsynth.products import Arrivals, LateSegment, LateSignals, Signals
 from sonarsynth.receiver import stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths, array_paths, reach
 from sonarsynth.signals.direct_sum import UnroundedSynthesis, attenuation
@@ -173,17 +173,17 @@ class GriddedSynthesis(UnroundedSynthesis):
             known = _FewPaths.of(self, span, paths, reception) if still and paths.count <= FEW else None
             waves.append(waves_of_few(known) if known else self.waves(span, paths, reception))
 
-        def summed(some: Ints) -> LatePart:
+        def summed(some: Ints) -> LateSegment:
             def add_all(out: npt.NDArray[Any], begin: int) -> None:
                 for n in some:
                     add(out, low + begin, waves[n])
 
             return int(first[some].min()) - low, int(stop[some].max()) - low, add_all
 
-        parts = [summed(some) for some in overlapping(np.arange(len(waves)), first, stop)]
+        segments = [summed(some) for some in overlapping(np.arange(len(waves)), first, stop)]
         shape, late = (elements.count, high - low), start + low / rate
         columns = {"start": late, "sampling_frequency": rate, "outside": plan.outside}
-        return LateSignals.of(parts, shape, self.precision, **columns)
+        return LateSignals.of(segments, shape, self.precision, **columns)
 
     def waves(self, span: Segment, paths: ArrayPaths, reception: Reception) -> Waves:
         """The waves of the paths of a stretch."""

@@ -164,7 +164,8 @@ def _extent(
 
 
 def overlapping(rows: Ints, early: Floats | Ints, late: Floats | Ints) -> Iterator[Ints]:
-    """Rows in runs that overlap in time; each run keeps the order of the arrivals."""
+    """Rows in runs that overlap in time, in its order; each run keeps the order of the rows. early, late (row,): when
+    each begins and ends, in s or samples."""
     if not rows.size:
         return
     if early[rows].max() <= late[rows].min():  # all of them at one time

@@ -537,9 +537,9 @@ def test_the_same_bits_every_time() -> None:
     hears = hearing(of, SONAR, FACES, absorption)
     a, b, late = (GriddedSynthesis().signals(of, SNAPS, hears) for _ in range(3))
     np.testing.assert_array_equal(a.pressure, b.pressure)
-    whole, in_stretches = (convert(some, Converter(bits=10, full_scale=0.5 * a.pressure.max())) for some in (a, late))
-    assert whole.clipped == in_stretches.clipped > 0
-    np.testing.assert_array_equal(whole.pressure, in_stretches.pressure)
+    whole, in_segments = (convert(some, Converter(bits=10, full_scale=0.5 * a.pressure.max())) for some in (a, late))
+    assert whole.clipped == in_segments.clipped > 0
+    np.testing.assert_array_equal(whole.pressure, in_segments.pressure)
 
 
 def test_few_paths_that_differ_in_anything_are_heard_anew() -> None:

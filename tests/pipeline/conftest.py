@@ -22,6 +22,13 @@ SMALL = (
     .replace("azimuths: 5, elevations: 3", "azimuths: 11, elevations: 9")
 )
 
+ROCK = """- name: rock
+        clutter: true
+        shape: {kind: sphere, radius: 0.4, edge: 0.1}
+        motion: {kind: still, position: [10, -2, -6]}
+    sources:"""
+BUILT = range(2, 18)
+
 
 @pytest.fixture(scope="session")
 def small_text() -> str:
@@ -56,6 +63,28 @@ def reference(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan) -> Pat
     """All frames, built in this process without a break."""
     path = tmp_path_factory.mktemp("reference") / "s.zarr"
     assert build(small_plan, path, workers=0).ok
+    return path
+
+
+@pytest.fixture(scope="session")
+def varied(small_text: str) -> Recipe:
+    """Ten sequences of two frames, of a box and of clutter, with splits."""
+    text = small_text.replace("    sources:", f"      {ROCK}", 1).replace("frames: 20", "frames: 2")
+    text = text.replace(
+        "  trajectory:",
+        "    converter: {bits: 16, full_scale: 20 Pa}\n    ranges: {near: 6 m, far: 14 m, step: 10 cm}\n  trajectory:",
+    )
+    noise = "{name: noise, path: environment.noise.level, kind: uniform, low: 30 dB, high: 50 dB}"
+    splits = "repeats: 10\nsplits: {train: 0.6, validation: 0.2, test: 0.2}\n"
+    return reading.loads(f"{text}variations: [{noise}]\n{splits}")
+
+
+@pytest.fixture(scope="session")
+def partly_built(varied: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Sixteen of its twenty frames, in shards of which one is there in part."""
+    path = tmp_path_factory.mktemp("partly") / "s.zarr"
+    products = {"signals", "image", "range_image", "cloud", "beams"}
+    assert build(plan(varied, products), path, frames=BUILT, workers=0).ok
     return path
 
 

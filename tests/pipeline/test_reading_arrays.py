@@ -20,12 +20,11 @@ import zarr
 
 import sonarsynth as ss
 from sonarsynth import planning, schedule
-from sonarsynth.recipe import Recipe, reading
+from sonarsynth.recipe import Recipe
 from sonarsynth.store import Damage, Mismatch
 from sonarsynth.store.files import within
 from sonarsynth.store.frame_reading import FrameReader
 
-BUILT = range(2, 18)
 PARTS: tuple[Any, ...] = (
     7,
     slice(3, 17, 4),
@@ -38,21 +37,8 @@ PARTS: tuple[Any, ...] = (
 
 
 @pytest.fixture(scope="module")
-def recipe(small_text: str) -> Recipe:
-    """Ten sequences of two frames; a converter, whose counts are packed, and a range image."""
-    converter = "    converter: {bits: 16, full_scale: 20 Pa}\n"
-    ranges = "    ranges: {near: 6 m, far: 14 m, step: 10 cm}\n"
-    text = small_text.replace("  trajectory:", f"{converter}{ranges}  trajectory:").replace("frames: 20", "frames: 2")
-    return reading.loads(f"{text}repeats: 10\n")
-
-
-@pytest.fixture(scope="module")
-def whole(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Sixteen of its twenty frames, in shards of which one is there in part."""
-    path = tmp_path_factory.mktemp("arrays") / "s.zarr"
-    products = {"signals", "image", "range_image", "cloud", "beams"}
-    assert schedule.build(planning.plan(recipe, products), path, frames=BUILT, workers=0).ok
-    return path
+def whole(partly_built: Path) -> Path:
+    return partly_built
 
 
 def plain(path: Path) -> Iterator[tuple[str, xr.Variable]]:
@@ -148,8 +134,8 @@ def test_threads_read_the_same(whole: Path) -> None:
         np.testing.assert_array_equal(values, expected[name].values[frame])
 
 
-def test_what_a_build_has_written_since_is_read(recipe: Recipe, tmp_path: Path) -> None:
-    plan, path = planning.plan(recipe, {"image"}), tmp_path / "s.zarr"
+def test_what_a_build_has_written_since_is_read(varied: Recipe, tmp_path: Path) -> None:
+    plan, path = planning.plan(varied, {"image"}), tmp_path / "s.zarr"
     assert schedule.build(plan, path, frames=range(2), workers=0).ok
     tree = ss.open(path)
     assert np.isnan(tree["image/energy"][12].values).all() and np.isnan(tree["image/energy"][3].values).all()

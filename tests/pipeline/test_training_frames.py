@@ -15,44 +15,16 @@ import pytest
 import xarray as xr
 
 import sonarsynth as ss
-from sonarsynth import planning, schedule
 from sonarsynth.evaluation.detectors import true_objects
 from sonarsynth.export.coco_files import write_coco
 from sonarsynth.loading import Frames, RenderedFrames
 from sonarsynth.loading.training_samples import FLOOR
-from sonarsynth.recipe import Recipe, reading
+from sonarsynth.recipe import Recipe
 from sonarsynth.store import Damage, Mismatch
 from sonarsynth.store.frame_reading import FrameReader
 
 BUILT = range(2, 18)
 EVERY = ("boxes", "mask", "points", "range", "range_boxes", "range_mask")
-ROCK = """- name: rock
-        clutter: true
-        shape: {kind: sphere, radius: 0.4, edge: 0.1}
-        motion: {kind: still, position: [10, -2, -6]}
-    sources:"""
-
-
-@pytest.fixture(scope="module")
-def recipe(small_text: str) -> Recipe:
-    """Ten sequences of two frames, of a box and of clutter, with splits."""
-    text = small_text.replace("    sources:", f"      {ROCK}", 1).replace("frames: 20", "frames: 2")
-    text = text.replace(
-        "  trajectory:",
-        "    converter: {bits: 16, full_scale: 20 Pa}\n    ranges: {near: 6 m, far: 14 m, step: 10 cm}\n  trajectory:",
-    )
-    noise = "{name: noise, path: environment.noise.level, kind: uniform, low: 30 dB, high: 50 dB}"
-    splits = "repeats: 10\nsplits: {train: 0.6, validation: 0.2, test: 0.2}\n"
-    return reading.loads(f"{text}variations: [{noise}]\n{splits}")
-
-
-@pytest.fixture(scope="module")
-def store(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Sixteen of its twenty frames, in shards of which one is there in part."""
-    path = tmp_path_factory.mktemp("training") / "s.zarr"
-    products = {"signals", "image", "range_image", "cloud", "beams"}
-    assert schedule.build(planning.plan(recipe, products), path, frames=BUILT, workers=0).ok
-    return path
 
 
 def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
@@ -60,9 +32,9 @@ def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
 
 
 @pytest.mark.parametrize("split", [None, "train", "test"])
-def test_samples_are_of_the_built_frames_of_a_split(store: Path, split: str | None) -> None:
-    tree = ss.open(store)
-    data = Frames(store, split=split, image="energy", targets=EVERY, signals=True)
+def test_samples_are_of_the_built_frames_of_a_split(partly_built: Path, split: str | None) -> None:
+    tree = ss.open(partly_built)
+    data = Frames(partly_built, split=split, image="energy", targets=EVERY, signals=True)
     built = np.array(BUILT)
     number = None if split is None else ["train", "validation", "test"].index(split)
     expected = built if number is None else built[tree["split"].values[built] == number]
@@ -92,21 +64,21 @@ def test_samples_are_of_the_built_frames_of_a_split(store: Path, split: str | No
         assert {value.dtype for value in floats} == {np.dtype(np.float32)}
 
 
-def test_levels_are_re_the_brightest_beam(store: Path) -> None:
-    levels, energy = Frames(store), Frames(store, image="energy")
+def test_levels_are_re_the_brightest_beam(partly_built: Path) -> None:
+    levels, energy = Frames(partly_built), Frames(partly_built, image="energy")
     for row in range(len(levels)):
         level, plain = levels[row]["image"], energy[row]["image"]
         assert level.dtype == np.float32 and level.max() == 0.0 and np.isfinite(level).all()
         expected = np.maximum(10.0 * np.log10(plain / plain.max()), FLOOR)
         np.testing.assert_allclose(level, expected, atol=1e-4)
-    cells, stored = Frames(store, image="range_db"), ss.open(store)["range_image/energy"].values
+    cells, stored = Frames(partly_built, image="range_db"), ss.open(partly_built)["range_image/energy"].values
     for row, frame in enumerate(cells.frames.tolist()):
         expected = np.maximum(10.0 * np.log10(np.nan_to_num(stored[frame]) / np.nanmax(stored[frame]) + 1e-30), FLOOR)
         np.testing.assert_allclose(cells[row]["image"], expected, atol=1e-4)
 
 
-def test_batches_are_the_samples_in_the_order_asked(store: Path) -> None:
-    data = Frames(store, targets=("boxes", "mask"))
+def test_batches_are_the_samples_in_the_order_asked(partly_built: Path) -> None:
+    data = Frames(partly_built, targets=("boxes", "mask"))
     rows = [7, 0, 11, 0, 3]
     samples = data.__getitems__(rows)
     assert all(same(sample, data[row]) for sample, row in zip(samples, rows, strict=True))
@@ -123,8 +95,8 @@ def take(data: Frames, row: int) -> dict[str, Any]:
     return data[row]
 
 
-def test_it_is_pickled_and_read_by_processes_that_are_forked(store: Path) -> None:
-    data = Frames(store, targets=EVERY)
+def test_it_is_pickled_and_read_by_processes_that_are_forked(partly_built: Path) -> None:
+    data = Frames(partly_built, targets=EVERY)
     expected = [data[row] for row in range(4)]  # files are open now
     again = pickle.loads(pickle.dumps(data))
     assert all(same(again[row], sample) for row, sample in enumerate(expected))
@@ -133,9 +105,9 @@ def test_it_is_pickled_and_read_by_processes_that_are_forked(store: Path) -> Non
     assert all(same(one, sample) for one, sample in zip(found, expected, strict=True))
 
 
-def test_rendered_frames_are_those_of_the_store(recipe: Recipe, store: Path) -> None:
-    stored = Frames(store, split="train", targets=("boxes", "mask"))
-    rendered = RenderedFrames(recipe, split="train", targets=("boxes", "mask"), seed=3)
+def test_rendered_frames_are_those_of_the_store(varied: Recipe, partly_built: Path) -> None:
+    stored = Frames(partly_built, split="train", targets=("boxes", "mask"))
+    rendered = RenderedFrames(varied, split="train", targets=("boxes", "mask"), seed=3)
     found = {}
     for _, sample in zip(range(4), rendered, strict=False):
         found[sample["frame"]] = sample
@@ -143,14 +115,14 @@ def test_rendered_frames_are_those_of_the_store(recipe: Recipe, store: Path) -> 
     both = found.keys() & where.keys()
     assert both and all(same(found[frame], stored[where[frame]]) for frame in both)
     assert rendered.categories == stored.categories == ("target",)
-    parts = [RenderedFrames(recipe, split="train", seed=3, part=(k, 3)).frames for k in range(3)]
+    parts = [RenderedFrames(varied, split="train", seed=3, part=(k, 3)).frames for k in range(3)]
     assert sorted(np.concatenate(parts).tolist()) == sorted(rendered.frames.tolist())
     assert rendered.frames.tolist() != sorted(rendered.frames.tolist())
 
 
-def test_a_damaged_file_is_no_data(store: Path, tmp_path: Path) -> None:
+def test_a_damaged_file_is_no_data(partly_built: Path, tmp_path: Path) -> None:
     copy = tmp_path / "s.zarr"
-    shutil.copytree(store, copy)
+    shutil.copytree(partly_built, copy)
     (file, *_) = sorted((copy / "signals" / "pressure").glob("c.*"))
     content = bytearray(file.read_bytes())
     for at in (20, len(content) - 30, len(content) - 2):  # a chunk, the index, the checksum of the index
@@ -161,7 +133,7 @@ def test_a_damaged_file_is_no_data(store: Path, tmp_path: Path) -> None:
     with pytest.raises(Damage):
         _ = [FrameReader(copy).array("signals/pressure")[frame] for frame in range(20)]
     file.unlink()
-    file.symlink_to(store / "zarr.json")
+    file.symlink_to(partly_built / "zarr.json")
     with pytest.raises(OSError, match="link"):
         _ = [FrameReader(copy).array("signals/pressure")[frame] for frame in range(20)]
 
@@ -169,10 +141,10 @@ def test_a_damaged_file_is_no_data(store: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "name", ["image/energy", "signals/pressure", "truth/targets/pixel_box", "truth/sonar_position"]
 )
-def test_a_missing_file_is_no_data(store: Path, tmp_path: Path, name: str) -> None:
+def test_a_missing_file_is_no_data(partly_built: Path, tmp_path: Path, name: str) -> None:
     """zarr takes it for one of fill values: images of -60 dB everywhere, frames without boxes, or fewer frames."""
     copy = tmp_path / "s.zarr"
-    shutil.copytree(store, copy)
+    shutil.copytree(partly_built, copy)
     (file, *_) = sorted((copy / name).glob("c.*"))
     file.unlink()
     with pytest.raises(Damage, match=f"^{name}/{file.name}: the file is missing: 'sonarsynth repair' restores it$"):
@@ -205,10 +177,10 @@ def test_a_missing_file_is_no_data(store: Path, tmp_path: Path, name: str) -> No
         ),
     ],
 )
-def test_metadata_are_not_believed(store: Path, tmp_path: Path, change: dict[str, Any], said: str) -> None:
+def test_metadata_are_not_believed(partly_built: Path, tmp_path: Path, change: dict[str, Any], said: str) -> None:
     """Of a store without marks, by which nobody knows what they were."""
     copy = tmp_path / "s.zarr"
-    shutil.copytree(store, copy, ignore=shutil.ignore_patterns(".marks"))
+    shutil.copytree(partly_built, copy, ignore=shutil.ignore_patterns(".marks"))
     document = json.loads((copy / "zarr.json").read_text())
     document["consolidated_metadata"]["metadata"]["image/energy"] |= change
     (copy / "zarr.json").write_text(json.dumps(document))
@@ -216,14 +188,14 @@ def test_metadata_are_not_believed(store: Path, tmp_path: Path, change: dict[str
         _ = FrameReader(copy).array("image/energy")[2]
 
 
-def test_what_is_not_there_is_said(store: Path, tmp_path: Path) -> None:
+def test_what_is_not_there_is_said(partly_built: Path, tmp_path: Path) -> None:
     for options, said in (
         ({"image": "picture"}, "image: must be one of db, energy, range_db, none, not 'picture'"),
         ({"targets": "box"}, "targets: must be of boxes, mask, range, points, range_boxes, range_mask, not 'box'"),
         ({"split": "exam"}, "split: must be one of train, validation, test, not 'exam'"),
     ):
         with pytest.raises(ss.FieldError, match=said):
-            Frames(store, **options)  # type: ignore[arg-type]
+            Frames(partly_built, **options)  # type: ignore[arg-type]
     with pytest.raises(Mismatch, match="is no store of sonarsynth"):
         Frames(tmp_path)
     with pytest.raises(Mismatch, match="copy the store"):
