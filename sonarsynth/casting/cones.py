@@ -268,7 +268,7 @@ def classify_cones(
     for rows, number in nearest_first(bodies, apex):
         body, mesh = bodies[number], casting_mesh(bodies[number].mesh)
         own = np.full(len(apex), NO_TARGET) if facet is None else np.where(owner == number, facet, NO_TARGET)
-        horizon = np.empty((0, 8)) if facet is None else mesh.horizon
+        horizon = np.empty((0, 8)) if facet is None else mesh.horizon(own)
         place = body.pose.rotation, body.pose.to_world(mesh.centre), mesh.size
         cones = apex[rows], axis[rows], slope[rows], reach[rows], far[rows], own[rows], body.mesh.normal, horizon
         look(*cones, *place, *mesh.tree, mesh.vertices, mesh.faces, *mesh.around, verdicts[rows])

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ BYTES = 90
 """Of Embree's own tables for a facet."""
 SLACK = 1e-3
 """Of the body's size: a hit this much beyond the proposed one is another hit, with others before it perhaps."""
+_LOOKING_UP = Lock()
+"""Held while horizons are written, so that threads read whole ones."""
 
 
 class EmbreeCaster:
@@ -74,16 +77,24 @@ class CastingMesh:
         return facet_tree.tree(self.vertices, self.faces)
 
     @cached_property
-    def horizon(self) -> Floats:
-        """(facet, octant) how high the mesh stands over each facet; see `horizons`."""
-        from sonarsynth.casting.horizons import horizons
+    def horizons(self) -> Floats:
+        """(facet, octant) how high the mesh stands over each facet, as far as anybody asked."""
+        from sonarsynth.casting.horizons import UNKNOWN
 
-        return horizons(self.vertices, self.faces, *self.tree)
+        return np.full((len(self.faces), 8), UNKNOWN)
+
+    def horizon(self, facet: Ints) -> Floats:
+        """The same, known of some facets (row,) at least; -1: none of it. See `horizons.look_up`."""
+        from sonarsynth.casting.horizons import look_up
+
+        with _LOOKING_UP:
+            look_up(facet, self.vertices, self.faces, *self.tree, self.horizons)
+        return self.horizons
 
     def times(self, factor: float) -> CastingMesh:
         """That of a copy so many times as large: what is known of the mesh in units of its size serves both."""
         copy = replace(self, centre=self.centre * factor, size=self.size * factor)
-        vars(copy).update(around=self.around, tree=self.tree, horizon=self.horizon)
+        vars(copy).update(around=self.around, tree=self.tree, horizons=self.horizons)
         return copy
 
     def within(self, start: Floats, heading: Floats, limit: Floats, *, any_hit: bool = False) -> tuple[Ints, Floats]:
@@ -203,7 +214,7 @@ def faced_from(mesh: Mesh, rows: Ints, offset: float, place: Floats) -> tuple[In
 
     ready, count = casting_mesh(mesh), len(rows)
     (origin, heading), far, (facet, ray) = np.empty((2, count, 3)), np.empty(count), np.empty((2, count), np.int64)
-    of_mesh = mesh.centroid, mesh.normal, ready.horizon, offset, ready.centre, ready.size
+    of_mesh = mesh.centroid, mesh.normal, ready.horizon(rows), offset, ready.centre, ready.size
     faced, count = intersections.off_facets(rows, place, *of_mesh, facet, origin, heading, far, ray)
     met = np.zeros(faced, bool)
     if count:
@@ -233,7 +244,7 @@ def occluded(
             continue
         ready, pose = casting_mesh(body.mesh), body.pose
         own = np.full(len(a), NO_TARGET) if facet is None else np.where(owner == number, facet, NO_TARGET)
-        horizon = np.empty((0, 8)) if facet is None else ready.horizon
+        horizon = np.empty((0, 8)) if facet is None else ready.horizon(own)
         count = intersections.into_mesh(
             a, b, hidden, own, body.mesh.normal, horizon, pose.rotation, pose.position, ready.centre, ready.size,
             origin, heading, far, segment,
