@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import sin
+from math import inf, sin
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Le
@@ -26,6 +26,8 @@ from sonarsynth.products import Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
 Count = Annotated[int, Ge(1), Le(16)]
+HELPS = 0.7
+"""Of the error of an image with few bins, what more subarrays leave of it where they, not the bins, are what errs."""
 
 
 @description
@@ -64,17 +66,23 @@ class FocusedDelayAndSum(Steering):
     0.04 in some frames), or all. Auto: few in a plan, where the error that it measures is allowed; else all."""
 
     def resolve(self, demand: Demand) -> tuple[FocusedDelayAndSum | DenseDelayAndSum, float]:
-        """With the recipe's subarrays and bins; left to the plan, the fewest subarrays, and with them few bins, that
-        err by no more than is allowed (dB); where none do, those that err least."""
+        """With the recipe's subarrays and bins; left to the plan, the fewest subarrays that err with few bins by no more
+        than is allowed (dB); where more subarrays no longer help, the fewest that do with all. Where none do, those that
+        err least."""
         if demand.exact:
             return self.exact(), 0.0
-        tried = []
-        for cut in cuts(demand.elements, self.focus) if self.subarrays == "auto" else [self.subarrays]:
-            for bins in ("few", "all") if self.bins == "auto" else (self.bins,):
+        tried: list[tuple[FocusedDelayAndSum, float]] = []
+        for bins in ("few", "all") if self.bins == "auto" else (self.bins,):
+            before = inf
+            for cut in cuts(demand.elements, self.focus) if self.subarrays == "auto" else [self.subarrays]:
                 method = replace(self, subarrays=cut, bins=bins)
-                tried.append((method, demand.error(method)))
-                if tried[-1][1] <= demand.allowed:
-                    return tried[-1]
+                error = demand.error(method)
+                tried.append((method, error))
+                if error <= demand.allowed:
+                    return method, error
+                if self.bins == "auto" and bins == "few" and error > HELPS * before:
+                    break
+                before = error
         return min(tried, key=lambda choice: choice[1])
 
     def exact(self) -> DenseDelayAndSum:
