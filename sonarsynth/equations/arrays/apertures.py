@@ -15,9 +15,14 @@ def element_directivity(frequency: npt.ArrayLike, direction: npt.ArrayLike, face
     sinc x = sin(pi x)/(pi x); 1 for a point. frequency (...) in Hz broadcasts against direction without its last axis.
     Source: any text on arrays, e.g. Van Trees (2002), Optimum Array Processing, section 2.6.
     """
+    from sonarsynth.equations.kernels.phasors import fill_face_responses  # compiled: read where it is needed
+
     u = np.asarray(direction, float)
     scale = np.asarray(frequency, float) * (face / sound_speed)
-    return np.asarray(np.sinc(scale * u[..., 1]) * np.sinc(scale * u[..., 2]))
+    y, z = np.broadcast_arrays(scale * u[..., 1], scale * u[..., 2])
+    response = np.empty(y.shape)
+    fill_face_responses(y.ravel(), z.ravel(), response.reshape(-1))
+    return response
 
 
 def focus_delay(position: npt.ArrayLike, direction: npt.ArrayLike, focus: float | None, sound_speed: float) -> Floats:

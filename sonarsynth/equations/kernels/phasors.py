@@ -81,6 +81,13 @@ def face_response(y: float, z: float) -> float:
     return sine(y) * sine(z) / (math.pi**2 * y * z)
 
 
+@compiled(fastmath={"contract"})
+def fill_face_responses(y: Any, z: Any, response: Any) -> None:
+    """Fill responses (wave,) of a face that is y (wave,) and z (wave,) wavelengths wide: `face_response`."""
+    for i in range(len(y)):
+        response[i] = face_response(y[i], z[i])
+
+
 @compiled(forceinline=True)
 def half_phasor(turns: Any, more: Any) -> Any:
     """Cosine and sine (lanes) of `turns` + `more` (lanes, |more| small) up to one sign; error 1e-7."""
