@@ -66,9 +66,9 @@ class FocusedDelayAndSum(Steering):
     0.04 in some frames), or all. Auto: few in a plan, where the error that it measures is allowed; else all."""
 
     def resolve(self, demand: Demand) -> tuple[FocusedDelayAndSum | DenseDelayAndSum, float]:
-        """With the recipe's subarrays and bins; left to the plan, the fewest subarrays that err with few bins by no more
-        than is allowed (dB); where more subarrays no longer help, the fewest that do with all. Where none do, those that
-        err least."""
+        """With the recipe's subarrays and bins; left to the plan, the fewest subarrays that err with few bins by no
+        more than is allowed (dB); where more subarrays no longer help, the fewest that do with all. Where none do,
+        those that err least."""
         if demand.exact:
             return self.exact(), 0.0
         tried: list[tuple[FocusedDelayAndSum, float]] = []
