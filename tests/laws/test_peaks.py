@@ -20,7 +20,7 @@ from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.planning import plan
 from sonarsynth.ranging import BeamAxis, FirstEcho, Peaks, SensorDelays
 from sonarsynth.ranging.location.triggered import Triggered
-from sonarsynth.ranging.picking.peak_kernels import local_maxima, over_lobes
+from sonarsynth.ranging.picking.peak_kernels import local_maxima, medians, over_lobes
 from sonarsynth.ranging.picking.peak_picking import LOBE_STEPS, _lobes
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.receiver.hydrophones import PositionTable
@@ -226,6 +226,16 @@ def test_peaks_of_noise_in_one_dimension_are_the_upcrossings_of_rice():
     sizes = np.array([40.0, 30.0, 200.0])
     assert expected_peaks(peak_level(0.1, sizes), sizes) == pytest.approx(0.1, rel=1e-9)
     assert peak_level(0.01, sizes) > peak_level(0.1, sizes) > peak_level(0.1, sizes[:2])
+
+
+@pytest.mark.parametrize("stop", [11, 12, 19, 60])
+def test_medians_are_those_of_sorted_powers(stop):
+    """Of an odd and an even number, where many are alike, and of silence."""
+    random = np.random.default_rng(0)
+    loud = random.exponential(size=(40, 60)) ** 6
+    for powers in (loud, np.round(loud), 1e-40 * loud, 0.0 * loud):
+        power = powers.astype(np.float32)
+        np.testing.assert_array_equal(medians(power, 3, stop, 4), np.median(power[:, 3:stop:4], axis=1))
 
 
 def test_local_maxima_are_those_of_a_filter():

@@ -10,6 +10,35 @@ from sonarsynth.compiling import compiled
 
 
 @compiled
+def medians(power: Any, first: int, stop: int, step: int) -> Any:
+    """Medians (beam,) of every step-th delay of power (beam, delay), 0 or more, from the `first` on to before `stop`.
+
+    The bits of such numbers are in their order: those of the median are found one by one, by how many are below it.
+    """
+    count = (stop - first + step - 1) // step
+    half, line, middle = count // 2, np.empty(count, np.int32), np.empty(len(power), np.float32)
+    both = np.empty(2, np.int32)
+    for b in range(len(power)):
+        bits = power[b, first:stop].view(np.int32)
+        for i in range(count):
+            line[i] = bits[i * step]
+        value = np.int32(0)
+        for bit in range(30, -1, -1):
+            more, below = np.int32(value | (1 << bit)), np.int32(0)
+            for i in range(count):
+                below += np.int32(line[i] < more)
+            value = more if below <= half else value
+        below, before = np.int32(0), np.int32(0)  # before it, of an even number
+        for i in range(count):
+            below += np.int32(line[i] < value)
+            before = max(before, line[i] if line[i] < value else np.int32(0))
+        both[0], both[1] = value, before if count % 2 == 0 and below == half else value
+        numbers = both.view(np.float32)
+        middle[b] = np.float32(0.5) * (numbers[0] + numbers[1])
+    return middle
+
+
+@compiled
 def exceeded(power: Any, index: Any, i: int, j: int, t: int, about: int) -> Any:
     """Whether the value of the beam at (i, j) and delay t has a neighbour that exceeds it, or equals it and comes
     before; neighbours: within one beam and `about` delays. Arrays as for `local_maxima`."""

@@ -17,7 +17,7 @@ from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.picking.beyond_the_grid import louder_beyond, possible_grating_lobes
-from sonarsynth.ranging.picking.peak_kernels import beside, farthest, local_maxima, over_lobes, power_centres
+from sonarsynth.ranging.picking.peak_kernels import beside, farthest, local_maxima, medians, over_lobes, power_centres
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes, tangents
 from sonarsynth.ranging.range_profiles import (
     OVERSAMPLING,
@@ -211,10 +211,7 @@ def noise_power(profiles: Profiles, image: EnergyImage, *, silent: bool = False)
     if silent:
         return np.full(len(profiles.power), least.eps**2 * float(profiles.loudest.max()) + least.tiny)
     end = min(int(pulse_times.PULSE_HALF / profiles.step), profiles.power.shape[1] // 4)
-    powers = profiles.power[:, end : profiles.power.shape[1] - end : OVERSAMPLING]
-    half = powers.shape[1] // 2  # bits are in the order of powers, and parted twice as fast
-    parted = np.partition(powers.view(np.int32), half, axis=1).view(np.float32)
-    median = 0.5 * (parted[:, half] + (parted[:, :half].max(axis=1) if powers.shape[1] % 2 == 0 else parted[:, half]))
+    median = medians(profiles.power, end, profiles.power.shape[1] - end, OVERSAMPLING)
     place = profiles.row - profiles.row.min(), profiles.column - profiles.column.min()
     level, filled = np.zeros((2, place[0].max() + 1, place[1].max() + 1))
     level[place], filled[place] = median / np.log(2.0), 1.0
