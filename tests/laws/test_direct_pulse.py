@@ -11,11 +11,14 @@ from sonarsynth.conventions import direction
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.imaging import Clean, FocusedDelayAndSum
+from sonarsynth.pipeline import render
 from sonarsynth.planning import plan
 from sonarsynth.planning.measured.lost_echoes import losses
 from sonarsynth.products import SourceEstimates
 from sonarsynth.ranging import SensorDelays, range_profiles
-from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
+from sonarsynth.ranging.cancelling.direct_pulse import deviations, remove, remove_others, trusted
+from sonarsynth.ranging.location import Triggered
+from sonarsynth.ranging.location.plane_waves import PlaneWaveFit
 from sonarsynth.ranging.range_profiles import direct_spectrum
 from sonarsynth.receiver import BeamGrid, Converter, PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.recipe.scene import Processing
@@ -239,6 +242,18 @@ def test_the_plan_counts_what_the_converter_leaves_of_the_direct_pulse():
     assert few.fall - fewest.fall == pytest.approx(4 * 6.02, abs=4.0) and few.fall < exact.fall - 30
     assert few.below - fewest.below == pytest.approx(4 * 6.02, abs=4.0)
     assert at(24, 300.0).fall < 30
+
+
+def test_where_nothing_is_recorded_of_the_direct_pulse_nothing_is_taken_out():
+    """Of zeros its lags were 0/0: memory beside the record was read, or a plan ended in a division by zero."""
+    nothing = replace(direct(), pressure=np.zeros((ARRAY.count, 1000), np.float32))
+    lag, gain = deviations(nothing, ARRAY, SONAR, PlaneWaveFit.of(located(direct()), 0))
+    assert not lag.any() and (gain == 1.0).all()
+    ahead = overlapped((3.5, 0.2, -50.0), locating=Triggered())
+    sonar = replace(ahead.scene.sonar, converter=Converter(bits=16, full_scale=1e9))
+    made = plan(replace(ahead, scene=replace(ahead.scene, sonar=sonar)), ["signals", "image"])
+    assert made.windows.direct_removed and any("nothing is recorded" in note for note in made.warnings)
+    assert not render(made, 0)["signals/pressure"].values.any()
 
 
 def test_the_plan_says_that_images_may_have_nothing_but_what_is_left_of_the_direct_pulse():

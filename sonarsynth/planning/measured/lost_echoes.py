@@ -112,7 +112,7 @@ def losses(plan: Plan, index: int) -> EchoLosses | None:
     lost = np.where(sent > FAINTEST * sent.sum(), 1 - imaged / np.maximum(sent, 1e-300), np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
         left = _without(plan, convert(direct, sonar.converter), estimates)
-        fall = 10 * float(np.log10(_energy(direct.pressure) / _energy(left)))
+        fall = 10 * float(np.log10(np.divide(_energy(direct.pressure), _energy(left))))
         below = 10 * float(np.log10(imaged.sum() / _energy(left[:, window])))
     names = [body.name for body in frame.moment.bodies]
     return EchoLosses(index, dict(zip(names, np.clip(lost, 0.0, 1.0).tolist(), strict=True)), fall, below)

@@ -87,7 +87,7 @@ def deviations(signals: Signals, elements: Elements, sonar: Sonar, front: PlaneW
     """How much later (sensor,) in s than a wavefront, and how many times as loud (sensor,), each sensor hears it.
 
     Newton steps on the squares of what the wave leaves, over the power of that, and of the deviations, over `UNLIKE`:
-    a sensor that hears little of the wave stays on the sphere.
+    a sensor that hears little of the wave, or nothing, stays on the sphere.
     """
     c, band = sonar.assumed_sound_speed, sonar.band
     aligned = pulse_times.cut(signals, elements.gain != 0, front.delays(elements, c), pulse_times.PULSE_HALF, band)
@@ -100,7 +100,7 @@ def deviations(signals: Signals, elements: Elements, sonar: Sonar, front: PlaneW
     for _ in range(ROUNDS):
         aligned_spectrum = ranging_kernels.turned(wave.spectrum, lag, aligned.frequency[0], aligned.spacing)
         residual = aligned_spectrum - gain[:, None] * model
-        prior = 0.5 * float(np.mean(np.abs(residual[live]) ** 2)) / UNLIKE**2
+        prior = 0.5 * float(np.mean(np.abs(residual[live]) ** 2)) / UNLIKE**2 + np.finfo(float).tiny
         late = np.sum(omega * (model * residual.conj()).imag, axis=1) / (slope + prior * (2 * np.pi * band.centre) ** 2)
         lag, gain = lag + late, gain + np.sum((model.conj() * residual).real, axis=1) / (power + prior)
     return np.where(live, lag, 0.0), np.where(live, gain, 1.0)
