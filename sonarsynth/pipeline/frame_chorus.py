@@ -26,7 +26,7 @@ from sonarsynth.signals.chorus.chorus_arrivals import (
 )
 from sonarsynth.signals.chorus.chorus_synthesis import chorus_pressure, spare_time
 from sonarsynth.sources.chorus import draw_snaps
-from sonarsynth.state import Emission
+from sonarsynth.state import Emission, Receiver
 
 LOUDEST = 3
 """Paths of a frame that are stored, the loudest."""
@@ -39,16 +39,22 @@ def frame_chorus(plan: Plan, frame: Frame) -> ChorusArrivals | None:
         return None
     if reach is None:
         return no_chorus()
-    receiver, sonar = receiver_of(plan, frame), plan.scene.sonar
+    receiver, sonar = _in_mid_record(plan, frame), plan.scene.sonar
     spare = spare_time(plan.elements, sonar, receiver.speed(plan.medium))
     start = frame_start(plan, frame)
     window = (start - spare, start + plan.windows.samples / sonar.sampling_frequency + spare)
-    heights = image_heights(plan.profile, plan.medium.depth, float(depth(frame.sonar_pose.position)), reach.images)
-    moved = 0.0 if receiver.track is None else float(np.linalg.norm(receiver.track.velocity)) * max(map(abs, window))
-    sooner = moved * float(heights.slowness.max())  # s: snaps are drawn about where the array is now
+    heights = image_heights(plan.profile, plan.medium.depth, float(depth(receiver.pose.position)), reach.images)
+    speed, half = 0.0 if receiver.track is None else float(np.linalg.norm(receiver.track.velocity)), np.ptp(window) / 2
+    sooner = speed * float(half * heights.slowness.max())  # s: snaps are drawn about where the array is in the middle
     now = (frame.time + window[0] - sooner, frame.time + window[1] + sooner)
     snaps = draw_snaps(chorus, number(frame.seed, "chorus", frame.key), listening(heights, receiver, now, reach.reach))
     return chorus_arrivals(snaps, reach, plan.medium, receiver, frame.time, window)
+
+
+def _in_mid_record(plan: Plan, frame: Frame) -> Receiver:
+    """The array where it is in the middle of its record."""
+    half = 0.5 * plan.windows.samples / plan.scene.sonar.sampling_frequency
+    return receiver_of(plan, frame).at(frame_start(plan, frame) + half)
 
 
 def with_chorus(plan: Plan, frame: Frame, signals: Signals, arrivals: ChorusArrivals | None) -> Signals:
@@ -59,7 +65,8 @@ def with_chorus(plan: Plan, frame: Frame, signals: Signals, arrivals: ChorusArri
     if distant is not None:
         mark_stage("synthesise")
         random = stream(frame.seed, "distant chorus", frame.key, frame.step)
-        pose, speed = frame.sonar_pose, receiver_of(plan, frame).speed(plan.medium)
+        receiver = _in_mid_record(plan, frame)
+        pose, speed = receiver.pose, receiver.speed(plan.medium)
         signals = add_noise(signals, distant, plan.scene.sonar, true_elements(plan, frame), random, pose, speed)
         mark_stage(DISTANT_CHORUS)
     if not len(arrivals.delay):

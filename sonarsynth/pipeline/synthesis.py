@@ -12,12 +12,12 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import NO_TARGET, Floats, Ints, depth
+from sonarsynth.conventions import NO_TARGET, Floats, Ints
 from sonarsynth.description.method import returned
 from sonarsynth.geometry.motion import pose, velocity
 from sonarsynth.pipeline.handed_on import Sound
 from sonarsynth.pipeline.stage_times import mark_stage
-from sonarsynth.planning import Plan, arrivals_of, behind_baffle, context_of, frame_start
+from sonarsynth.planning import Plan, arrivals_of, behind_baffle, context_of, frame_start, receiver_of
 from sonarsynth.planning.measured.sampled_arrivals import reception_of
 from sonarsynth.planning.noise_rows import ELECTRONICS, SENSORS, part_names
 from sonarsynth.products import Arrivals, Kind, LateSignals, Signals
@@ -32,6 +32,7 @@ from sonarsynth.signals.noise.point_sources import add_noise_source
 from sonarsynth.sources.noise_source import NoiseSource
 from sonarsynth.sources.snap_models import Ricker
 from sonarsynth.sources.sound_source import Emission
+from sonarsynth.state import Receiver
 from sonarsynth.tracing.arrivals import trace
 
 SCATTERERS: Final = -2
@@ -177,18 +178,19 @@ def digitise(plan: Plan, frame: Frame, signals: Signals, recorder: Recorder = NO
     `plan` is that of the sequence. Each part draws from a random stream of its own.
     """
     mark_stage("synthesise")
-    sonar, pose, sensors = plan.scene.sonar, frame.sonar_pose, true_elements(plan, frame)
-    sound_speed = float(plan.profile.at(depth(pose.position)))
+    sonar, sensors = plan.scene.sonar, true_elements(plan, frame)
+    receiver = receiver_of(plan, frame).at(signals.start + 0.5 * signals.pressure.shape[1] / signals.sampling_frequency)
+    pose, sound_speed = receiver.pose, receiver.speed(plan.medium)
     noises = plan.scene.world.environment.noises
     for number, (name, noise) in enumerate(zip(part_names(noises), noises, strict=True)):
         if noise.played:
-            signals = _with_played_noise(plan, frame, signals, noise, number, sound_speed)
+            signals = _with_played_noise(plan, frame, signals, noise, number, receiver)
         else:
             random = stream(frame.seed, "noise", frame.key, frame.step, *([number] if number else []))
             signals = add_noise(signals, noise, sonar, sensors, random, pose, sound_speed)
         mark_stage(name)
     for number, source in enumerate(plan.scene.world.noise_sources):
-        signals = _with_noise_source(plan, frame, signals, source, number)
+        signals = _with_noise_source(plan, frame, signals, source, number, receiver)
         mark_stage(f"noise of {source.name}")
     recorder("noise", signals)
     signals = _through_channels(plan, frame, signals, sound_speed, recorder)
@@ -196,7 +198,7 @@ def digitise(plan: Plan, frame: Frame, signals: Signals, recorder: Recorder = NO
 
 
 def _with_played_noise(
-    plan: Plan, frame: Frame, signals: Signals, noise: Any, number: int, sound_speed: float
+    plan: Plan, frame: Frame, signals: Signals, noise: Any, number: int, receiver: Receiver
 ) -> Signals:
     """Signals with a recording. The direction of each stretch of it is drawn once a sequence."""
     from sonarsynth.signals.noise.played_noise import add_played_noise  # seldom needed
@@ -204,29 +206,31 @@ def _with_played_noise(
     def even(stretch: int) -> Floats:
         return stream(frame.seed, "played noise", frame.key, number, stretch).random(2)
 
-    sonar, pose, sensors = plan.scene.sonar, frame.sonar_pose, true_elements(plan, frame)
-    return add_played_noise(signals, noise, sonar, sensors, pose, sound_speed, time=frame.time, even=even)
+    sensors, pose, speed = true_elements(plan, frame), receiver.pose, receiver.speed(plan.medium)
+    return add_played_noise(signals, noise, receiver.sonar, sensors, pose, speed, time=frame.time, even=even)
 
 
-def _with_noise_source(plan: Plan, frame: Frame, signals: Signals, source: NoiseSource, number: int) -> Signals:
-    """Signals with the sound of one source: all of it takes the paths of the sound that arrives at the frame's time."""
-    own, late = frame.sonar_pose.position, 0.0
+def _with_noise_source(
+    plan: Plan, frame: Frame, signals: Signals, source: NoiseSource, number: int, receiver: Receiver
+) -> Signals:
+    """Signals with the sound of one source: all of it takes the paths of the sound that the array hears where
+    `receiver` has it, in the middle of the record."""
+    own, then, late = receiver.pose.position, frame.time + receiver.instant, 0.0
     for _ in range(3):  # sources make way at a hundredth of the speed of sound, or less
-        away = np.linalg.norm(pose(source.motion, frame.time - late).position - own)
-        late = float(away) / float(plan.profile.at(depth(own)))
-    time, position = frame.time - late, pose(source.motion, frame.time - late).position
-    pulse = Ricker(frequency=plan.scene.sonar.band.centre)
-    instant = Emission(position, -late, pulse, None, illuminates=False)
+        away = np.linalg.norm(pose(source.motion, then - late).position - own)
+        late = float(away) / receiver.speed(plan.medium)
+    position, sonar = pose(source.motion, then - late).position, receiver.sonar
+    instant = Emission(position, receiver.instant - late, Ricker(frequency=sonar.band.centre), None, illuminates=False)
     arrivals = trace(replace(context_of(plan, frame), snaps=(instant,)), plan.propagation)
-    arrivals = replace(arrivals, delay=arrivals.delay + late)
-    apart = position - frame.sonar_pose.position
+    arrivals = behind_baffle(replace(arrivals, delay=arrivals.delay - instant.time), sonar)
+    apart = position - own
     slowness = apart / max(float(np.linalg.norm(apart)), 1e-9) / arrivals.sound_speed
-    ours, theirs = frame.sonar_velocity @ slowness, velocity(source.motion, time) @ slowness
+    own_velocity = frame.sonar_velocity if receiver.track is None else receiver.track.velocity
+    ours, theirs = own_velocity @ slowness, velocity(source.motion, then - late) @ slowness
     random = stream(frame.seed, "noise source", frame.key, frame.step, number)
-    sonar, sensors = plan.scene.sonar, true_elements(plan, frame)
-    arrivals = behind_baffle(arrivals, sonar)
-    moving = partial(add_noise_source, time=frame.time, faster=float((1.0 + ours) / (1.0 + theirs)), random=random)
-    return moving(signals, source, arrivals, instant, sensors, sonar, plan.absorption)
+    faster = float((1.0 + ours) / (1.0 + theirs))
+    moving = partial(add_noise_source, time=then - late, faster=faster, random=random)
+    return moving(signals, source, arrivals, instant, true_elements(plan, frame), sonar, plan.absorption)
 
 
 def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: float, recorder: Recorder) -> Signals:

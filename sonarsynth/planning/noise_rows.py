@@ -12,6 +12,7 @@ from sonarsynth.description.method import FrameSize
 from sonarsynth.environment.noise import Noise
 from sonarsynth.environment.noise.noise_field import SECONDS as DRAW_SECONDS
 from sonarsynth.geometry.motion import pose
+from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_frames import MAX_SAMPLED_FRAMES
 from sonarsynth.receiver import SensorErrors
 from sonarsynth.signals.noise.drawing import coherence_error, seconds
@@ -102,17 +103,21 @@ def _source_rows(plan: Plan) -> list[NoiseRow]:
 
 
 def _passing(plan: Plan, source: NoiseSource) -> float:
-    """How far (degree) a source and the array pass each other in a record, at most, by the frames that a plan samples
-    of one sequence."""
+    """How far (degree) a source and the array pass each other from the middle of a record to its ends, at most, by the
+    frames that a plan samples of one sequence."""
     trajectory, off = plan.scene.trajectory, 0.0
-    longest = plan.windows.samples / plan.scene.sonar.sampling_frequency
+    half = 0.5 * plan.windows.samples / plan.scene.sonar.sampling_frequency
+    first_frame = plan.recipe.first_frame(plan.sequence)
     for step in evenly(trajectory.frames, MAX_SAMPLED_FRAMES):
-        time = trajectory.time(step)
-        first, last = (
-            pose(source.motion, at).position - pose(trajectory.sonar, at).position for at in (time, time + longest)
+        frame = plan.recipe.frame(first_frame + step)[1]
+        middle = frame.time + frame_start(plan, frame) + half
+        now, *ends = (
+            pose(source.motion, at).position - pose(trajectory.sonar, at).position
+            for at in (middle, middle - half, middle + half)
         )
-        across = float(np.linalg.norm(np.cross(first, last)))
-        off = max(off, float(np.rad2deg(np.arctan2(across, first @ last))))
+        for then in ends:
+            across = float(np.linalg.norm(np.cross(now, then)))
+            off = max(off, float(np.rad2deg(np.arctan2(across, now @ then))))
     return off
 
 

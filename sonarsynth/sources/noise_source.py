@@ -80,7 +80,8 @@ class NoiseSource:
     name: Annotated[str, MinLen(1)]
     """Name, for people."""
     motion: Motion
-    """Where it is: at one place in each frame. Recordings are played faster as it approaches (Doppler)."""
+    """Where it is: in each frame at one place, whose sound is heard in the middle of the record. Recordings are played
+    faster as it approaches (Doppler)."""
     sound: Annotated[Noise | NoiseRecording, BY_KIND]
     """What it sounds like at 1 m: a spectrum, whose level is re 1 uPa2/Hz at 1 m, drawn anew in each frame; or a
     recording."""

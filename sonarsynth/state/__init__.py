@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -88,6 +88,7 @@ class Receiver:
     elements: Elements
     sonar: Sonar = field(default_factory=Sonar)
     track: Track | None = None  # of the array, if it and bodies move while sound is under way; None: all stays
+    instant: float = 0.0  # s after that of the frame: when it is there
 
     @property
     def band(self) -> tuple[float, float]:
@@ -101,7 +102,14 @@ class Receiver:
 
     def pose_at(self, time: float) -> Pose:
         """Of the array, at a time (s) after the instant of the frame."""
-        return self.pose if self.track is None or self.track.still else self.track.later(time).pose
+        return self.at(time).pose
+
+    def at(self, time: float) -> Receiver:
+        """The same where it is at a time (s) after the instant of the frame; without a track as it is."""
+        if self.track is None:
+            return self
+        track = self.track.later(time - self.instant)
+        return replace(self, pose=track.pose, track=track, instant=time)
 
     def speed(self, medium: Medium) -> float:
         """Of sound at the middle of the array, m/s."""
@@ -109,9 +117,9 @@ class Receiver:
 
     def turn_to_array(self, towards: Floats, time: Floats) -> Floats:
         """Unit vectors (path, xyz) of the world in the frame of the array at times (path,), s after the instant of the
-        frame: by then it has turned at its spin of that instant."""
+        frame: by then it has turned at its spin of its `instant`."""
         spin = np.zeros(3) if self.track is None else self.pose.turn_to_body(self.track.spin)
-        return turned(np.asarray(towards @ self.pose.rotation), spin, -time)
+        return turned(np.asarray(towards @ self.pose.rotation), spin, self.instant - time)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.reverberation.speckle import SINC
 from sonarsynth.frontiers.signal_knobs import speckle_points
 from sonarsynth.geometry import Pose
+from sonarsynth.geometry.hovering import Hover
 from sonarsynth.geometry.motion import Still, Waypoint, Waypoints, pose
 from sonarsynth.pipeline import render, synthesise, trace_at
 from sonarsynth.pipeline.synthesis import frame_signals
@@ -61,7 +62,9 @@ def recipe(
         filter=BandPass(low=25e3, high=85e3),
         assumed_sound_speed=SPEED,
     )
-    source = SnappingShrimp(position=snap, height=more.pop("source_height", HEIGHT))
+    source = SnappingShrimp(
+        position=snap, height=more.pop("source_height", HEIGHT), snap_times=more.pop("snap_times", (0.0,))
+    )
     return Recipe(
         seed=seed,
         accuracy=Accuracy(speckle=speckle),
@@ -134,6 +137,19 @@ def test_a_sonar_that_turns_where_it_is_hears_scatterers_where_they_are() -> Non
         there = pose(still, 0.0).turn_to_world(rest.direction[n])
         seen = pose(turning, float(found.delay[n])).turn_to_body(there)
         np.testing.assert_allclose(found.direction[n], seen, atol=1e-12)
+
+
+def test_a_sonar_that_swings_hears_scatterers_where_they_are_however_long_after_the_instant_of_a_frame() -> None:
+    """On the bottom, after as long as sound takes there and back: 0.3 s after it they were up to 0.8 m off."""
+    swings = Hover(position=BACK.position, heading=0.3, surge=1.0, sway=1.0, yaw=np.deg2rad(20.0), period=4.0)
+    found = heard(plan(recipe(sonar=swings, snap_times=(0.3,))))
+    snap = np.array([*SNAP, HEIGHT - DEPTH])
+    for n in range(0, len(found.delay), 97):
+        then = pose(swings, float(found.delay[n]))
+        place = then.to_world(found.direction[n] * found.length[n])
+        took = (np.linalg.norm(place - snap) + np.linalg.norm(place - then.position)) / SPEED
+        assert place[2] == pytest.approx(-DEPTH, abs=1e-3)
+        assert found.delay[n] == pytest.approx(0.3 + took, abs=2e-6)
 
 
 def test_nothing_comes_before_the_first_possible_echo() -> None:

@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 from sonarsynth.evaluation import check
+from sonarsynth.geometry.motion import pose
 from sonarsynth.pipeline import render
 from sonarsynth.pipeline.frame_chorus import frame_chorus
 from sonarsynth.planning import plan
@@ -142,27 +143,37 @@ def test_a_chorus_that_is_brighter_than_the_echoes_is_no_fault_of_the_store(tmp_
     assert any("also heard: chorus" in one.warning for one in checks)
 
 
-def test_a_sonar_that_moves_hears_snaps_when_they_reach_it() -> None:
-    """And from where it is then, up and down too: they came up to 0.2 us off, and 20 us where it climbs."""
-    sonar = "{kind: course, start: [0, 0, -5], heading: 90 deg, speed: 8 m/s, climb: 1.5 m/s}"
+@pytest.mark.parametrize(
+    ("sonar", "exact"),
+    [
+        ("kind: course, start: [0, 0, -5], heading: 90 deg, speed: 8 m/s, climb: 1.5 m/s", 1e-7),
+        ("kind: hover, position: [0, 0, -5], surge: 1, sway: 1, heave: 1, yaw: 20 deg, period: 4 s", 1e-3),
+    ],
+    ids=["climbs", "swings"],
+)
+@pytest.mark.parametrize("late", [0.0, 0.3])
+def test_a_sonar_that_moves_hears_snaps_when_they_reach_it(sonar: str, exact: float, late: float) -> None:
+    """And from where it is then, up and down too: they came up to 0.2 us off, and 20 us where it climbs; 0.3 s after
+    the instant of a frame, to a sonar that swings, 60 us off and 2 degrees aside."""
     heard = "scene.world.chorus={density: 0.05, reach: 30 m, images: 2, distant: false}"
-    few = "scene.trajectory.frames=2"
-    made = plan(reading.load(str(REMUS), [*SMALL, few, f"scene.trajectory.sonar={sonar}", heard]), ("signals",))
+    few, snap = "scene.trajectory.frames=2", f"scene.world.sources.0.snap_times=[{late} s]"
+    sets = [*SMALL, few, snap, f"scene.trajectory.sonar={{{sonar}}}", heard]
+    made = plan(reading.load(str(REMUS), sets), ("signals",))
     frame = made.recipe.frame(0)[1]
     chorus, found = made.scene.world.chorus, frame_chorus(made, frame)
     assert chorus is not None and found is not None and len(found.delay) > 5
-    hears = ListeningWindow(np.zeros(2), frame.time - 0.1, frame.time + 0.2, 40.0, 40.0, 1400.0, 1600.0)
+    hears = ListeningWindow(np.zeros(2), frame.time - 0.1, frame.time + 0.5, 40.0, 40.0, 1400.0, 1600.0)
     snaps = draw_snaps(chorus, number(frame.seed, "chorus", frame.key), hears)
     rows = [int(np.flatnonzero((snaps.key == key).all(axis=1))[0]) for key in found.key]
     snaps = snaps.select(np.array(rows)[found.snap])
     up = made.medium.depth * np.array([-1.0, 1.0, -3.0])[found.boundaries]  # images: by none, surface, that and bottom
-    ours = frame.sonar_pose.position + np.outer(found.delay, frame.sonar_velocity)
-    away = np.column_stack([snaps.position, up]) - ours
+    then = [pose(made.scene.trajectory.sonar, frame.time + heard_at) for heard_at in found.delay]
+    away = np.column_stack([snaps.position, up]) - [one.position for one in then]
     length = np.linalg.norm(away, axis=1)
-    late = snaps.time - frame.time + length / found.sound_speed
-    np.testing.assert_allclose(found.delay, late, rtol=0.0, atol=1e-8)
-    towards = frame.sonar_pose.turn_to_world(found.direction)
-    np.testing.assert_allclose(towards, away / length[:, None], rtol=0.0, atol=1e-7)
+    arrives = snaps.time - frame.time + length / found.sound_speed
+    np.testing.assert_allclose(found.delay, arrives, rtol=0.0, atol=max(1e-8, 2e-3 * exact))
+    towards = [one.turn_to_world(seen) for one, seen in zip(then, found.direction, strict=True)]
+    np.testing.assert_allclose(towards, away / length[:, None], rtol=0.0, atol=exact)
 
 
 def test_a_sonar_that_moves_hears_all_snaps_up_to_the_end_of_a_long_record(monkeypatch: pytest.MonkeyPatch) -> None:

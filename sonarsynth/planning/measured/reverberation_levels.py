@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -115,10 +115,12 @@ def _scatterers(plan: Plan, frame: Frame, start: float, speckle: float, spread: 
     described = scene.world.reverberation
     assert described is not None
     context, sonar = context_of(plan, frame), scene.sonar
+    stop = start + plan.windows.samples / sonar.sampling_frequency
+    context = replace(context, receiver=context.receiver.at(0.5 * (start + stop)))  # what is heard is about there
     before, after = spare_times(plan.elements, sonar, context.receiver.speed(plan.medium), snaps)
     listening = ReverberationWindow(
         start - before,
-        start + plan.windows.samples / sonar.sampling_frequency + after,
+        stop + after,
         sonar.band.high - sonar.band.low,
         speckle,
         spread,

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import turned
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import context_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene
@@ -111,27 +113,39 @@ def _hiding_bodies_off(times: MeetingTimes, context: FrameContext, snap: int, sp
 
 def _background(plan: Plan, frame: Frame) -> list[Omission]:
     """What the sonar does, of which what is heard beside snaps and echoes has nothing."""
-    world, sonar, start, rows = plan.scene.world, frame.sonar_track, frame_start(plan, frame), list[Omission]()
-    late = max(abs(start), start + plan.windows.samples / plan.scene.sonar.sampling_frequency)
-    level = sonar.velocity * (1.0, 1.0, 0.0)
-    then = sonar.later(late).pose
-    off = float(np.linalg.norm(then.position - sonar.pose.position - level * late))
-    if off > 1e-9 and (world.chorus is not None or world.reverberation is not None):
-        why = "level velocity and spin, of the time of the frame"
+    world, rows = plan.scene.world, list[Omission]()
+    half = 0.5 * plan.windows.samples / plan.scene.sonar.sampling_frequency
+    middle = frame.sonar_track.later(frame_start(plan, frame) + half)
+    level, (_, spin) = middle.velocity * (1.0, 1.0, 0.0), middle.in_own_frame
+    off = aside = turning = 0.0
+    for late in (-half, half):
+        then = middle.later(late).pose
+        off = max(off, float(np.linalg.norm(then.position - middle.pose.position - level * late)))
+        turn = turned(np.eye(3), spin, np.full(3, late)).T
+        aside = max(aside, _degrees(then.rotation - middle.pose.rotation @ turn))
+        turning = max(turning, _degrees(then.rotation - middle.pose.rotation))
+    if max(off, aside) > 1e-9 and (world.chorus is not None or world.reverberation is not None):
+        why = "level velocity and spin, of the middle of the record"
         what = "climb and acceleration of the sonar in reverberation and chorus"
-        rows.append(Omission(what, why, f"places up to {off:.1g} m off in the first frame"))
-    mach = float(np.linalg.norm(sonar.velocity)) / float(plan.profile.speed.min())
+        bound = f"places up to {off:.1g} m off, directions up to {aside:.1g} degrees, in the first frame"
+        rows.append(Omission(what, why, bound))
+    mach = float(np.linalg.norm(middle.velocity)) / float(plan.profile.speed.min())
     if mach > 1e-9 and world.chorus is not None:
         angle = f"directions within 45 degrees of the axis up to {np.rad2deg(mach):.2g} degrees off"
         bound = f"{angle}, pulses {1e2 * mach:.2g} % too long or short"
         rows.append(Omission("Doppler in the chorus", "the array is at rest while it hears a snap", bound))
-    turned = float(np.rad2deg(np.linalg.norm(then.rotation - sonar.pose.rotation)) / np.sqrt(2.0))
     fields = [(noise.played, of) for noise in world.environment.noises if (of := noise.directions) is not None]
     waves = any(played or of.toward is not None for played, of in fields)
-    if turned > 1e-6 and (waves or world.noise_sources):  # the rest is alike in all azimuths
-        why, bound = "it comes from where it does at the frame's time", f"directions up to {turned:.2g} degrees off"
-        rows.append(Omission("turning of the sonar within a frame, in noise", why, f"{bound} in the first frame"))
+    if turning > 1e-6 and (waves or world.noise_sources):  # the rest is alike in all azimuths
+        why = "it comes from where it does in the middle of the record"
+        bound = f"directions up to {turning:.2g} degrees off in the first frame"
+        rows.append(Omission("turning of the sonar within a frame, in noise", why, bound))
     return rows
+
+
+def _degrees(difference: Floats) -> float:
+    """Angle between two rotations that differ little, by their difference (xyz, xyz)."""
+    return float(np.rad2deg(np.linalg.norm(difference)) / np.sqrt(2.0))
 
 
 def _moved(plan: Plan) -> str:

@@ -148,9 +148,9 @@ def chorus_arrivals(
 ) -> ChorusArrivals:
     """Arrivals in a window (s, after the instant of the frame, which is `time` (s) after the start of the motions).
 
-    The array moves from snap to snap at its velocity and spin; while it hears one it is at rest. A path so rough that
-    the phase of its reflections is lost (2 pi f sigma > 1 in the middle of the band) keeps its energy, with a random
-    sign. Paths that are `FAINT` are left out.
+    The array moves from snap to snap at the velocity and spin of its `instant`; while it hears one it is at rest. A
+    path so rough that the phase of its reflections is lost (2 pi f sigma > 1 in the middle of the band) keeps its
+    energy, with a random sign. Paths that are `FAINT` are left out.
     """
     heights = image_heights(medium.profile, medium.depth, float(depth(receiver.pose.position)), reach.images)
     emitted, at = (snaps.time - time)[:, None], receiver.pose.position[:2]
@@ -159,8 +159,9 @@ def chorus_arrivals(
     velocity = np.zeros(3) if receiver.track is None else receiver.track.velocity
     delay = emitted + np.hypot(np.hypot(level[..., 0], level[..., 1]), climb) * heights.slowness
     for _ in range(2 if velocity.any() else 0):  # it makes way at a hundredth of the speed of sound, or less
-        level = away - delay[..., None] * velocity[:2]
-        climb = np.abs(heights.climb + delay * velocity[2] * heights.turns)
+        moved = (delay - receiver.instant)[..., None] * velocity
+        level = away - moved[..., :2]
+        climb = np.abs(heights.climb + moved[..., 2] * heights.turns)
         delay = emitted + np.hypot(np.hypot(level[..., 0], level[..., 1]), climb) * heights.slowness
     snap, image = np.nonzero((delay > window[0]) & (delay < window[1]))
     level, climb, delay = level[snap, image], climb[snap, image], delay[snap, image]

@@ -41,7 +41,7 @@ def add_noise_source(
 ) -> Signals:
     """Signals with the sound of a source.
 
-    arrivals: its paths, of an emission of 1 Pa at 1 m at the instant of the frame (`instant`); time: of the frame, in s
+    arrivals: its paths, of an emission of 1 Pa at 1 m (`instant`) and delayed after that; time: of this emission, in s
     since the start of the motions; faster: how many times as fast as it was played the array hears a recording.
     """
     if not arrivals.delay.size:
@@ -61,8 +61,8 @@ def add_noise_source(
     f = frequency[drawn]
     sent = np.zeros(frequency.size, complex)
     if isinstance(source.sound, NoiseRecording):
-        begin = (signals.start + beside) * fs - lead  # paths are those of the instant, 0
-        played = source.sound.segment(time - first + begin * faster / fs, faster / fs, length)
+        begin = (signals.start - instant.time - first + beside) * fs - lead  # after the emission is heard
+        played = source.sound.segment(time + begin * faster / fs, faster / fs, length)
         sent[drawn] = rfft(played)[drawn] * through[drawn]
     else:
         normal = random.standard_normal((2, drawn.size))

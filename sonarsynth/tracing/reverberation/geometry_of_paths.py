@@ -69,7 +69,7 @@ def back_ways(medium: Medium, receiver: Receiver, end: Floats, bounces: int, own
 def scattered_paths(
     position: Floats, emission: Emission, medium: Medium, receiver: Receiver, out: UnfoldedPaths, back: UnfoldedPaths
 ) -> ScatteredPaths:
-    """Paths by places (point, xyz) m. The array is where its velocity, and its spin, bring it till they arrive."""
+    """Paths by places (point, xyz) m. The array is where its velocity, and its spin, bring it from its `instant`."""
     velocity = np.zeros(3) if receiver.track is None else receiver.track.velocity
     away = position - emission.position
     over = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
@@ -78,7 +78,7 @@ def scattered_paths(
     level = position[:, :2] - receiver.pose.position[:2]
     late = delay + np.hypot(np.hypot(*level.T), back.climb) * back.slowness
     if velocity.any():
-        level = level - late[:, None] * velocity[:2]
+        level = level - (late - receiver.instant)[:, None] * velocity[:2]
     beside = np.maximum(np.hypot(*level.T), 1e-9)
     r2 = np.hypot(beside, back.climb)
     towards = np.column_stack([level, np.broadcast_to(back.climb, r2.shape)]) / r2[:, None]
