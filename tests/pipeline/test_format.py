@@ -113,6 +113,20 @@ def test_pressure_reads_as_float32_and_is_what_plain_xarray_reads(built: Path) -
             )
 
 
+def test_a_rendered_frame_has_the_types_and_the_numbers_of_a_store(small_text: str, tmp_path: Path) -> None:
+    """To the bit: of coordinates too, but for texts, which zarr keeps at any length."""
+    text = small_text.replace("  trajectory:", "    sensor_errors: {gain: 1 dB, phase: 10 deg}\n  trajectory:")
+    recipe = loads(text)
+    assert schedule.build(recipe, tmp_path / "s.zarr", frames=(1,), workers=0).ok
+    stored, rendered = ss.open(tmp_path / "s.zarr"), ss.render(recipe, 1)
+    for node in rendered.subtree:
+        for name, own in node.to_dataset(inherit=False).variables.items():
+            other = stored[node.path].to_dataset(inherit=False).variables[name]
+            other = other.isel(frame=1) if "frame" in other.dims else other
+            assert own.dims == other.dims and (own.dtype == other.dtype or own.dtype.kind == "U"), (node.path, name)
+            np.testing.assert_array_equal(own.values, other.values, err_msg=f"{node.path}/{name}")
+
+
 @pytest.mark.parametrize("command", ["build", "build --restart", "verify", "repair", "show", "card"])
 def test_a_store_of_an_older_format_is_refused_in_one_line(
     command: str, built: Path, tmp_path: Path, small_text: str, capsys: pytest.CaptureFixture[str]

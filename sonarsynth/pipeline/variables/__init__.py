@@ -93,7 +93,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
 
 
 def frame_tree(plan: Plan, index: int, values: Mapping[tuple[str, str], npt.NDArray[Any]]) -> xr.DataTree:
-    """A frame as a labelled tree: groups, names and units (attributes) as in a store, without the frame axis.
+    """A frame as a labelled tree: groups, names, types and units (attributes) as in a store, without the frame axis.
 
     values: every stored value of frame number `index`, by group and name.
     """
@@ -106,7 +106,7 @@ def frame_tree(plan: Plan, index: int, values: Mapping[tuple[str, str], npt.NDAr
         static.setdefault(group, {})[name] = entry
     for v in variables(plan):
         attrs = {"units": v.units, "long_name": v.long_name, **dict(v.attributes)}
-        data = values[v.group, v.name]
+        data = np.asarray(values[v.group, v.name], v.dtype)
         data = v.stacked([data], (plan.sizes[v.dims[1]],))[0] if v.listed else data
         if "scale_factor" in attrs:
             packed = data * attrs.pop("scale_factor")
