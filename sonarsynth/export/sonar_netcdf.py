@@ -9,17 +9,16 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from sonarsynth.conventions import PINGS, Floats, Progress, format_bytes
 from sonarsynth.description import FieldError
-from sonarsynth.detection import beam_width
 from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll, latitude_longitude
+from sonarsynth.export.receive_beams import ReceiveBeams, receive_beams
 from sonarsynth.export.transmit_beams import KINDS, TransmitBeams, transmit_beams
 
 if TYPE_CHECKING:
@@ -52,20 +51,6 @@ _ENUMS: Final = {
 }
 
 
-class _Beams(NamedTuple):
-    """A group of beams: hydrophones, which hear all directions, or steered beams."""
-
-    names: list[str]
-    azimuth: Floats  # (beam,) rad
-    elevation: Floats  # (beam,) rad
-    width: float  # degree
-    interval: float  # s
-    units: str
-    long_name: str
-    length: int  # samples
-    samples: Callable[[int], tuple[np.ndarray, float]]  # of a frame: (beam, sample), and the time of the first (s)
-
-
 def write_sonar_netcdf(
     tree: xr.DataTree, folder: Path, frames: np.ndarray, progress: Progress | None = None
 ) -> tuple[Path, ...]:
@@ -76,7 +61,7 @@ def write_sonar_netcdf(
     beams, else the energy (Pa2 s) of each as one sample. Returns the files. Raises FieldError for a store with neither
     signals nor beams nor images, ImportError without h5netcdf, OSError.
     """
-    groups, sent = list(_groups(tree)), transmit_beams(tree)
+    groups, sent = list(receive_beams(tree)), transmit_beams(tree)
     if not groups:
         raise FieldError(("signals",), "the store has neither signals nor beams nor images")
     folder.mkdir(parents=True, exist_ok=True)
@@ -103,48 +88,7 @@ def _must_have_room(folder: Path, needed: int) -> None:
         raise OSError(errno.ENOSPC, said, str(folder))
 
 
-def _groups(tree: xr.DataTree) -> Iterator[_Beams]:
-    if "signals" in tree.children:
-        signals = tree["signals"].dataset
-        zeros = np.zeros(signals.sizes["sensor"])
-        names = [f"hydrophone {n}" for n in range(len(zeros))]
-        interval = 1.0 / float(signals["sampling_frequency"])
-
-        def pressure(frame: int) -> tuple[np.ndarray, float]:
-            ping = signals.isel(frame=frame)
-            return np.asarray(ping["pressure"].values, np.float32), float(ping["start"])
-
-        yield _Beams(names, zeros, zeros, 360.0, interval, "Pa", "Sound pressure", signals.sizes["sample"], pressure)
-    if not {"beams", "image"} & set(tree.children):
-        return
-    steered = tree["beams" if "beams" in tree.children else "image"].dataset
-    azimuth, elevation = np.meshgrid(steered["azimuth"].values, steered["elevation"].values)
-    names = [f"azimuth {a:.6g} elevation {e:.6g}" for a, e in zip(azimuth.ravel(), elevation.ravel(), strict=True)]
-    interval, units, meaning = float("nan"), "Pa2 s", "Energy in the echo window"
-    if "delay" in steered.dims:
-        units, meaning = "dB", "Level of the beam re 1 uPa"
-        if steered.sizes["delay"] > 1:
-            interval = float(np.diff(steered["delay"].values[:2])[0])
-
-    def values(frame: int) -> tuple[np.ndarray, float]:
-        ping = steered.isel(frame=frame)
-        data = np.asarray(ping["level" if "delay" in steered.dims else "energy"].values, np.float32)
-        return data.reshape(len(names), -1), float(ping["start"])
-
-    yield _Beams(
-        names,
-        np.deg2rad(azimuth.ravel()),
-        np.deg2rad(elevation.ravel()),
-        min(float(np.rad2deg(beam_width(tree))), 360.0),
-        interval,
-        units,
-        meaning,
-        steered.sizes.get("delay", 1),
-        values,
-    )
-
-
-def _write(tree: xr.DataTree, path: Path, frames: np.ndarray, groups: list[_Beams], sent: TransmitBeams) -> None:
+def _write(tree: xr.DataTree, path: Path, frames: np.ndarray, groups: list[ReceiveBeams], sent: TransmitBeams) -> None:
     import h5netcdf
 
     with h5netcdf.File(path, "w") as file:
@@ -207,7 +151,7 @@ def _platform(tree: xr.DataTree, file: Any, sent: TransmitBeams) -> None:
 
 
 def _beam_group(
-    tree: xr.DataTree, group: Any, frames: np.ndarray, beams: _Beams, sent: TransmitBeams, kinds: dict[str, Any]
+    tree: xr.DataTree, group: Any, frames: np.ndarray, beams: ReceiveBeams, sent: TransmitBeams, kinds: dict[str, Any]
 ) -> None:
     import h5py
 
@@ -251,7 +195,7 @@ def _beam_group(
         _put(group, name, dims, data.astype(precise), units, name.replace("_", " "))
 
 
-def _transducers(tree: xr.DataTree, group: Any, beams: _Beams, sent: TransmitBeams) -> None:
+def _transducers(tree: xr.DataTree, group: Any, beams: ReceiveBeams, sent: TransmitBeams) -> None:
     """Which transducers of `/Platform` hear each hydrophone's beam, and send the transmit beams."""
     hydrophones, pings = len(_hydrophones(tree)), len(group["ping_time"])
     if beams.units == "Pa":
@@ -263,7 +207,7 @@ def _transducers(tree: xr.DataTree, group: Any, beams: _Beams, sent: TransmitBea
 
 
 def _numbers(
-    tree: xr.DataTree, frames: np.ndarray, beams: _Beams, start: np.ndarray, sent: TransmitBeams
+    tree: xr.DataTree, frames: np.ndarray, beams: ReceiveBeams, start: np.ndarray, sent: TransmitBeams
 ) -> dict[str, tuple[tuple[str, ...], Any, str]]:
     """Numeric variables of a group of beams: dimensions, values, units."""
     truth = tree["truth"].dataset.isel(frame=frames)
@@ -272,12 +216,13 @@ def _numbers(
     latitude, longitude = latitude_longitude(position)
     phi, theta = beam_rotation(beams.azimuth, beams.elevation)
     ping, beam, sending = ("ping_time",), ("ping_time", "beam"), ("ping_time", "tx_beam")
-    disc = (2.0 * np.deg2rad(beams.width) / 1.03) ** 2 / np.pi  # of the width (`beam_width`): lambda^2/area
+    wide, high = beams.azimuth_width, beams.elevation_width
+    disc = (2.0 / 1.03) ** 2 * np.deg2rad(wide) * np.deg2rad(high) / np.pi  # 1.03 lambda/D across: lambda^2/area
     return {
-        "beamwidth_receive_major": (beam, beams.width, "arc_degree"),
-        "beamwidth_receive_minor": (beam, beams.width, "arc_degree"),
+        "beamwidth_receive_major": (beam, wide, "arc_degree"),
+        "beamwidth_receive_minor": (beam, high, "arc_degree"),
         "blanking_interval": (beam, 0.0, "s"),
-        "equivalent_beam_angle": (beam, min(disc, 4.0 * np.pi), "sr"),  # received alone
+        "equivalent_beam_angle": (beam, np.minimum(disc, 4.0 * np.pi), "sr"),  # received alone
         "platform_heading": (ping, heading, "degrees_north"),
         "platform_latitude": (ping, latitude, "degrees_north"),
         "platform_longitude": (ping, longitude, "degrees_east"),

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from scipy.fft import ifft, irfft, next_fast_len, rfft
 
 from sonarsynth.conventions import Complexes, Floats, Ints, direction
-from sonarsynth.equations.arrays.apertures import live_gain
+from sonarsynth.equations.arrays.apertures import half_power_angle, live_gain
 from sonarsynth.equations.arrays.gates import fast_length
 from sonarsynth.equations.arrays.spherical_wave import parabola
 from sonarsynth.products import EnergyImage, Signals, SourceEstimates
@@ -275,13 +275,10 @@ def _moments(f: Floats, echo: Floats, noise: Floats, spacing: float) -> Moments:
 
 @lru_cache(maxsize=16)
 def half_width(elements: Elements, wavenumber: float) -> float:
-    """Angle (rad) at which a beam of `wavenumber` (1/m) is down 3 dB, from the second moment of the aperture.
-
-    0.808/(k s), s the root mean square extent in y and z: exact for a uniform disc (2 J1(x)/x at x = 1.616).
-    """
+    """`half_power_angle` (rad) by the root mean square extent in y and z together, 1 at most."""
     live = elements.position[elements.gain != 0][:, 1:]
     extent = float(np.sqrt(np.mean((live - live.mean(axis=0)) ** 2))) if len(live) else 0.0
-    return min(0.808 / (2 * np.pi * wavenumber * extent), 1.0) if extent > 0 else 1.0
+    return min(float(half_power_angle(extent, wavenumber)), 1.0)
 
 
 @lru_cache(maxsize=16)

@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,6 +27,8 @@ from sonarsynth.recipe import reading
 from sonarsynth.store import Mismatch
 
 BUILT = [2, 3, 4]
+WIDEST = 0.1
+"""rad: beside the axis of a beam, within its main lobe."""
 MANDATORY = {
     "beam",
     "ping_time",
@@ -203,13 +206,37 @@ def test_netcdf_reads_what_the_convention_asks_and_the_same_numbers(store: Path)
         np.testing.assert_allclose(axes, np.stack(ours, axis=-1).reshape(-1, 3), atol=1e-6)
         assert str(steered["beam"][0]).startswith("azimuth -15")
         assert np.all(heard["equivalent_beam_angle"][:] == np.float32(4.0 * np.pi))
-        width = np.deg2rad(np.float64(steered["beamwidth_receive_major"][0, 0]))
+        width = np.sqrt(np.prod([_widths(steered, n) for n in ("major", "minor")], axis=0))
         wide = brentq(lambda x: (2.0 * j1(x) / x) ** 2 - 0.5, 1.0, 2.0)  # at half the width, in ka sin(theta)
-        scale = wide / (0.5 * width)
-        lobes = quad(
-            lambda angle: 2.0 * np.pi * angle * (2.0 * j1(scale * angle) / (scale * angle)) ** 2, 1e-9, 90, limit=9000
-        )
-        np.testing.assert_allclose(steered["equivalent_beam_angle"][:], lobes[0], rtol=0.02)
+        lobes = [
+            quad(lambda x, k: 2.0 * np.pi * x * (2.0 * j1(k * x) / (k * x)) ** 2, 1e-9, 90, (k,), limit=9000)[0]
+            for k in wide / (0.5 * width)
+        ]
+        np.testing.assert_allclose(steered["equivalent_beam_angle"][0], lobes, rtol=0.02)
+        for beam in np.flatnonzero(np.isin(azimuth, azimuth[0, [0, 5]]) & np.isin(elevation, elevation[[0, 4], 0])):
+            for n, name in enumerate(("major", "minor")):
+                across = _half_power_width(place, (azimuth.ravel()[beam], elevation.ravel()[beam]), n, tree.attrs)
+                np.testing.assert_allclose(_widths(steered, name)[beam], across, rtol=0.03)
+
+
+def _widths(group: Any, name: str) -> np.ndarray:
+    return np.deg2rad(group[f"beamwidth_receive_{name}"][0].astype(float))
+
+
+def _half_power_width(place: np.ndarray, axis: tuple[float, float], turn: int, attrs: dict[str, Any]) -> float:
+    """Angle (rad) between the directions beside the axis of a beam in which the array hears half of the power, in
+    azimuth (turn 0) or elevation (1), by the sum over its hydrophones."""
+    k = 2.0 * np.pi * 0.5 * (attrs["band_low"] + attrs["band_high"]) / attrs["assumed_sound_speed"]
+
+    def ahead(azimuth: float, elevation: float) -> np.ndarray:
+        return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+
+    def over_half(angle: float) -> float:
+        beside = ahead(*(value + angle * (n == turn) for n, value in enumerate(axis)))
+        return float(abs(np.exp(1j * k * place @ (beside - ahead(*axis))).mean()) ** 2 - 0.5)
+
+    angle = brentq(over_half, 0.0, WIDEST) - brentq(over_half, -WIDEST, 0.0)
+    return float(angle * (np.cos(axis[1]) if turn == 0 else 1.0))
 
 
 def test_netcdf_reads_what_a_transmitter_sends(small_text: str, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from sonarsynth.pipeline.variables.static_variables import coordinates
 from sonarsynth.pipeline.variables.variable import Variable, flags
 from sonarsynth.pipeline.variables.variable_groups import VARIABLES
 from sonarsynth.planning import OF_BEAMS, Plan
+from sonarsynth.ranging.range_profiles import aperture_moments
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,6 +84,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
         "assumed_sound_speed": plan.scene.sonar.assumed_sound_speed,
         "accuracy_signal": recipe.accuracy.signal,
         "aperture_radius": plan.elements.aperture,
+        "aperture_rms": np.sqrt(np.diag(aperture_moments(plan.elements))[1:]).tolist(),  # m, across and up
         "choices": plan.choices.as_json(),
         "validity": list(plan.validity),
         "frames_conventions": (
