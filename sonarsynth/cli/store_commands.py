@@ -105,7 +105,7 @@ def evaluate(
     if chosen is None or (predictions and also):
         raise BadOption("give one file of detections, or 'truth'")
     if chosen != evaluation.TRUTH and not Path(chosen).is_file():
-        raise BadOption(f"{chosen}: no such file")
+        raise BadOption(f"{chosen}: {'is not a file but a folder' if Path(chosen).is_dir() else 'no such file'}")
     with printing.planning("reading"):
         figures = evaluation.evaluate(store, chosen, split=split).as_json()
     if as_json:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, finite_json
+from sonarsynth.conventions import Floats, counted, finite_json
 from sonarsynth.pictures.figures.strength_figure import strength_figure
 from sonarsynth.pictures.figures.style import save
 from sonarsynth.scattering import Scattering
@@ -42,7 +42,7 @@ class StrengthTable:
         mean = 10.0 * np.log10(np.mean(10.0 ** (self.strength / 10.0)))
         at = f"{np.rad2deg(self.aspect[high[0]]):g} deg and {self.frequency[high[1]] / 1e3:g} kHz"
         return (
-            f"{self.strength.size} levels: maximum {self.strength[high]:.1f} dB re 1 m2 at {at}, "
+            f"{counted(self.strength.size, 'level')}: maximum {self.strength[high]:.1f} dB re 1 m2 at {at}, "
             f"median {np.median(self.strength):.1f} dB, mean power {mean:.1f} dB"
         )
 

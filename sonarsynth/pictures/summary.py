@@ -82,10 +82,13 @@ def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     inside = None if view is None else np.isin(view[frames], (View.IN_VIEW, View.PARTLY_IN_VIEW)).sum(axis=0)
     snr, lines = read(tree, "truth/targets/snr"), []
     for i, name in enumerate(map(str, names)):
+        distance = away[np.isfinite(away[:, i]), i]
+        if not len(distance):
+            lines.append(f"  target     {name}: in none of these frames")
+            continue
         faces = read(tree, f"{mesh_group(tree, i, int(frames[0]))}/faces")
         facets = f"{len(faces)} facets, " if faces is not None else ""
-        distance = away[np.isfinite(away[:, i]), i]
-        reach = f"{distance.min():.2f} to {distance.max():.2f} m away" if len(distance) else "in none of these frames"
+        reach = f"{distance.min():.2f} to {distance.max():.2f} m away"
         ratio = "" if snr is None or not np.isfinite(snr[frames, i]).any() else _ratios(snr[frames, i])
         within = "" if inside is None or inside[i] == visible[i] else f" ({inside[i]} within the beams)"
         seen = counted(int(visible[i]), "frame")

@@ -115,6 +115,7 @@ def test_a_bad_file_gets_one_line(
     [
         (["evaluate", "STORE"], "give one file of detections"),
         (["evaluate", "STORE", "nothing.json"], "nothing.json: no such file"),
+        (["evaluate", "STORE", "."], ".: is not a file but a folder"),
         (["detect", "STORE", "--split", "test"], "no frame of test has been built"),
         (["evaluate", "STORE", "truth", "--split", "exam"], "must be one of train, validation, test, not exam"),
         (["detect", "STORE", "--method", "guess"], "must be one of cfar, peaks, not 'guess'"),

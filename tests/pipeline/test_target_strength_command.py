@@ -49,8 +49,9 @@ def test_an_open_mesh_file_in_its_unit_and_silence_as_null(tmp_path: Path, capsy
 def test_a_coarse_mesh_is_noted_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--frequency", "50e3", "--aspect", "90", "--out", str(tmp_path)]
     assert run(app, ["target-strength", "{kind: remus100, coarse: true}", *options]) == 0
-    noted = capsys.readouterr().err.splitlines()
-    assert len(noted) == 1
+    said = capsys.readouterr()
+    noted = said.err.splitlines()
+    assert len(noted) == 1 and said.out.startswith("1 level: maximum")
     assert noted[0].startswith("note: facets of")
 
 

@@ -55,7 +55,7 @@ class Soundscape:
         if model.rates is not None:
             rows = zip(self.measured.levels, figures.rates, wide.rates, model.rates, strict=True)
             lines += [
-                f"arrivals over {level + PASCAL:.0f} dB: {rate:.3g} +- {spread:.2g} /s (model {predicted:.3g})"
+                f"arrivals over {level + PASCAL:.0f} dB: {rate:.3g} +- {spread:.3g} /s (model {predicted:.3g})"
                 for level, rate, spread, predicted in rows
             ]
         if np.isfinite(figures.fano[0]):
