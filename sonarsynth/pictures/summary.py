@@ -86,14 +86,22 @@ def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
         if not len(distance):
             lines.append(f"  target     {name}: in none of these frames")
             continue
-        faces = read(tree, f"{mesh_group(tree, i, int(frames[0]))}/faces")
-        facets = f"{len(faces)} facets, " if faces is not None else ""
+        facets = _facets(tree, i, frames[np.isfinite(away[:, i])])
         reach = f"{distance.min():.2f} to {distance.max():.2f} m away"
         ratio = "" if snr is None or not np.isfinite(snr[frames, i]).any() else _ratios(snr[frames, i])
         within = "" if inside is None or inside[i] == visible[i] else f" ({inside[i]} within the beams)"
         seen = counted(int(visible[i]), "frame")
         lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen}{within}{ratio}")
     return [*lines, *_ghosts(tree, frames, list(map(str, names)))]
+
+
+def _facets(tree: xr.DataTree, target: int, frames: np.ndarray) -> str:
+    """How many facets a target has in some frames, whose meshes may differ; nothing where none is stored."""
+    _, first = np.unique(needed(tree, "truth/targets/mesh")[frames, target], return_index=True)
+    meshes = (read(tree, f"{mesh_group(tree, target, int(frame))}/faces") for frame in frames[first])
+    counts = [len(faces) for faces in meshes if faces is not None]
+    several = f"{min(counts)} to " if len(set(counts)) > 1 else ""
+    return f"{several}{max(counts)} facets, " if counts else ""
 
 
 def _ratios(snr: np.ndarray) -> str:

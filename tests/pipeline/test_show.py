@@ -248,6 +248,18 @@ def test_the_summary_agrees_with_the_closed_form(shown: tuple[list[Path], list[s
     assert f"median error {0.01 * np.sqrt(3):.3g} m" in text  # every coordinate of the located snap is 1 cm off
 
 
+def test_the_summary_counts_the_facets_of_all_meshes_that_a_target_has(store: Path) -> None:
+    tree = opened(store).load()
+    mesh = tree["targets/hull"].to_dataset()
+    tree["targets/hull"] = xr.DataTree.from_dict({"0": mesh.isel(face=slice(7)), "1": mesh})
+    tree["truth/targets/mesh"][:] = [[1], [0], [-1]]
+    assert f"hull: 7 to {mesh.sizes['face']} facets, " in summary(tree, store)
+    tree["truth/targets/position"][1] = np.nan  # there in the first frame alone
+    assert f"hull: {mesh.sizes['face']} facets, 12.00 to 12.00 m away" in summary(tree, store)
+    tree["truth/targets/position"][:] = np.nan
+    assert "hull: in none of these frames\n" in summary(tree, store)
+
+
 def test_of_very_many_frames_some_are_judged_and_all_are_counted(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules[summary.__module__], "JUDGED", 1)
     text = summary(opened(store), store)
