@@ -103,3 +103,18 @@ def test_a_plan_takes_few_bins_only_where_they_are_as_good():
     assert (method, error) == (FocusedDelayAndSum(subarrays=(2, 2), bins="few"), 0.05)
     chosen = replace(method, bins="all")
     assert chosen.resolve(Demand(0.1, False, lambda m: 0.2, ARRAY)) == (chosen, 0.2)
+
+
+@pytest.mark.parametrize("allowed", [0.5, 0.1, 0.03, 0.002])
+@pytest.mark.parametrize("of_bins", [0.0, 0.02, 0.2])
+def test_a_plan_keeps_what_is_allowed_where_any_subarrays_and_bins_do(allowed, of_bins):
+    """Errors by subarrays fall with their number, those by few bins do not: few where these are allowed."""
+    from sonarsynth.description.method import Demand
+
+    def error(method):
+        return np.hypot(0.4 / method.subarrays[0] ** 2, of_bins if method.bins == "few" else 0.0)
+
+    method, found = FocusedDelayAndSum().resolve(Demand(allowed, False, error, ARRAY))
+    assert found == error(method)
+    assert found <= allowed
+    assert (method.bins == "few") == (of_bins < allowed)

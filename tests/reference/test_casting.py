@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
 from sonarsynth.casting import ray_casting
+from sonarsynth.casting.horizons import UNKNOWN
 from sonarsynth.casting.ray_casting import OFFSET, first_hit, occluded
 from sonarsynth.casting.shadows import hide
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import NO_TARGET, Floats
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import ConstantVelocity
@@ -209,7 +212,7 @@ def off_facets(mesh: Mesh, count: int, seed: int) -> tuple[np.ndarray, Floats, F
 @pytest.mark.parametrize("mesh", [RING, COPY, mesh_of(Remus100(edge=0.06))])
 def test_rays_above_the_horizon_of_their_facet_meet_nothing(mesh: Mesh) -> None:
     facet, origin, direction = off_facets(mesh, 300, 7)
-    sine, horizon = np.sum(direction * mesh.normal[facet], axis=1), ray_casting.casting_mesh(mesh).horizon[facet]
+    sine, horizon = np.sum(direction * mesh.normal[facet], axis=1), ray_casting.casting_mesh(mesh).horizon(facet)[facet]
     octant = (direction < 0.0) @ [1, 2, 4]
     above = sine > horizon[np.arange(len(facet)), octant]
     assert (search(mesh, origin[above], direction[above])[0] < 0).all()
@@ -218,7 +221,7 @@ def test_rays_above_the_horizon_of_their_facet_meet_nothing(mesh: Mesh) -> None:
 
 def test_nothing_stands_over_the_facets_of_convex_bodies() -> None:
     for mesh in (SPHERE, mesh_of(Box(size=(0.4, 0.3, 0.2)))):
-        assert not ray_casting.casting_mesh(mesh).horizon.any()
+        assert not ray_casting.casting_mesh(mesh).horizon(np.arange(len(mesh.faces))).any()
 
 
 def test_the_horizon_of_a_floor_is_the_edge_of_the_wall_on_it() -> None:
@@ -226,9 +229,21 @@ def test_the_horizon_of_a_floor_is_the_edge_of_the_wall_on_it() -> None:
     wall = [[0.6, -0.1, 0.0], [0.6, 0.1, 0.0], [0.6, 0.0, 0.8]]
     mesh = Mesh(np.array(floor + wall), np.arange(6, dtype=np.int32).reshape(2, 3))
     east = [[True, False] * 4]  # octants in which the wall stands: x is not below 0 there
-    np.testing.assert_allclose(ray_casting.casting_mesh(mesh).horizon[:1], east)  # 0.8 m up at most, 0.6 m away
+    np.testing.assert_allclose(
+        ray_casting.casting_mesh(mesh).horizon(np.array([0]))[:1], east
+    )  # 0.8 m up at most, 0.6 m away
     low = Mesh(mesh.vertices * [1.0, 1.0, 0.5], mesh.faces)
-    np.testing.assert_allclose(ray_casting.casting_mesh(low).horizon[:1], np.multiply(east, 0.4 / 0.6))
+    np.testing.assert_allclose(ray_casting.casting_mesh(low).horizon(np.array([0]))[:1], np.multiply(east, 0.4 / 0.6))
+
+
+def test_a_horizon_is_the_same_whichever_facets_were_asked_for_before() -> None:
+    one, other = (ray_casting.casting_mesh(RING.scaled(factor)) for factor in (1.1, 1.0))
+    some, every = np.array([7, 3, 7, NO_TARGET]), np.arange(len(RING.faces))
+    one, other = (replace(ready) for ready in (one, other))  # that know nothing yet
+    few = one.horizon(some).copy()
+    np.testing.assert_array_equal(np.flatnonzero((few != UNKNOWN).any(axis=1)), [3, 7])
+    np.testing.assert_array_equal(one.horizon(every), other.horizon(every[::-1]))
+    np.testing.assert_array_equal(one.horizon(every)[[3, 7]], few[[3, 7]])
 
 
 def test_what_hides_a_facet_is_the_same_where_its_number_is_known() -> None:
