@@ -151,14 +151,31 @@ def test_a_spectrum_is_heard_at_its_level_and_changes_no_draw_of_the_ambient_noi
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ("{name: a, motion: {kind: still, position: [9, 0, 3]}, sound: {kind: flat, level: 1 dB}}", "out of the water"),
+        ("{name: a, motion: {kind: still, position: [9, 0, 3]}, sound: {kind: flat, level: 1}}", "above the surface"),
         (f"{{name: a, motion: {STILL}, sound: {{kind: thermal, directions: {{kind: surface}}}}}}", "no directions"),
         (f"{{name: a, motion: {STILL}, sound: {{kind: noise_recording, path: tone.wav}}}}", "no such file"),
+        (  # which was silent
+            "{name: a, motion: {kind: still, position: [0, 0, -20]}, sound: {kind: flat, level: 1 dB}}",
+            r"noise_sources\.0\.motion: is at the centre of the array at frame 0",
+        ),
+        (
+            "{name: a, motion: {kind: still, position: [0, 0.4, -19.9]}, sound: {kind: flat, level: 1 dB}}",
+            r"noise_sources\.0\.motion: is at hydrophone 1 of the array at frame 0",
+        ),
+        (  # of which nothing was true
+            "{name: a, motion: {kind: course, start: [30, 0, -20], speed: 1600}, sound: {kind: flat, level: 1 dB}}",
+            r"noise_sources\.0\.motion: moves too fast for sound in water at frame 0",
+        ),
+        (  # silent as well
+            "{name: a, motion: {kind: still, position: [20, 1, -20]}, sound: {kind: flat, level: 1 dB}}",
+            r"noise_sources\.0\.motion: is inside target 'ball' at frame 0, or touches it",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(tmp_path: Path, source: str, message: str) -> None:
+    body = "{name: ball, shape: {kind: sphere, radius: 1, edge: 0.5}, motion: {kind: still, position: [20, 1, -20]}}"
     with pytest.raises((ss.RecipeError, ss.FieldError), match=message):
-        heard(tmp_path, source)
+        heard(tmp_path, f"{source}]\n    targets: [{body}")
 
 
 @pytest.mark.parametrize("speed", [0.0, 10.0])

@@ -1,4 +1,4 @@
-"""Can the noises of a scene be read, are they of its band, and where do their formulas not hold?"""
+"""Where is what sounds in a scene; can its noises be read, are they of its band, and where do formulas not hold?"""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sonarsynth.conventions import Floats
 from sonarsynth.description import FieldError
 from sonarsynth.description.method import returned
 from sonarsynth.environment.noise import Noise
-from sonarsynth.recipe.scene import Scene
+from sonarsynth.geometry.motion import pose, velocity
+from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.sources.noise_source import NoiseRecording
 
 INSTANT = 1e-9
@@ -36,6 +38,16 @@ def check_noises(scene: Scene) -> None:
                 )
         except ValueError as error:
             raise FieldError(path, str(error)) from None
+
+
+def source_places(scene: Scene, frame: Frame) -> Iterator[tuple[tuple[str | int, ...], Floats, Floats]]:
+    """The field that says where a source of snaps or of noise is in a frame, its place (xyz) m and velocity m/s."""
+    owners = [i for i, source in enumerate(scene.world.sources) for _ in source.times]
+    for i, snap in zip(owners, frame.moment.snaps, strict=True):
+        yield ("scene", "world", "sources", i, "position"), snap.position, snap.velocity
+    for i, source in enumerate(scene.world.noise_sources):
+        place = pose(source.motion, frame.time).position
+        yield ("scene", "world", "noise_sources", i, "motion"), place, velocity(source.motion, frame.time)
 
 
 def noise_notes(scene: Scene) -> Iterator[str]:

@@ -15,7 +15,7 @@ from sonarsynth.equations.rays.ray_solutions import TOLERANCE
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.motion import Track, pose
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.planning.notes.noise_checks import check_noises
+from sonarsynth.planning.notes.noise_checks import check_noises, source_places
 from sonarsynth.planning.notes.track_checks import check_tracks
 from sonarsynth.receiver import Sonar, elements
 from sonarsynth.receiver.sensor_errors import drawn_errors
@@ -169,7 +169,7 @@ def check_frame(scene: Scene, frame: Frame) -> None:
         if (sensors := enclosed(body, frame.sonar_pose.to_world(array.position))).any():
             line = f"target '{body.name}' contains hydrophone {sensors.argmax()} at {when}, or touches it"
             raise FieldError(path, line)
-    _check_snaps(scene, frame)
+    _check_sources(scene, frame)
     for number, field in enumerate(frame.moment.scatterers):
         _check_depth(("scene", "world", "scatterers", number), "a scatterer", field.position, bottom_depth, when)
 
@@ -222,24 +222,23 @@ def _fastest(track: Track, reach: float) -> float:
     return math.hypot(*track.velocity) + math.hypot(*track.spin) * reach  # squares nothing: absurd speeds overflow
 
 
-def _check_snaps(scene: Scene, frame: Frame) -> None:
-    """No source is at the centre of the array, at a hydrophone, or inside a target."""
-    owners = [i for i, source in enumerate(scene.world.sources) for _ in source.times]
+def _check_sources(scene: Scene, frame: Frame) -> None:
+    """No source, of snaps or of noise, is at the centre of the array, at a hydrophone, or inside a target."""
     array, centre = elements(scene.sonar.array), frame.sonar_pose.position
     slowest, bottom = float(_water(scene).speed.min()), scene.world.environment.depth
-    for owner, snap in zip(owners, frame.moment.snaps, strict=True):
-        path = ("scene", "world", "sources", owner, "position")
-        if (away := math.dist(snap.position, centre)) < CLOSEST:
+    for path, place, speed in source_places(scene, frame):
+        if (away := math.dist(place, centre)) < CLOSEST:
             raise FieldError(path, f"is at the centre of the array at frame {frame.index}")
         if away < 2.0 * (array.aperture + CLOSEST):
-            distance = np.linalg.norm(frame.sonar_pose.to_world(array.position) - snap.position, axis=1)
+            distance = np.linalg.norm(frame.sonar_pose.to_world(array.position) - place, axis=1)
             if distance.min() < CLOSEST:
                 raise FieldError(path, f"is at hydrophone {distance.argmin()} of the array at frame {frame.index}")
-        _check_depth(path, "a source", snap.position[None], bottom, f"frame {frame.index}")
-        if scene.physics.doppler and math.hypot(*snap.velocity, *frame.sonar_velocity) > 0.4 * MAX_DOPPLER * slowest:
+        _check_depth(path, "a source", place[None], bottom, f"frame {frame.index}")
+        fast = math.hypot(*speed, *frame.sonar_velocity) > 0.4 * MAX_DOPPLER * slowest
+        if fast and (scene.physics.doppler or "noise_sources" in path):  # recordings are played by it all the same
             raise FieldError(path, f"moves too fast for sound in water at frame {frame.index}")
         for body in frame.moment.bodies:
-            if not _apart(body, snap.position) and enclosed(body, snap.position[None])[0]:
+            if not _apart(body, place) and enclosed(body, place[None])[0]:
                 raise FieldError(path, f"is inside target '{body.name}' at frame {frame.index}, or touches it")
 
 
