@@ -107,6 +107,21 @@ WRONG = [
     ),
     ("position: [12, 8]", "position: [1e9, 1]", "11: scene.world.sources.0.position: is more than 1e+06 m"),
     ("depth: 12 m", "depth: 120 km", f"5: {WATER}.depth: must be less than or equal to 12 km, not '120 km'"),
+    (  # of a word or a number the word alone was named
+        "    targets:",
+        "    chorus: {reach: 5 km}\n    targets:",
+        "6: scene.world.chorus.reach: must be 'auto' or less than or equal to 3 km, not '5 km'",
+    ),
+    (
+        "    targets:",
+        "    chorus: {reach: 5 s}\n    targets:",
+        "6: scene.world.chorus.reach: has unit 's'; use one of m",
+    ),
+    (
+        "    targets:",
+        "    chorus: {density: 2}\n    targets:",
+        "6: scene.world.chorus.density: must be 'mud', 'harbour', 'reef', 'rubble' or less than or equal to 1, not 2",
+    ),
     ("azimuth_span: 30 deg", "azimuth_span: 180 deg", "azimuth_span: must be less than 180 deg, not '180 deg'"),
     (
         "kind: isovelocity, speed: 1540",

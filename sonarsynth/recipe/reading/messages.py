@@ -24,6 +24,10 @@ def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
             texts[keys] = texts[keys].replace("' or '", "', '").replace(", not ", " or a mapping, not ", 1)
         if details["type"] == "literal_error" and (texts.get(keys) or "").startswith("must be a list, not "):
             texts[keys] = texts[keys].replace("a list, not ", f"a list or {details['ctx']['expected']}, not ", 1)
+        number = details["type"].startswith(("less_than", "greater_than")) or message.startswith("has unit ")
+        if number and (texts.get(keys) or "").startswith("must be '"):  # or a word
+            said = texts[keys].rpartition(", not ")[0].replace("' or '", "', '")
+            texts[keys] = message.replace("must be ", f"{said} or ", 1)
         texts.setdefault(keys, message)
         if details["type"] == "too_short":  # only entries that are right are counted
             explained.add(keys)
