@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, counted
+from sonarsynth.conventions import Floats, counted, depth
+from sonarsynth.description import FieldError
 from sonarsynth.description.memory import SHARD_COPIES, frame_bytes, frames_together
 from sonarsynth.environment.absorption import DepthAbsorption
 from sonarsynth.environment.sea import Profile
@@ -27,6 +28,7 @@ from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.rising_bottom import with_sources
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.chorus.chorus_arrivals import ChorusReach
+from sonarsynth.signals.chorus.chorus_synthesis import check_length
 from sonarsynth.sources import Source
 from sonarsynth.state import Medium
 
@@ -163,12 +165,22 @@ class Plan:
 
     @cached_property
     def chorus(self) -> ChorusReach | None:
-        """How far the chorus of the sequence is heard; none without one."""
-        if self.scene.world.chorus is None:
+        """How far the chorus of the sequence is heard; none without one. Raises FieldError where its snaps are too long
+        to be made."""
+        described, sonar = self.scene.world.chorus, self.scene.sonar
+        if described is None:
             return None
-        sonar, first = self.scene.sonar, self.scene.trajectory.time(0)
-        position = pose(self.scene.trajectory.sonar, first).position
-        return chorus_reach(self.scene, self.profile, position, self.absorption(band_frequencies(sonar)))
+        position = pose(self.scene.trajectory.sonar, self.scene.trajectory.time(0)).position
+        reach = chorus_reach(self.scene, self.profile, position, self.absorption(band_frequencies(sonar)))
+        if reach is None:
+            return None
+        try:
+            model, width = described.snap.at_depth(self.medium.depth), float(described.widths.max())
+            speed = float(self.profile.at(depth(position)))
+            check_length(model, width, self.elements, sonar, speed, self.absorption)
+        except ValueError as error:
+            raise FieldError(("scene", "world", "chorus", "snap"), str(error)) from None
+        return reach
 
     @cached_property
     def distant_chorus(self) -> DistantChorus | None:

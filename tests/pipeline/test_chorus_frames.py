@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from sonarsynth.description import FieldError
 from sonarsynth.evaluation import check
 from sonarsynth.geometry.motion import pose
 from sonarsynth.pipeline import render
@@ -132,6 +133,14 @@ def test_a_chorus_whose_recording_is_absent_is_refused() -> None:
     absent = "scene.world.chorus={snap: {kind: recorded_snap, path: absent.wav}}"
     with pytest.raises(reading.RecipeError, match=r"chorus.snap.path: no such file"):
         reading.load(str(REMUS), [*SMALL, absent])
+
+
+@pytest.mark.parametrize("snap", ["{kind: ricker, frequency: 1 kHz}", "{kind: gabor, frequency: 60 kHz, cycles: 500}"])
+def test_a_chorus_of_snaps_that_are_too_long_is_refused_when_it_is_planned(snap: str) -> None:
+    """Frames failed, with a traceback."""
+    long = f"scene.world.chorus={{density: 1e-3, reach: 50 m, snap: {snap}}}"
+    with pytest.raises(FieldError, match=r"^scene\.world\.chorus\.snap: lasts [\d.]+ ms .* is the most$"):
+        plan(reading.load(str(REMUS), [*SMALL, long]), ("signals",))
 
 
 def test_a_chorus_that_is_brighter_than_the_echoes_is_no_fault_of_the_store(tmp_path: Path) -> None:

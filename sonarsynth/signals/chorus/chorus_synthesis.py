@@ -80,7 +80,6 @@ def chorus_pressure(
         if not len(group.delay):
             continue
         modes = pulse_modes(model, width, sonar, elements.face, sound_speed, lost)
-        _check_length(modes, spare - elements.aperture / sound_speed, rate * times)
         louder = REFERENCE_PRESSURE / model.pulse(0.0, 0.0).peak * 10.0 ** (group.level / 20.0)
         add_arrivals(
             flat,
@@ -101,11 +100,22 @@ def chorus_pressure(
     return pressure * elements.gain[:, None].astype(np.float32)
 
 
-def _check_length(modes: PulseModes, longest: float, rate: float) -> None:
-    """Refuses pulses of more than `longest` (s): those at the ends of the record would not be heard whole."""
-    length = modes.table.shape[1] // (FRACTIONS + 1) / rate
+def check_length(
+    model: PulseModel,
+    width: float,
+    elements: Elements,
+    sonar: Sonar,
+    speed: float,
+    absorption: Callable[[Floats], Floats],
+) -> None:
+    """Raises ValueError for a snap, `width` times as long as its model, that is too long for `spare_time`: at the ends
+    of the record it would not be heard whole. speed (m/s) and absorption: as of `chorus_pressure`."""
+    lost = tuple(absorption(node_frequencies(sonar)).tolist())
+    modes, longest = pulse_modes(model, width, sonar, elements.face, speed, lost), spare_time(elements, sonar, speed)
+    longest -= elements.aperture / speed
+    length = modes.table.shape[1] // (FRACTIONS + 1) / (sonar.sampling_frequency * grid_factor(sonar))
     if length > longest:
-        raise ValueError(f"a snap of the chorus lasts {1e3 * length:.3g} ms; {1e3 * longest:.3g} ms is the most")
+        raise ValueError(f"lasts {1e3 * length:.3g} ms behind the filter; {1e3 * longest:.3g} ms is the most")
 
 
 def spare_time(elements: Elements, sonar: Sonar, sound_speed: float) -> float:

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal, get_args
 import numpy as np
 from annotated_types import Ge, Le
 
-from sonarsynth.conventions import Decibels, Floats, Number, PositiveMetres, PositiveSeconds
+from sonarsynth.conventions import Decibels, Floats, Metres, Number, PositiveMetres, PositiveSeconds
 from sonarsynth.description import description
 from sonarsynth.sources.shrimp import LogarithmicBubble, SnapModel
 
@@ -56,7 +56,7 @@ class Chorus:
     """What a snap sounds like."""
     clusters: Clusters | None = None
     """How snaps come together; left out: each by itself, in place and time (Poisson)."""
-    reach: Literal["auto"] | Annotated[PositiveMetres, Le(3000)] = "auto"
+    reach: Literal["auto"] | Annotated[Metres, Ge(1), Le(3000)] = "auto"
     """Horizontal distance from the array to which snaps are heard one by one; `auto`: where those beyond bring under
     2 % of the power, or are so many that their sum is Gaussian noise (with `distant`), but 3000 m at most."""
     images: Literal["auto"] | Annotated[int, Ge(0), Le(200)] = "auto"
