@@ -24,7 +24,7 @@ def range_image(received: ReceivedWindow, ranges: Floats, track: Track | None) -
         t = (r + |r u - s(t)| - |s|)/c
 
     s: the first located snap, in the frame of a sonar that goes on along its track until it hears the echo. NaN beyond
-    the echo window, and where no snap was located.
+    the echo window, and where no snap was located, or nothing of it is recorded.
     """
     image, found, drift = received.image, received.estimates, np.zeros(3)
     cells = np.full((len(ranges), len(image.azimuth)), np.nan, np.float32)
@@ -41,7 +41,7 @@ def range_image(received: ReceivedWindow, ranges: Floats, track: Track | None) -
         power = echoes.profiles(beams)[1]
         speed = received.sonar.assumed_sound_speed
         _largest(power, first, echoes.step, ranges, beams, found.position[0], drift, speed, cells)
-    return cells / np.float32(echoes.unity)
+    return cells / np.float32(echoes.unity) if echoes.unity > 0.0 else np.full_like(cells, np.nan)
 
 
 @compiled

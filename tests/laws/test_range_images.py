@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -159,6 +160,15 @@ def test_a_range_image_without_ranges_is_refused_in_one_line() -> None:
     for wrong, line in (({"near": 5.0, "far": 4.0}, "far must be beyond near"), ({"step": 1e-6}, "more than 100000")):
         with pytest.raises(ValidationError, match=line):
             RangeGrid(**({"near": 5.0, "far": 30.0, "step": 0.02} | wrong))
+
+
+def test_where_nothing_is_recorded_no_cell_has_a_number() -> None:
+    """Of no echo over no direct pulse, which warned of 0/0."""
+    coarse = scene(PING, converter=Converter(bits=16, full_scale=1e9))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        image = render(plan(coarse, ["range_image"]), 0)
+    assert np.isnan(image["range_image/energy"].values).all()
 
 
 def test_the_plan_says_where_counts_are_too_coarse_for_the_noise() -> None:
