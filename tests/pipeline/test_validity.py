@@ -95,6 +95,35 @@ def _notes(made: ss.Plan) -> list[str]:
     return [note for note in made.warnings if note.startswith("scene.")]
 
 
+BREEZE = f"{WATER}surface.wind_speed: waves of Pierson and Moskowitz (1964): wind speed 5 m/s is outside"
+
+
+@pytest.mark.parametrize(
+    ("sea", "expected"),
+    [
+        ("", []),
+        ("chorus: {reach: 20, images: 2}", [BREEZE]),
+        ("reverberation: {bottom: null, bounces: 0}", [BREEZE]),
+        ("reverberation: {surface: null, bounces: 1}", [BREEZE]),
+        ("reverberation: {surface: null, bounces: 0}", []),
+        (
+            "reverberation: {bottom: null, surface: {kind: wind, wind_speed: 30}}",
+            [BREEZE, "scene.world.reverberation.surface: waves of Pierson and Moskowitz (1964): wind speed 30 m/s is"],
+        ),
+    ],
+)
+def test_boundaries_that_chorus_and_reverberation_meet_are_said_too(sea: str, expected: list[str]) -> None:
+    """Without reflections of snaps nothing was said of them, and a wind of the reverberation's own warned in frames."""
+    text = RECIPE.replace("surface: {}", "surface: {wind_speed: 5}").replace("    targets:", f"    {sea}\n    targets:")
+    made = ss.plan(ss.loads(text.replace("{kind: auto, bounces: 1}", "{kind: auto}")), ["signals"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.render(made, 0)
+    found = [note for note in _notes(made) if "Pierson" in note]
+    assert len(found) == len(expected)
+    assert all(note.startswith(beginning) for note, beginning in zip(found, expected, strict=True))
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_a_plan_says_each_once_with_its_field(case: str) -> None:
     old, new, expected = CASES[case]

@@ -32,10 +32,15 @@ def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
         ("absorption", note)
         for note in absorption_notes(environment.absorption, [[band.low], [band.high]], [0.0, environment.depth])
     ]
-    if scene.physics.tracing.bounces:
-        for name, boundary in (("surface", environment.surface), ("bottom", environment.bottom)):
+    chorus, described = scene.world.chorus, scene.world.reverberation
+    for name, boundary in (("surface", environment.surface), ("bottom", environment.bottom)):
+        of_sea = chorus is not None or (described is not None and (described.bounces or name in described.owners))
+        if scene.physics.tracing.bounces or of_sea:
             field_notes += [(f"{name}.{field}", note) for field, note in boundary_notes(boundary, band.low, band.high)]
     lines = [f"scene.world.environment.{field}: {note}" for field, note in field_notes]
+    laws = {} if described is None else {"bottom": described.bottom, "surface": described.surface}
+    for name, law in laws.items():
+        lines += [f"scene.world.reverberation.{name}: {note}" for note in (() if law is None else law.notes())]
     return (*lines, *noise_notes(scene), *(f"{'.'.join(BELIEVED)}: {note}" for note in _believed(scene)))
 
 

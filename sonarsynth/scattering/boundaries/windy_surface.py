@@ -11,6 +11,7 @@ from sonarsynth.conventions import Floats, MetresPerSecond
 from sonarsynth.description import description
 from sonarsynth.equations.reverberation.bottom_strength import Angles
 from sonarsynth.equations.reverberation.surface_strength import bubbles, facets, small_waves
+from sonarsynth.equations.water import formula_ranges
 from sonarsynth.equations.water.boundary_reflection import wind_wave_height
 from sonarsynth.scattering.boundaries.boundary_law import BoundaryLaw, BoundarySite
 
@@ -34,10 +35,17 @@ class WindySurface(BoundaryLaw):
                 raise ValueError("needs the wind_speed of a rough surface")
             return np.zeros(np.broadcast(*angles).shape)
         own = self.wind_speed is not None and self.wind_speed != site.wind_speed
-        height = float(wind_wave_height(wind)) if own else site.rms_height
+        with formula_ranges.noted():  # said by `notes`
+            height = float(wind_wave_height(wind)) if own else site.rms_height
         both = site.mirrored(_angle(angles.sine_in)) * site.mirrored(_angle(angles.sine_out))
         mirror = facets(angles, site.wavenumber, wind, height) * both
         return mirror + small_waves(angles, wind) + bubbles(angles, site.frequency, wind)
+
+    def notes(self) -> tuple[str, ...]:
+        """As `Method.notes`."""
+        with formula_ranges.noted() as lines:
+            wind_wave_height(self.wind_speed or 0.0)
+        return tuple(lines)
 
     def row(self) -> str:
         """As `Method.row`."""
