@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonarsynth.detection.detection_method import beams_at
 from sonarsynth.evaluation.checks import blocks, numbered
 from sonarsynth.geometry import Pose
 from sonarsynth.store.checking.check_rows import Check
@@ -71,8 +72,7 @@ def _views_agree(labels: dict[str, np.ndarray], azimuth: np.ndarray, elevation: 
     if not (outward * (full_box - box[in_view]) >= -ROUNDING).all():
         return False
     for angles, columns, sides in ((azimuth, [0, 1], [0, 2]), (elevation, [2, 3], [1, 3])):
-        if len(angles) > 1:
-            in_beams = np.interp(box[in_view][:, columns], angles, np.arange(len(angles)) + 0.5)
-            if not (np.abs(in_beams - pixels[in_view][:, sides]) <= 1e-6).all():
-                return False
+        apart = np.abs(beams_at(box[in_view][:, columns], angles) - pixels[in_view][:, sides])
+        if len(angles) > 1 and not (apart <= 1e-6).all():
+            return False
     return True

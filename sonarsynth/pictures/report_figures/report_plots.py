@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sonarsynth.conventions import Ints, evenly
+from sonarsynth.detection.detection_method import angle_at
 from sonarsynth.evaluation.detectors import true_objects
 from sonarsynth.evaluation.detectors.true_objects import TrueObjects, category_names
 from sonarsynth.pictures.report_figures.report_numbers import QUANTITIES
@@ -67,9 +68,8 @@ def _boxes(objects: TrueObjects, frame: int, azimuth: np.ndarray, elevation: np.
     y: list[float | None] = []
     texts: list[str] = []
     for row in np.flatnonzero(objects.frame == frame):
-        sides = objects.box[row] - 0.5
-        x0, x1 = np.interp(sides[[0, 2]], np.arange(len(azimuth)), azimuth).tolist()
-        y0, y1 = np.interp(sides[[1, 3]], np.arange(len(elevation)), elevation).tolist()
+        x0, x1 = angle_at(objects.box[row][[0, 2]], azimuth).tolist()
+        y0, y1 = angle_at(objects.box[row][[1, 3]], elevation).tolist()
         x += [x0, x1, x1, x0, x0, None]
         y += [y0, y0, y1, y1, y0, None]
         text = f"{names[objects.category[row]]}, {objects.range[row]:.1f} m, {objects.snr[row]:.1f} dB"
