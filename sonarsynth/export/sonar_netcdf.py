@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 LOST: Final = (
-    "what the convention asks of a transmitter is NaN for snaps, and for pulses that are no sweep what it asks of a "
-    "sweep; no equation converts to target strength",
+    "what the convention asks of a transmitter is missing (NaN) for snaps, what it asks of a sweep for other pulses, "
+    "and the absorption for all; no equation converts to target strength",
     "positions are metres east and north of 0 N 0 E (WGS 84); times are counted from the start of the motions, or the "
     "first frame where that is earlier, as 1970-01-01",
     "the truth, points, source estimates, meshes and the link budget are left out",
@@ -173,16 +173,9 @@ def _beam_group(
         cells = np.empty((count, 1), object)
         cells[:, 0] = list(values)
         samples[row] = cells
-    enums: tuple[tuple[str, str, tuple[str, ...], Any], ...] = (
-        ("beam_stabilisation", "beam_stabilisation_t", ("ping_time",), 0),
-        ("beam_type", "beam_t", (), 0),
-        ("transmit_type", "transmit_t", ("ping_time", "tx_beam"), sent.kind),
-    )
-    for name, kind, dims, number in enums:
-        shape = tuple(group.dimensions[dim].size for dim in dims)
-        unused = set(_ENUMS[kind].values()) - set(np.ravel(number).tolist())  # readers mask what stands for nothing
-        variable = group.create_variable(name, dims, kinds[kind], fillvalue=np.int8(max(unused, default=0)))
-        variable[...] = np.broadcast_to(np.int8(number), shape)
+    _enumerated(group, "beam_stabilisation", kinds, "beam_stabilisation_t", ("ping_time",), 0)
+    _enumerated(group, "beam_type", kinds, "beam_t", (), 0)
+    _enumerated(group, "transmit_type", kinds, "transmit_t", ("ping_time", "tx_beam"), sent.kind)
     processing = group.create_variable(
         "non_quantitative_processing", ("ping_time",), np.int16, data=np.zeros(rows, np.int16)
     )
@@ -193,6 +186,15 @@ def _beam_group(
         data = np.broadcast_to(np.asarray(values), shape)
         precise = np.float64 if name in ("platform_latitude", "platform_longitude") else np.float32
         _put(group, name, dims, data.astype(precise), units, name.replace("_", " "))
+
+
+def _enumerated(group: Any, name: str, kinds: dict[str, Any], kind: str, dims: tuple[str, ...], number: Any) -> None:
+    """A variable of words of the convention, by numbers that broadcast to its shape; a number that stands for nothing
+    where these are masked, which readers mask too."""
+    shape, values = tuple(group.dimensions[dim].size for dim in dims), np.ma.array(number, np.int8)
+    nothing = np.int8(max(set(_ENUMS[kind].values()) - set(values.compressed().tolist()), default=0))
+    variable = group.create_variable(name, dims, kinds[kind], fillvalue=nothing)
+    variable[...] = np.broadcast_to(values.filled(nothing), shape)
 
 
 def _transducers(tree: xr.DataTree, group: Any, beams: ReceiveBeams, sent: TransmitBeams) -> None:

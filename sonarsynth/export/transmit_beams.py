@@ -23,10 +23,10 @@ _NUMBERS: Final = (
 
 
 class TransmitBeams(NamedTuple):
-    """Beams of transmitters, one that says nothing where there is none."""
+    """Beams of transmitters, one that says nothing where there is none: masked and NaN."""
 
     position: Floats  # (transmitter, xyz) m, sonar frame; of none where there is none
-    kind: np.ndarray  # (tx_beam,) numbers of `KINDS`
+    kind: np.ma.MaskedArray[Any, Any]  # (tx_beam,) numbers of `KINDS`; masked where the pulse is of none of them
     numbers: dict[str, tuple[Floats, str]]  # (tx_beam,) of each variable, and its units
 
     @property
@@ -39,8 +39,7 @@ def transmit_beams(tree: xr.DataTree) -> TransmitBeams:
     """The beams of the transmitters of a store. Raises FieldError for an attribute that no build writes."""
     listed = tree.attrs.get("transmitters", [])
     rows = [_row(entry, n) for n, entry in enumerate(listed if isinstance(listed, list | tuple) else [None])]
-    band = {"start": float(tree.attrs["band_low"]), "stop": float(tree.attrs["band_high"])}
-    told = [row for row, _ in rows] or [band]
+    told = [row for row, _ in rows] or [{}]
     column = {name: np.array([row.get(name, np.nan) for row in told]) for name in _NUMBERS}
     phi, theta = beam_rotation(np.deg2rad(column["azimuth"]), np.deg2rad(column["elevation"]))
     numbers = {
@@ -55,17 +54,20 @@ def transmit_beams(tree: xr.DataTree) -> TransmitBeams:
         "tx_beam_rotation_psi": (0.0 * phi, "arc_degree"),
     }
     position = np.array([[row[axis] for axis in "xyz"] for row, _ in rows]).reshape(-1, 3)
-    return TransmitBeams(position, np.array([kind for _, kind in rows] or [0], np.int8), numbers)
+    kinds = [kind for _, kind in rows] or [None]
+    masked = np.ma.array([kind or 0 for kind in kinds], np.int8, mask=[kind is None for kind in kinds])
+    return TransmitBeams(position, masked, numbers)
 
 
-def _row(entry: Any, number: int) -> tuple[dict[str, float], int]:
-    """The numbers of a transmitter, and that of the kind of its pulse."""
+def _row(entry: Any, number: int) -> tuple[dict[str, float], int | None]:
+    """The numbers of a transmitter, and that of the kind of its pulse, if it is a sweep or a tone."""
     said = entry if isinstance(entry, dict) else {}
     row = {name: said[name] for name in (*_NUMBERS, *"xyz") if name in said}
     numbers = all(isinstance(value, int | float) and np.isfinite(value) for value in row.values())
-    kind = said.get("type", "CW")
-    if not numbers or not {*"xyz"} <= row.keys() or kind not in KINDS:
+    kind = said.get("type")
+    if not numbers or not {*"xyz"} <= row.keys() or kind not in (None, *KINDS):
         raise FieldError(("transmitters", str(number)), "must have x, y and z, numbers, and a type of CW, LFM or HFM")
-    if "type" not in said:
+    if kind is None:
         row.pop("source_level", None)  # it is of a peak
+        return row, None
     return row, KINDS[kind]

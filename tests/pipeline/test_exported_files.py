@@ -206,6 +206,10 @@ def test_netcdf_reads_what_the_convention_asks_and_the_same_numbers(store: Path)
         np.testing.assert_allclose(axes, np.stack(ours, axis=-1).reshape(-1, 3), atol=1e-6)
         assert str(steered["beam"][0]).startswith("azimuth -15")
         assert np.all(heard["equivalent_beam_angle"][:] == np.float32(4.0 * np.pi))
+        sent = [name for name in heard.variables if name.startswith(("transmit_", "tx_", "beamwidth_transmit"))]
+        assert len(sent) > 8 and all(
+            np.ma.getmaskarray(heard[n][:]).all() or np.isnan(heard[n][:]).all() for n in sent
+        ), "snaps are not sent"
         width = np.sqrt(np.prod([_widths(steered, n) for n in ("major", "minor")], axis=0))
         wide = brentq(lambda x: (2.0 * j1(x) / x) ** 2 - 0.5, 1.0, 2.0)  # at half the width, in ka sin(theta)
         lobes = [
