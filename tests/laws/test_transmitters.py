@@ -130,6 +130,11 @@ def test_what_arrives_is_what_the_sonar_equation_says() -> None:
         strengths.append(peak(pressure[:, late], rate) / (loud / r2))
         direct = sent * BEAM.pattern(sonar.turn_to_body(away / r[:, None])) / r
         assert peak(pressure[:, ~late], rate) == pytest.approx(np.abs(direct), rel=2e-3)
+        budget = frame["link_budget/transmission_loss_out"].values[0, :, 0]
+        centre = (sonar.position - place) / (r0 := np.linalg.norm(sonar.position - place))
+        heard = sent * BEAM.pattern(sonar.turn_to_body(centre)) / r0
+        assert budget == pytest.approx(-20.0 * np.log10(np.abs([loud, heard]) / sent), abs=5e-3), "the beam is in it"
+        assert "beam of a transmitter" in frame["link_budget/transmission_loss_out"].attrs["long_name"]
     assert np.array(strengths) == pytest.approx(np.mean(strengths), rel=5e-3)
 
 

@@ -134,7 +134,8 @@ HOW_LEVELS_ADD_UP = (
 
 _LEVELS = {
     "source_level": "peak source level of the snap re 1 uPa at 1 m",
-    "transmission_loss_out": "spreading loss from snap to target (snap to array for the direct path)",
+    "transmission_loss_out": "spreading loss from snap to target (snap to array for the direct path), and what the "
+    "beam of a transmitter takes on that way",
     "scattering": "scattering of all facets together: target strength",
     "transmission_loss_in": "spreading loss from target to array",
     "absorption_loss": "absorption along the whole path",
