@@ -157,3 +157,15 @@ def test_scatterers_outside_the_water_are_refused_in_one_line(entry: str) -> Non
     recipe = ss.load(ROOT / "configs" / "tank.yaml", [f"scene.world.scatterers=[{entry}]"])
     with pytest.raises(ValueError, match=r"world\.scatterers\.0: a scatterer is .* at frame 0"):
         ss.plan(recipe)
+
+
+@pytest.mark.parametrize(("window", "said"), [("{}", True), ("{start: 0, stop: 60 ms}", False)])
+def test_the_plan_says_of_which_scatterers_nothing_is_heard(window: str, said: bool) -> None:
+    """The record is as long as targets need: nothing came of a swarm 40 m off, without a word."""
+    swarm = "scene.world.scatterers=[{kind: swarm, centre: [40, 3, -2], strength: -10, members: 5}]"
+    sets = [swarm, "scene.world.environment.depth=8 m", f"scene.processing.echo_window={window}", "rays=null"]
+    made = ss.plan(ss.load(ROOT / "configs" / "tank.yaml", sets), ["signals"])
+    assert any(note.startswith("scene.world.scatterers.0: no echo of them comes") for note in made.warnings) == said
+    without = ss.plan(ss.load(ROOT / "configs" / "tank.yaml", ["scene.world.scatterers=[]", *sets[1:]]), ["signals"])
+    heard, silent = (ss.render(one, 0)["signals/pressure"].values.astype(float) for one in (made, without))
+    assert (np.abs(heard - silent).max() < 1e-6) == said  # parts are summed by themselves, in single precision

@@ -39,7 +39,7 @@ _SIGNALS = group_of(
     row("pressure", ("frame", "sensor", "sample"), "Pa", "sound pressure at each hydrophone", dtype="float32"),
     row("start", ("frame",), "s", "time of sample 0 after the instant of the frame"),
     row("clipped", ("frame",), "1", "samples at full scale of the converter", dtype="int32"),
-    row("outside", ("frame",), "1", "arrivals outside the window: left out, counted", dtype="int32"),
+    row("outside", ("frame",), "1", "arrivals outside the window, but reverberation: left out, counted", dtype="int32"),
 )
 _IMAGE = group_of(
     "/image",

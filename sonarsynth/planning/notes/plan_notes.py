@@ -23,6 +23,7 @@ from sonarsynth.planning.notes.source_notes import (
     off_the_bottom,
     out_of_band,
     steering_notes,
+    unheard_scatterers,
     unlit,
     unlocated,
 )
@@ -78,7 +79,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         lines += view_notes(noted(looks)) + steering_notes(noted(looks))
         lines += stretch_notes(noted(looks), recipe.accuracy.range_m)
     lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene) + converter_notes(plan, looks)
-    lines += out_of_band(scene)
+    lines += out_of_band(scene) + unheard_scatterers(plan)
     if plan.sizes["emission"] and plan.products & OF_BEAMS:
         some = noted(looks)
         lines += unlocated(scene) or lobe_notes(some) + direction_notes(some) + assumed_speed_notes(some)

@@ -10,6 +10,7 @@ from scipy.fft import irfft
 from sonarsynth.conventions import Floats
 from sonarsynth.description.method import Demand
 from sonarsynth.equations.arrays.grating_lobes import loudest_lobe
+from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import extreme_waveforms
@@ -197,3 +198,30 @@ def steering_error(off_axis: Floats, approach: Floats) -> Floats:
     sound. Both of any shape, that of the result.
     """
     return np.asarray(np.arcsin(np.clip(np.sin(off_axis) / (1.0 + approach), -1.0, 1.0)) - off_axis)
+
+
+def unheard_scatterers(plan: Plan) -> list[str]:
+    """Scatterers without a body of which no echo comes within the record of the first frame: it is as long as those of
+    targets need."""
+    frame = plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1]
+    start, array, lines = frame_start(plan, frame), frame.sonar_pose.position, list[str]()
+    stop = start + plan.windows.samples / plan.scene.sonar.sampling_frequency
+    lit = [snap for snap in frame.moment.snaps if snap.illuminates]
+    for number, field in enumerate(frame.moment.scatterers):
+        back = np.linalg.norm(field.position - array, axis=1)
+        took = [
+            snap.time + (np.linalg.norm(field.position - snap.position, axis=1) + back) / _speed(plan) for snap in lit
+        ]
+        heard = np.concatenate([np.zeros(0), *took])
+        if lit and not ((heard > start) & (heard < stop)).any():
+            when = (
+                f"no echo of them comes within the record of the first frame, {1e3 * start:.3g} to {1e3 * stop:.3g} ms"
+            )
+            first = f"the first {1e3 * heard.min():.3g} ms after its instant"
+            lines.append(f"scene.world.scatterers.{number}: {when}, but {first}: see scene.processing.echo_window")
+    return lines
+
+
+def _speed(plan: Plan) -> float:
+    """Of sound (m/s), on average from surface to bottom."""
+    return float(np.mean(plan.profile.at(np.linspace(0.0, plan.medium.depth, 9))))
