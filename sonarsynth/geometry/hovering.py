@@ -14,7 +14,7 @@ from sonarsynth.geometry import Pose, quaternion
 
 @description
 class Hover:
-    """About a place, along each axis of the body and about the vertical: amplitude times the sine of the phase.
+    """About a place, along its heading, across and up, and about the vertical: amplitude times the sine of the phase.
 
     The four swings begin a quarter of a period after each other, so that the body goes round its place.
     """
@@ -29,9 +29,9 @@ class Hover:
     roll: Radians = 0.0
     """Roll: the starboard side down is positive."""
     surge: NonNegativeMetres = 0.0
-    """Amplitude of the swing forward and back."""
+    """Amplitude of the level swing along the heading."""
     sway: NonNegativeMetres = 0.0
-    """Amplitude of the swing to port and starboard."""
+    """Amplitude of the level swing to port and starboard."""
     heave: NonNegativeMetres = 0.0
     """Amplitude of the swing up and down."""
     yaw: Annotated[Radians, Ge(0), Le(np.pi)] = 0.0

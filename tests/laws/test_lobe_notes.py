@@ -52,6 +52,17 @@ def test_a_lobe_is_as_loud_and_as_far_away_as_is_said(cycles, pitch, monkeypatch
     assert np.rad2deg(2.0 * np.arcsin(0.5 * apart)) == pytest.approx(degrees, abs=2.5)
 
 
+@pytest.mark.parametrize(("pitch", "orders"), [(0.07, 5), (0.15, 12), (2.0, 160)])
+def test_lobes_of_more_orders_than_are_followed_are_said(pitch: float, orders: int) -> None:
+    """Up to (1 + sin 30 degrees) wavelengths apart at the upper edge of the band; and a frame of them is made."""
+    own = recipe(3.0, pitch)
+    (reach,) = {1.5 * pitch * look.scene.sonar.band.high / 1500.0 for look in sample_frames(own)}
+    assert orders <= reach < 1.1 * orders + 1
+    said = [line for line in source_notes.lobe_notes(sample_frames(own)) if "orders of grating lobes" in line]
+    assert len(said) == (orders > 12)
+    assert float(render(own, 0)["image/energy"].max()) > 0.0
+
+
 def test_a_tone_has_a_lobe_as_loud_as_its_main_one_and_a_dense_array_none() -> None:
     tone = np.array([60e3 - 1e-3, 60e3 + 1e-3]), np.ones(2)
     sine, level = loudest_lobe(np.full(12, 12), 0.05, *tone, 1500.0, 2.0)

@@ -15,6 +15,11 @@ FAINT = 0.25
 """A line is followed only from this share of the power on that lobes must bring a peak to count: in `reef.yaml` lines
 that did count had twice this share and more."""
 
+FARTHEST = 12
+"""Orders of grating lobes that are looked along at most: all those of hydrophones 6 wavelengths apart."""
+AT_ONCE = 2048
+"""Directions whose profiles are held at once."""
+
 
 def possible_grating_lobes(
     window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, counts: Floats
@@ -39,10 +44,10 @@ def possible_grating_lobes(
 
 
 def _orders(window: ReceivedWindow, profiles: Profiles) -> int:
-    """Up to which order grating lobes of echoes from anywhere are in the beams."""
+    """Up to which order grating lobes of echoes from anywhere are in the beams, `FARTHEST` at most."""
     farthest_lobe = 1.0 + np.abs(profiles.direction[:, 1:]).max()
     shortest = window.sonar.assumed_sound_speed / window.beams.snapshots.frequency[-1]
-    return int(farthest_lobe * window.elements.pitch / shortest)
+    return min(int(farthest_lobe * window.elements.pitch / shortest), FARTHEST)
 
 
 def louder_beyond(
@@ -64,6 +69,9 @@ def louder_beyond(
     peak, u = peak[~inside], u[~inside]
     far = np.linalg.norm(u - profiles.direction[b[peak]], axis=1) * (farthest(elements.position) / c / profiles.step)
     first, last = np.maximum(np.ceil(t[peak] - far), 0.0).astype(int), (t[peak] + far).astype(int) + 1
-    late, loudest = loudest_between(profiles.filter.profiles(u)[1], first, last) if len(u) else np.zeros((2, 0))
+    late, loudest = np.zeros((2, len(u)))
+    for low in range(0, len(u), AT_ONCE):
+        some = slice(low, low + AT_ONCE)
+        late[some], loudest[some] = loudest_between(profiles.filter.profiles(u[some])[1], first[some], last[some])
     louder = loudest > height[peak]
     return u[louder], profiles.step * late[louder], loudest[louder]
