@@ -26,6 +26,9 @@ SHARDS_AHEAD: Final = 3
 LANDING: Final = 5.0
 """Seconds to wait for what a finished shard gives: where its worker dies just then, Dask waits for that for ever."""
 
+TRIES: Final = 5
+"""Times that a plan is given to all workers, while some of them end."""
+
 MAX_LOSSES: Final = 2
 """A shard whose workers died this often is put off to the end, and its frames are tried alone."""
 
@@ -230,6 +233,20 @@ class GivenPlan(WorkerPlugin):
         tasks.give(self.job, self.resolved)
 
 
+def register(client: Client, plugin: WorkerPlugin) -> None:
+    """Give a plugin to all workers. Where one ends meanwhile, the scheduler takes the client for gone: then once more.
+
+    Raises OSError where that does not come to an end.
+    """
+    for left in reversed(range(TRIES)):
+        try:
+            client.register_plugin(plugin)
+            return
+        except OSError:
+            if not left or client.status != "running":
+                raise
+
+
 def _probe(job: Job, frame: int) -> None:
     """Render a frame and forget it."""
     tasks.render_frames(job, [frame])
@@ -251,7 +268,7 @@ def run(
     """
     worker_status.open_folder(job.path)
     try:
-        client.register_plugin(GivenPlan(job, tasks.resolved(plan)))
+        register(client, GivenPlan(job, tasks.resolved(plan)))
         _Builder(client, job, done, lost, patience).run(todo)
     finally:
         worker_status.close_folder(job.path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
+import os
 import signal
 import threading
 import time
@@ -13,10 +14,12 @@ from typing import Any
 
 import psutil
 import pytest
+from distributed import Client, LocalCluster, Worker, WorkerPlugin
 from distributed.client import AllExit
 
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import build
+from sonarsynth.schedule.cluster import register
 from sonarsynth.schedule.connecting import waited_for
 from sonarsynth.store.files.place import record
 from sonarsynth.store.marks import all_files, load_mark, marked
@@ -63,6 +66,33 @@ def test_a_worker_that_dies_with_what_its_last_shards_gave_does_not_hold_the_bui
     }
     chunks = {name for name in all_files(whole) if not name.endswith("zarr.json")}
     assert {name: record(path, name) for name in chunks} == {name: record(whole, name) for name in chunks}
+
+
+class Ending(WorkerPlugin):
+    """Ends the first worker process that it is given to."""
+
+    def __init__(self, struck: Path) -> None:
+        self.struck = struck
+
+    def setup(self, worker: Worker) -> None:
+        """End this process, if none has ended yet."""
+        try:
+            self.struck.touch(exist_ok=False)
+        except FileExistsError:
+            return
+        os._exit(1)
+
+
+@pytest.mark.long
+def test_a_worker_that_ends_as_it_is_given_the_plan_ends_no_build(tmp_path: Path) -> None:
+    """The others have it, and the one in its place."""
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+        register(client, Ending(tmp_path / "struck"))
+        assert (tmp_path / "struck").exists()
+        wait_until(lambda: len(client.scheduler_info()["workers"]) == 2)
+        assert all(
+            client.run(lambda dask_worker: any("Ending" in str(type(p)) for p in dask_worker.plugins.values())).values()
+        )
 
 
 @pytest.mark.parametrize(("error", "told"), [(AllExit(), 0), (ValueError("ours"), 1)])
