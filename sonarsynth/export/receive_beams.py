@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.description import FieldError
 from sonarsynth.equations.arrays.apertures import half_power_angle
 
 if TYPE_CHECKING:
@@ -30,7 +31,8 @@ class ReceiveBeams(NamedTuple):
 
 
 def receive_beams(tree: xr.DataTree) -> Iterator[ReceiveBeams]:
-    """The groups of beams of a store: hydrophones where it has signals; steered beams, against delay or of an image."""
+    """The groups of beams of a store: hydrophones where it has signals; steered beams, against delay or of an image.
+    Raises FieldError for an attribute that no build writes."""
     if "signals" in tree.children:
         signals = tree["signals"].dataset
         zeros = np.zeros(signals.sizes["sensor"])
@@ -75,9 +77,12 @@ def receive_beams(tree: xr.DataTree) -> Iterator[ReceiveBeams]:
 
 def _beam_widths(tree: xr.DataTree, azimuth: Floats, elevation: Floats) -> tuple[Floats, Floats]:
     """Half-power widths (beam,) in degrees, across and up, at the centre of the band, of an array that is foreshortened
-    off its axis; NaN of a store that does not say its extent."""
+    off its axis; NaN of a store that does not say its extent. Raises FieldError for an extent that no build writes."""
     wavenumber = 0.5 * (tree.attrs["band_low"] + tree.attrs["band_high"]) / tree.attrs["assumed_sound_speed"]
-    across, up = np.array(tree.attrs.get("aperture_rms", (np.nan, np.nan)), float)
+    extent = np.array(tree.attrs.get("aperture_rms", (np.nan, np.nan)))
+    if extent.shape != (2,) or extent.dtype.kind not in "fiu":
+        raise FieldError(("aperture_rms",), "must be two numbers, m across and up")
+    across, up = extent.tolist()
     seen = np.abs(across * np.cos(azimuth)), np.abs(up * np.cos(elevation))
-    wide, high = (np.minimum(2.0 * np.rad2deg(half_power_angle(extent, wavenumber)), 360.0) for extent in seen)
+    wide, high = (np.minimum(2.0 * np.rad2deg(half_power_angle(side, wavenumber)), 360.0) for side in seen)
     return wide, high

@@ -281,6 +281,14 @@ def test_netcdf_reads_what_a_transmitter_sends(small_text: str, tmp_path: Path) 
             write_sonar_netcdf(tree, tmp_path / "wrong", np.array(BUILT))
 
 
+@pytest.mark.parametrize("wrong", ["wide", 0.4, [0.4], [0.4, 0.4, 0.4], [0.4, "high"]])
+def test_an_extent_of_the_array_that_no_build_writes_is_refused(store: Path, tmp_path: Path, wrong: Any) -> None:
+    tree = ss.open(store)
+    tree.attrs["aperture_rms"] = wrong
+    with pytest.raises(FieldError, match="aperture_rms: must be two numbers, m across and up"):
+        write_sonar_netcdf(tree, tmp_path / "wrong", np.array(BUILT))
+
+
 def test_beams_of_one_delay_have_no_interval(store: Path, tmp_path: Path) -> None:
     import netCDF4
 
