@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, depth, evenly
-from sonarsynth.description import FieldError
 from sonarsynth.description.method import FrameSize
 from sonarsynth.environment.noise import Noise
 from sonarsynth.environment.noise.noise_field import SECONDS as DRAW_SECONDS
@@ -81,15 +80,9 @@ def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
 
 
 def _source_rows(plan: Plan) -> list[NoiseRow]:
-    """Rows of the sources of noise. Raises FieldError for one that is out of the water."""
+    """Rows of the sources of noise."""
     rows, samples, centre = list[NoiseRow](), plan.sizes["sensor"] * plan.sizes["sample"], plan.scene.sonar.band.centre
-    trajectory, bottom = plan.scene.trajectory, plan.scene.world.environment.depth
-    for number, source in enumerate(plan.scene.world.noise_sources):
-        for step in range(trajectory.frames):
-            height = float(pose(source.motion, trajectory.time(step)).position[2])
-            if not -bottom <= height < 0.0:
-                path = ("scene", "world", "noise_sources", number, "motion")
-                raise FieldError(path, f"is out of the water: z {height:g} m in frame {step} of {-bottom:g} to 0 m")
+    for source in plan.scene.world.noise_sources:
         text = "as recorded"
         if not isinstance(source.sound, NoiseRecording):
             density = float(source.sound.density(np.array([centre]))[0])

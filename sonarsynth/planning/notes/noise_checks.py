@@ -1,4 +1,4 @@
-"""Where is what sounds in a scene; can its noises be read, are they of its band, and where do formulas not hold?"""
+"""Where sources are, whether noises can be read and are of the band, and where their formulas do not hold."""
 
 from __future__ import annotations
 

@@ -166,7 +166,7 @@ def direction_notes(looks: Sequence[SampledScene]) -> list[str]:
 def lobe_notes(looks: Sequence[SampledScene]) -> list[str]:
     """How loud grating lobes of echoes are in images, where points may be found in them: of the worst sequence; and of
     hydrophones that are farther apart than echoes beyond the beams are looked for."""
-    worst, lines, sparse = LOBE, [], dict[str, None]()
+    worst, lines, sparse = LOBE, list[str](), list[str]()
     for look in looks:
         sonar = look.scene.sonar
         array, c = elements(sonar.array), sonar.assumed_sound_speed
@@ -174,10 +174,10 @@ def lobe_notes(looks: Sequence[SampledScene]) -> list[str]:
             continue
         beams, wavelengths = sonar.beams, array.pitch * sonar.band.high / c
         if (1.0 + np.sin(0.5 * max(beams.azimuth_span, beams.elevation_span))) * wavelengths > FARTHEST + 1:
-            sparse[
+            sparse = [
                 f"hydrophones are {wavelengths:.3g} wavelengths apart: echoes from beyond the beams are looked for "
                 f"along {FARTHEST} orders of grating lobes either way, and points may be found in the others"
-            ] = None
+            ]
         live = array.gain != 0.0
         for waveform in extreme_waveforms(look.scene):
             f, spectrum = pulse_spectrum(waveform, sonar.antialias, sonar.sampling_frequency, PULSE_SAMPLES)
@@ -193,7 +193,7 @@ def lobe_notes(looks: Sequence[SampledScene]) -> list[str]:
                         f"about {degrees:.0f} deg beside it, {max(-10.0 * np.log10(level), 0.0):.1f} dB below it, and "
                         "points may be found in it (origin 'grating lobe')"
                     ]
-    return lines + list(sparse)
+    return lines + sparse
 
 
 def steering_error(off_axis: Floats, approach: Floats) -> Floats:
