@@ -13,7 +13,7 @@ from sonarsynth.detection.cell_averaging import CellAveraging
 from sonarsynth.detection.detection_method import DetectionMethod, Region, detections_of
 from sonarsynth.detection.detections import Detections, from_rows, read
 from sonarsynth.detection.image_peaks import ImagePeaks
-from sonarsynth.detection.sonar_view import SonarView, beam_width, views
+from sonarsynth.detection.sonar_view import SonarView, beam_width, beam_widths, views
 from sonarsynth.store import chosen_frames, open_store
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ __all__ = [
     "Region",
     "SonarView",
     "beam_width",
+    "beam_widths",
     "by_kind",
     "detect",
     "detections_of",

@@ -16,7 +16,7 @@ from sonarsynth.detection.sonar_view import SonarView
 @description
 class CellAveraging:
     """Cell-averaging CFAR: a beam is of an object where its energy is more than alpha times the mean of the N beams of
-    a square ring about it, alpha = N (P^(-1/N) - 1).
+    a rectangular ring about it, alpha = N (P^(-1/N) - 1).
 
     Objects are the connected beams; the score is the largest ratio (dB).
 
@@ -37,12 +37,12 @@ class CellAveraging:
         """As `DetectionMethod.regions`."""
         from scipy.ndimage import find_objects, label
 
-        inner = round(self.guard * view.reach)
-        outer = inner + max(1, round(self.training * view.reach))
+        inner = [round(self.guard * reach) for reach in view.reach]
+        outer = [hole + max(1, round(self.training * reach)) for hole, reach in zip(inner, view.reach, strict=True)]
         finite = np.isfinite(view.energy)
         energy = np.where(finite, view.energy, 0.0)
-        count = _square_sum(finite.astype(float), outer) - _square_sum(finite.astype(float), inner)
-        mean = (_square_sum(energy, outer) - _square_sum(energy, inner)) / np.maximum(count, 1.0)
+        count = _sum_about(finite.astype(float), outer) - _sum_about(finite.astype(float), inner)
+        mean = (_sum_about(energy, outer) - _sum_about(energy, inner)) / np.maximum(count, 1.0)
         ratio = np.divide(energy, mean, out=np.zeros_like(energy), where=(mean > 0.0) & (count > 0.0))
         cells = np.maximum(count, 1.0)
         over = ratio > cells * (self.false_alarm_rate ** (-1.0 / cells) - 1.0)
@@ -55,9 +55,9 @@ class CellAveraging:
         return regions
 
 
-def _square_sum(values: Floats, reach: int) -> Floats:
-    """Sums over squares of so many beams to each side, cut at the edges of the image."""
-    for axis in (0, 1):
+def _sum_about(values: Floats, reaches: list[int]) -> Floats:
+    """Sums over rectangles of so many beams to each side along each axis, cut at the edges of the image."""
+    for axis, reach in enumerate(reaches):
         count = values.shape[axis]
         total = np.concatenate([np.zeros_like(values.take([0], axis)), np.cumsum(values, axis)], axis)
         at = np.arange(count)

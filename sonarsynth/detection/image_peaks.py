@@ -38,7 +38,7 @@ class ImagePeaks:
             return []
         energy = np.where(finite, view.energy, 0.0)
         level = 10.0 * np.log10(np.maximum(energy, np.finfo(float).tiny) / middle)
-        highest = maximum_filter(level, 2 * view.reach + 1, mode="nearest")
+        highest = maximum_filter(level, [2 * reach + 1 for reach in view.reach], mode="nearest")
         least = max(self.threshold, float(level.max()) - self.dynamic_range)
         rows, columns = np.nonzero((level == highest) & (level >= least))
         regions, taken = [], np.zeros(level.shape, bool)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.description import FieldError
+from sonarsynth.equations.arrays.apertures import beams_held, half_power_width, whole_beams_held
 from sonarsynth.store import Damage
 
 if TYPE_CHECKING:
@@ -28,43 +30,53 @@ class SonarView:
     |---|---|---|---|
     | `energy` | (elevation, azimuth) | Pa2 s | of each beam; NaN where the direct pulse left none |
     | `azimuth`, `elevation` | (azimuth,), (elevation,) | degree | of the beams |
-    | `beam_width` | | degree | half power, at the middle of the band |
+    | `beam_width` | (2,) | degree | half power, along azimuth and elevation, at the middle of the band |
     | `points` | (point, 4) | degree, degree, m, Pa2 s | azimuth, elevation, range, energy; empty without a cloud |
     """
 
     energy: Floats
     azimuth: Floats
     elevation: Floats
-    beam_width: float
+    beam_width: Floats
     points: Floats
 
     @property
-    def step(self) -> float:
-        """Degrees between beams that follow each other."""
-        steps = np.concatenate([np.diff(self.azimuth), np.diff(self.elevation)])
-        return float(np.mean(steps)) if len(steps) else self.beam_width
+    def held(self) -> Floats:
+        """Beams (2,) that a beam width holds, along azimuth and elevation; one where no beam follows another."""
+        return beams_held(self.beam_width, self.azimuth, self.elevation)
 
     @property
-    def reach(self) -> int:
-        """Beams that a beam width holds, one at least."""
-        return max(1, round(min(self.beam_width / self.step, float(max(self.energy.shape)))))
+    def reach(self) -> tuple[int, int]:
+        """`held` in whole beams, one at least, along elevation and azimuth as the axes of the image."""
+        return whole_beams_held(self.beam_width, self.azimuth, self.elevation)
+
+
+def beam_widths(
+    tree: xr.DataTree | FrameReader, azimuth: Floats | float = 0.0, elevation: Floats | float = 0.0
+) -> Floats:
+    """Half-power widths (2, ...) in rad of beams, along azimuth and elevation, at the centre of the band; 2 pi at most.
+
+    azimuth, elevation (...) rad: of the beams; off its axis the array is foreshortened. From the extent of the array in
+    the attributes of the store, or that of a disc where an old one does not say it. Raises FieldError for an extent
+    that no build writes.
+    """
+    extent = np.array(tree.attrs.get("aperture_rms") or [0.5 * tree.attrs["aperture_radius"]] * 2)
+    if extent.shape != (2,) or extent.dtype.kind not in "fiu":
+        raise FieldError(("aperture_rms",), "must be two numbers, m across and up")
+    wavenumber = 0.5 * (tree.attrs["band_low"] + tree.attrs["band_high"]) / tree.attrs["assumed_sound_speed"]
+    seen = np.abs(extent.reshape(2, *[1] * np.ndim(azimuth)) * np.cos(np.stack([azimuth, elevation])))
+    return half_power_width(seen, wavenumber)
 
 
 def beam_width(tree: xr.DataTree | FrameReader) -> float:
-    """Half-power beam width (rad) of the array at the centre of its band, from the attributes of the store.
-
-    Disc: 1.03 lambda / D (first-order; Van Trees 2002, table 4.1).
-    """
-    low, high = tree.attrs["band_low"], tree.attrs["band_high"]
-    extent = 2.0 * np.float64(tree.attrs["aperture_radius"])
-    with np.errstate(divide="ignore"):  # one place has no beam: every direction is the same
-        return float(1.03 * tree.attrs["assumed_sound_speed"] / (0.5 * (low + high)) / extent)
+    """The wider (rad) of `beam_widths` on the axis of the array."""
+    return float(beam_widths(tree).max())
 
 
 def views(tree: xr.DataTree, frames: np.ndarray) -> Iterator[tuple[int, SonarView]]:
     """Each of some frames of a store whose images were built, with its number. Raises Damage where one is missing."""
     image = tree["image"].dataset
-    width = float(np.rad2deg(beam_width(tree)))
+    width = np.rad2deg(beam_widths(tree))
     azimuth, elevation = (np.asarray(image[axis].values, float) for axis in ("azimuth", "elevation"))
     for start in range(0, len(frames), BLOCK):
         block = frames[start : start + BLOCK]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.detection import beam_width
+from sonarsynth.detection import beam_width, beam_widths
 from sonarsynth.evaluation.brightest_beams import brightest_beam_on_target
 from sonarsynth.evaluation.checks import every, numbered
 from sonarsynth.evaluation.cloud_scores import cloud_scores
@@ -29,6 +29,7 @@ __all__ = [
     "Check",
     "DetectorReport",
     "beam_width",
+    "beam_widths",
     "bounds",
     "brightest_beam_on_target",
     "check",

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.detection import beam_width
+from sonarsynth.detection import beam_widths
+from sonarsynth.equations.arrays.apertures import whole_beams_held
 from sonarsynth.evaluation.checks import SmallVariables, blocks, every, numbered, of_frame, other_sounds
 from sonarsynth.evaluation.level_checks import echoes_heard, snaps_heard
 from sonarsynth.products import View
@@ -16,19 +17,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def _grid_step(tree: xr.DataTree) -> float:
-    """Step (rad) of the beam grid, infinite for a single beam."""
-    for axis in ("azimuth", "elevation"):
-        values = every(tree, f"truth/beams/{axis}")
-        if len(values) > 1:
-            return float(np.deg2rad(np.diff(values).mean()))
-    return float("inf")
-
-
-def near_target(truth: np.ndarray, row: int, column: int, reach: int) -> bool:
-    """Whether a beam is on a target, or within `reach` beams of one; truth (elevation, azimuth)."""
+def near_target(truth: np.ndarray, row: int, column: int, reach: tuple[int, int]) -> bool:
+    """Whether a beam is on a target, or within `reach` beams of one, along both; truth (elevation, azimuth)."""
     rows, columns = np.nonzero(truth >= 0)
-    return bool(((rows - row) ** 2 + (columns - column) ** 2 <= reach**2).any())
+    return bool((((rows - row) / reach[0]) ** 2 + ((columns - column) / reach[1]) ** 2 <= 1.0).any())
 
 
 def refused(block: SmallVariables, frame: int) -> bool:
@@ -59,7 +51,8 @@ def on_ghost(block: SmallVariables, frame: int, azimuth: float, elevation: float
         return False
     ghost = (np.deg2rad(block.of(f"truth/targets/echo_{axis}", frame)[:, 1:]) for axis in ("azimuth", "elevation"))
     box = np.deg2rad(block.of("truth/targets/image_box", frame))[:, None]
-    reach = np.nan_to_num(np.stack([box[..., 1] - box[..., 0], box[..., 3] - box[..., 2]])) + beam_width(block.tree)
+    reach = np.nan_to_num(np.stack([box[..., 1] - box[..., 0], box[..., 3] - box[..., 2]]))
+    reach += beam_widths(block.tree)[:, None, None]
     off = np.abs(np.stack([middle - angle for middle, angle in zip(ghost, (azimuth, elevation), strict=True)]))
     level = block.of("truth/targets/echo_level", frame)
     loud = level[:, 1:] >= np.nan_to_num(level[:, :1], nan=-np.inf) - GLINT
@@ -79,8 +72,8 @@ def in_box(block: SmallVariables, frame: int, azimuth: float, elevation: float) 
     """Whether a direction (rad) is in the image box of a target, or within a beam width of it: no beam may point at
     what little of a target is in view."""
     box = np.deg2rad(block.of("truth/targets/image_box", frame))
-    width, beam = beam_width(block.tree), np.array([azimuth, azimuth, elevation, elevation])
-    return bool(((beam[[0, 2]] >= box[:, [0, 2]] - width) & (beam[[1, 3]] <= box[:, [1, 3]] + width)).all(axis=1).any())
+    width, beam = beam_widths(block.tree), np.array([azimuth, elevation])
+    return bool(((beam >= box[:, [0, 2]] - width) & (beam <= box[:, [1, 3]] + width)).all(axis=1).any())
 
 
 def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
@@ -92,7 +85,7 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """
     name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
     azimuth, elevation = (np.deg2rad(every(tree, f"truth/beams/{axis}")) for axis in ("azimuth", "elevation"))
-    reach = max(1, round(min(beam_width(tree) / _grid_step(tree), max(len(azimuth), len(elevation)))))
+    reach = whole_beams_held(beam_widths(tree), azimuth, elevation)
     hits, ghosts, judged, unlocated, missed = 0, 0, 0, 0, []
     for block, i in ((b, i) for b in blocks(tree, frames) for i in b.frames):
         energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/beams/target", i)

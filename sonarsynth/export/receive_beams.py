@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.description import FieldError
-from sonarsynth.equations.arrays.apertures import half_power_angle
+from sonarsynth.detection import beam_widths
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,26 +62,16 @@ def receive_beams(tree: xr.DataTree) -> Iterator[ReceiveBeams]:
         data = np.asarray(ping["level" if "delay" in steered.dims else "energy"].values, np.float32)
         return data.reshape(len(names), -1), float(ping["start"])
 
+    said = 1.0 if "aperture_rms" in tree.attrs else np.nan  # an old store does not say how wide and high the array is
+    wide, high = said * np.rad2deg(beam_widths(tree, *axis))
     yield ReceiveBeams(
         names,
         *axis,
-        *_beam_widths(tree, *axis),
+        wide,
+        high,
         interval,
         units,
         meaning,
         steered.sizes.get("delay", 1),
         values,
     )
-
-
-def _beam_widths(tree: xr.DataTree, azimuth: Floats, elevation: Floats) -> tuple[Floats, Floats]:
-    """Half-power widths (beam,) in degrees, across and up, at the centre of the band, of an array that is foreshortened
-    off its axis; NaN of a store that does not say its extent. Raises FieldError for an extent that no build writes."""
-    wavenumber = 0.5 * (tree.attrs["band_low"] + tree.attrs["band_high"]) / tree.attrs["assumed_sound_speed"]
-    extent = np.array(tree.attrs.get("aperture_rms", (np.nan, np.nan)))
-    if extent.shape != (2,) or extent.dtype.kind not in "fiu":
-        raise FieldError(("aperture_rms",), "must be two numbers, m across and up")
-    across, up = extent.tolist()
-    seen = np.abs(across * np.cos(azimuth)), np.abs(up * np.cos(elevation))
-    wide, high = (np.minimum(2.0 * np.rad2deg(half_power_angle(side, wavenumber)), 360.0) for side in seen)
-    return wide, high

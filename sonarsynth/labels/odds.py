@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isqrt
 from typing import Final
 
 import numpy as np
@@ -51,10 +52,12 @@ NO_ODDS = Odds(0, 0, 0)
 """Of no frame."""
 
 
-def odds(energy: Floats, beam_target: npt.NDArray[np.int16], clutter: Bools, snr: Floats | None, reach: int) -> Odds:
+def odds(
+    energy: Floats, beam_target: npt.NDArray[np.int16], clutter: Bools, snr: Floats | None, reach: tuple[int, int]
+) -> Odds:
     """Of one frame: its image (elevation, azimuth), the target of each beam (-1: none), which targets are clutter
-    (target,), their ratios (target,) dB (none where echoes are all that is heard: no odds), a beam width in beams.
-    A peak is as bright as any beam so near to it."""
+    (target,), their ratios (target,) dB (none where echoes are all that is heard: no odds), a beam width in beams
+    (along elevation and azimuth). A peak is as bright as any beam so near to it."""
     from scipy.ndimage import distance_transform_edt
 
     of = np.append(~clutter, False)[beam_target]  # beams on nothing: the last
@@ -63,20 +66,21 @@ def odds(energy: Floats, beam_target: npt.NDArray[np.int16], clutter: Bools, snr
     heard = np.where(np.isfinite(energy), energy, -np.inf)
     peaks = np.where(brightest_about(heard, reach) == heard, heard, -np.inf).ravel()
     best = np.argsort(-peaks, kind="stable")[:PEAKS]
-    near = distance_transform_edt(~of) <= reach
+    near = distance_transform_edt(~of, sampling=1.0 / np.array(reach)) <= 1.0 + 1e-9
     on_target = near.ravel()[best] & np.isfinite(peaks[best])
     ratios = snr[~clutter & np.isfinite(snr)]
     return Odds(1, int(on_target[0]), int(on_target.any()), float(near.mean()), tuple(ratios.tolist()))
 
 
-def brightest_about(energy: Floats, reach: int) -> Floats:
-    """The brightest beam within `reach` beams of each (elevation, azimuth), a row of the disc at a time: a beam of one
-    hydrophone fills the image, and takes a minute by all beams at once."""
+def brightest_about(energy: Floats, reach: tuple[int, int]) -> Floats:
+    """The brightest beam within `reach` beams (along both) of each (elevation, azimuth), a row of the ellipse at a
+    time: a beam of one hydrophone fills the image, and takes a minute by all beams at once."""
     from scipy.ndimage import maximum_filter1d
 
     rows, highest = len(energy), energy.copy()
-    for off in range(min(reach, rows - 1) + 1):
-        width = 2 * int(np.sqrt(reach**2 - off**2)) + 1
+    high, wide = reach
+    for off in range(min(high, rows - 1) + 1):
+        width = 2 * (isqrt(wide**2 * (high**2 - off**2)) // high) + 1
         along = maximum_filter1d(energy, width, axis=1, mode="constant", cval=-np.inf)
         for to, of in ((slice(off, rows), slice(0, rows - off)), (slice(0, rows - off), slice(off, rows))):
             highest[to] = np.maximum(highest[to], along[of])

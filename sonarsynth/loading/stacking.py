@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sonarsynth.detection import beam_width
+from sonarsynth.detection import beam_widths
 from sonarsynth.store import some_frames
 
 if TYPE_CHECKING:
@@ -42,13 +42,14 @@ def stack(tree: xr.DataTree, frames: int | Iterable[int] | None = None) -> xr.Da
         raise ValueError("none of the frames has an image")
     targets = tree["truth/targets"].dataset
     boxes = targets["image_box"].isel(frame=chosen[imaged]).values
-    width = float(np.rad2deg(beam_width(tree)))
+    width = np.rad2deg(beam_widths(tree))[[0, 0, 1, 1]]  # of the sides of a box
     for number, name in enumerate(targets["target"].values):
         own = boxes[:, number][np.isfinite(boxes[:, number]).all(axis=1)]
-        moved = float(np.ptp(own, axis=0).max()) if len(own) else 0.0
-        if moved > 0.5 * width:
+        moved = np.ptp(own, axis=0) if len(own) else np.zeros(4)
+        most = int((moved / width).argmax())
+        if moved[most] > 0.5 * width[most]:
             raise ValueError(
-                f"{name} moves {moved:.1f} deg in these frames: more than half of a beam of {width:.1f} deg"
+                f"{name} moves {moved[most]:.1f} deg in these frames: more than half of a beam of {width[most]:.1f} deg"
             )
     return energy.isel(frame=imaged).median("frame", keep_attrs=True)
 

@@ -9,7 +9,7 @@ import numpy as np
 from sonarsynth.conventions import ASSUMED_SPEED, Floats, direction
 from sonarsynth.equations.arrays.apertures import focus_delay, live_gain
 from sonarsynth.equations.arrays.gates import gate_taper
-from sonarsynth.evaluation import beam_width
+from sonarsynth.evaluation import beam_widths
 from sonarsynth.pictures.figures.sheet import Beam
 from sonarsynth.pictures.store_reading import StoredFrame, beam_grid, needed, read
 
@@ -37,7 +37,7 @@ def beams(tree: xr.DataTree, frame: StoredFrame) -> list[Beam]:
     ):
         return []
     azimuth, elevation = beam_grid(tree)
-    chosen = choose(frame, azimuth, elevation, float(np.rad2deg(beam_width(tree))))
+    chosen = choose(frame, azimuth, elevation, np.rad2deg(beam_widths(tree)))
     if not chosen:
         return []
     cells = np.array(list(chosen.values()))
@@ -58,8 +58,10 @@ def beams(tree: xr.DataTree, frame: StoredFrame) -> list[Beam]:
     ]
 
 
-def choose(frame: StoredFrame, azimuth: Floats, elevation: Floats, width: float) -> dict[str, tuple[int, int]]:
-    """Beams (row, column) by name; `width` is the beam width (deg). Empty where no beam points at a target.
+def choose(frame: StoredFrame, azimuth: Floats, elevation: Floats, width: Floats) -> dict[str, tuple[int, int]]:
+    """Beams (row, column) by name; width (2,) in deg: of a beam, along azimuth and elevation.
+
+    Empty where no beam points at a target.
 
     Near and far are the brightest beams of the nearest and the farthest tenth of the true ranges; the miss is the beam
     next to the far hit that is `CLEAR` beam widths off every target.
@@ -75,7 +77,7 @@ def choose(frame: StoredFrame, azimuth: Floats, elevation: Floats, width: float)
     row, column = np.indices(on.shape)
     off = ~on
     for r, c in zip(*np.nonzero(on & ~_surrounded(on)), strict=True):
-        off &= np.hypot((row - r) * step[0], (column - c) * step[1]) >= CLEAR * width
+        off &= np.hypot((row - r) * step[0] / width[1], (column - c) * step[1] / width[0]) >= CLEAR
     chosen = {"close hit": hit, "far hit": far_hit}
     if off.any():
         distance = np.hypot((row - far_hit[0]) * step[0], (column - far_hit[1]) * step[1])

@@ -7,11 +7,13 @@ from functools import lru_cache
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.arrays.apertures import half_power_width
 from sonarsynth.labels.estimate_labels import Direct, direct_paths, emissions, heard_first
 from sonarsynth.pipeline.stored_values import Values, table
 from sonarsynth.planning import Plan
 from sonarsynth.products import Arrivals, Signals, SourceEstimates
 from sonarsynth.ranging.location.association import in_record
+from sonarsynth.ranging.range_profiles import aperture_moments
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import envelope_delay
@@ -53,13 +55,15 @@ def emission_values(
 ) -> Values:
     """Which snap each estimate came from, and whether the first estimate, the clock, is of a snap that illuminates."""
     band = plan.scene.sonar.band
-    emission = emissions(estimates, direct, band.high - band.low, beam_width(plan))
+    emission = emissions(estimates, direct, band.high - band.low, beam_widths(plan).min())
     clock = in_record(estimates, signals, *plan.windows.echo)[:1].any() and emission[0] >= 0
     usable = np.int8(clock and snaps[int(emission[0])].illuminates)
     return table("/source_estimates", emission=emission, usable=usable)
 
 
-def beam_width(plan: Plan) -> float:
-    """Half-power beam width (rad) at the centre of the band, of a disc as wide as the array; no more than 1."""
-    wavelength = plan.scene.sonar.assumed_sound_speed / plan.scene.sonar.band.centre
-    return float(min(1.03 * wavelength / max(2 * plan.elements.aperture, 1e-9), 1.0))
+def beam_widths(plan: Plan) -> Floats:
+    """Half-power widths (2,) in rad of a beam on the axis of the array, along azimuth and elevation, at the centre of
+    the band; no more than 1."""
+    wavenumber = plan.scene.sonar.band.centre / plan.scene.sonar.assumed_sound_speed
+    extent = np.sqrt(np.diag(aperture_moments(plan.elements))[1:])
+    return np.minimum(half_power_width(extent, wavenumber), 1.0)

@@ -16,9 +16,10 @@ from typing import Final
 import numpy as np
 
 from sonarsynth import store
+from sonarsynth.equations.arrays.apertures import whole_beams_held
 from sonarsynth.labels.odds import NO_ODDS, Odds, odds
 from sonarsynth.pipeline import Values
-from sonarsynth.pipeline.labelled_estimates import beam_width
+from sonarsynth.pipeline.labelled_estimates import beam_widths
 from sonarsynth.planning import Plan
 from sonarsynth.schedule.making import job_of
 from sonarsynth.schedule.tasks import StageResult, remember, render_frames
@@ -103,10 +104,10 @@ def _seconds(frame: StageResult) -> float:
 
 def _odds(plan: Plan, values: Values) -> Odds:
     """Of finding targets in a frame that was made."""
-    energy, azimuth = values.get(("/image", "energy")), plan.scene.sonar.beams.azimuth
-    if energy is None or len(azimuth) < 2:
+    energy, beams = values.get(("/image", "energy")), plan.scene.sonar.beams
+    if energy is None:
         return NO_ODDS
-    reach = min(max(round(beam_width(plan) / float(azimuth[1] - azimuth[0])), 1), len(azimuth))
+    reach = whole_beams_held(beam_widths(plan), beams.azimuth, beams.elevation)
     clutter = values["/truth/targets", "clutter"] != 0
     snr = values.get(("/truth/targets", "snr"))
     return odds(energy, values["/truth/beams", "target"], clutter, snr, reach)

@@ -8,17 +8,19 @@ import pytest
 from sonarsynth.detection import CellAveraging, ImagePeaks, SonarView, detections_of
 
 AZIMUTH, ELEVATION = np.linspace(-20.0, 20.0, 81), np.linspace(-15.0, 15.0, 61)
-WIDTH = 3.0
+WIDTH = np.array([3.0, 3.0])
 """deg, between beams of 0.5."""
 
 
-def view(*spots: tuple[float, float, float], noise: float = 1e-4, points: object = ()) -> SonarView:
+def view(
+    *spots: tuple[float, float, float], noise: float = 1e-4, points: object = (), width: np.ndarray = WIDTH
+) -> SonarView:
     """Points seen by beams that are Gaussian, half as bright half a width off: azimuth, elevation (deg), energy."""
     energy = np.full((61, 81), noise)
     for azimuth, elevation, loud in spots:
-        away = (AZIMUTH - azimuth) ** 2 + (ELEVATION[:, None] - elevation) ** 2
-        energy += loud * np.exp2(-away / (0.5 * WIDTH) ** 2)
-    return SonarView(energy, AZIMUTH, ELEVATION, WIDTH, np.reshape(np.array(points, float), (-1, 4)))
+        away = ((AZIMUTH - azimuth) / width[0]) ** 2 + ((ELEVATION[:, None] - elevation) / width[1]) ** 2
+        energy += loud * np.exp2(-away / 0.5**2)
+    return SonarView(energy, AZIMUTH, ELEVATION, width, np.reshape(np.array(points, float), (-1, 4)))
 
 
 @pytest.mark.parametrize("method", [ImagePeaks(), CellAveraging(guard=1.5)], ids=["peaks", "cfar"])
@@ -46,6 +48,33 @@ def test_the_box_of_a_point_is_one_beam_and_that_of_a_line_is_as_long() -> None:
     (line,) = detections_of(seen, ImagePeaks())
     x0, y0, x1, y1 = line["box"]
     assert x1 - x0 == pytest.approx(12.0 / 0.5, abs=2.0) and y1 - y0 <= 2.0
+
+
+@pytest.mark.parametrize("method", [ImagePeaks(), CellAveraging(guard=1.5)], ids=["peaks", "cfar"])
+def test_beams_wide_one_way_are_told_from_objects_that_are(method: ImagePeaks | CellAveraging) -> None:
+    """Of a long array: two points beside each other across its narrow beams are two, a point is small both ways."""
+    seen = view((-4.0, 0.0, 1.0), (4.0, 0.0, 0.8), width=np.array([2.0, 10.0]))
+    found = detections_of(seen, method)
+    assert len(found) == 2
+    if method.kind == "peaks":  # whose regions are half-power ones
+        for one in found:
+            assert one["box"][2] - one["box"][0] <= 2.0 and one["box"][3] - one["box"][1] <= 6.0  # of beams 20 high
+
+
+def test_what_is_found_turns_with_the_image_and_scales_with_its_grid() -> None:
+    seen = view((-4.0, 3.0, 1.0), (5.0, -6.0, 0.8), width=np.array([2.0, 7.0]))
+    turned = SonarView(seen.energy.T, ELEVATION, AZIMUTH, seen.beam_width[::-1], seen.points)
+    coarse = SonarView(seen.energy, AZIMUTH, 4.0 * ELEVATION, seen.beam_width * [1.0, 4.0], seen.points)
+    for method in (ImagePeaks(), CellAveraging()):
+        one, other, third = (
+            sorted((r.score, *map(tuple, sides)) for r in method.regions(v) for sides in [(r.rows, r.columns)[::way]])
+            for v, way in ((seen, 1), (turned, -1), (coarse, 1))
+        )
+        assert len(one) == len(other) >= 2 and one == third
+        for (score, rows, columns), (same, across, up) in zip(one, other, strict=True):
+            assert score == pytest.approx(same) and set(zip(rows, columns, strict=True)) == set(
+                zip(across, up, strict=True)
+            )
 
 
 def test_a_spot_that_is_too_faint_beside_the_brightest_is_a_side_lobe() -> None:

@@ -135,29 +135,30 @@ def test_odds_count_frames_whose_brightest_beam_is_on_a_target_that_is_no_clutte
     for at, hit in (((4, 2), True), ((4, 3), True), ((4, 5), False), ((4, 9), False)):
         here = image.copy()
         here[at] = 2.0
-        found += (one := odds(here, beams, clutter, snr, 1))
+        found += (one := odds(here, beams, clutter, snr, (1, 1)))
         assert vars(one) == {"frames": 1, "found": hit, "among_peaks": hit, "chance": 5 / 108, "snr": (3.0,)}
         for third in (False, True):  # two brighter peaks, then a third
             here[1, [5, 7]], here[7, 6] = 2.5, 2.5 if third else 1.0
-            one_of = odds(here, beams, clutter, snr, 1)
+            one_of = odds(here, beams, clutter, snr, (1, 1))
             assert (one_of.found, one_of.among_peaks) == (0, hit and not third)
     assert found.line == (
         "of 4 frames with a target, the brightest beam is on it in 2 (95 %: 0.15 to 0.85), a beam at random in 0.19, "
         "one of the 3 brightest peaks in 2 (95 %: 0.15 to 0.85); snr of targets 3 to 3 dB, median 3"
     )
-    assert odds(image, beams, clutter, None, 1) == NO_ODDS  # nothing but echoes
-    assert odds(image, np.full((9, 12), -1, np.int16), clutter, snr, 1).line == ""
+    assert odds(image, beams, clutter, None, (1, 1)) == NO_ODDS  # nothing but echoes
+    assert odds(image, np.full((9, 12), -1, np.int16), clutter, snr, (1, 1)).line == ""
 
 
 @pytest.mark.parametrize("shape", [(9, 12), (1, 7), (7, 1), (20, 23)])
-def test_the_brightest_beam_about_each_is_that_of_a_disc(shape: tuple[int, int]) -> None:
-    """However far the disc reaches beyond the image, and where nothing is known of a beam."""
+def test_the_brightest_beam_about_each_is_that_of_an_ellipse(shape: tuple[int, int]) -> None:
+    """However far the ellipse reaches beyond the image, and where nothing is known of a beam."""
     random = np.random.default_rng(4)
     energy = np.where(random.random(shape) < 0.2, -np.inf, random.normal(size=shape))
     place = np.stack(np.indices(shape), axis=-1).reshape(-1, 2)
-    apart = np.hypot(*(place[:, None] - place).transpose(2, 0, 1))
-    for reach in (1, 2, 5, 31):
-        about = np.where(apart <= reach, energy.ravel(), -np.inf).max(axis=1).reshape(shape)
+    off = place[:, None] - place
+    for reach in ((1, 1), (2, 2), (5, 5), (31, 31), (1, 7), (6, 2)):
+        within = ((off * reach[::-1]) ** 2).sum(axis=-1) <= np.prod(reach) ** 2
+        about = np.where(within, energy.ravel(), -np.inf).max(axis=1).reshape(shape)
         assert np.array_equal(brightest_about(energy, reach), about)
 
 
@@ -166,7 +167,7 @@ def test_loud_targets_are_found_in_all_tried_frames_faint_ones_by_chance(level: 
     """Faint: more than so many by chance is one in 1000. The array is sparse, for narrow beams."""
     scene = recipe(("left",), ("electronics",)).scene
     sonar = replace(
-        scene.sonar, array=PlanarLattice(columns=12, rows=8, pitch=0.04), electronics=Electronics(level=level)
+        scene.sonar, array=PlanarLattice(columns=12, rows=10, pitch=0.04), electronics=Electronics(level=level)
     )
     eight = replace(scene, sonar=sonar, trajectory=replace(scene.trajectory, frames=8))
     made = plan(replace(recipe(), scene=eight), ("image",))

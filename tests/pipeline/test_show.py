@@ -292,7 +292,7 @@ def test_the_steered_beam_has_the_energy_of_the_image(store: Path) -> None:
 def test_hit_far_hit_and_miss_are_what_they_are_called(store: Path) -> None:
     frame = stored(opened(store), 1)
     angle = np.linspace(-15.0, 15.0, Size().beams)
-    chosen = choose(frame, angle, angle, 1.5)
+    chosen = choose(frame, angle, angle, np.array([1.5, 1.5]))
     on = frame.target >= 0
     assert on[chosen["close hit"]]
     assert on[chosen["far hit"]]

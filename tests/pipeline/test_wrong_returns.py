@@ -134,7 +134,7 @@ def test_it_is_named_with_what_was_expected(
     ],
 )
 def test_regions_of_detectors_are_looked_at(monkeypatch: pytest.MonkeyPatch, region: Any, said: str) -> None:
-    view = SonarView(np.ones((9, 11)), np.arange(11.0), np.arange(9.0), 1.0, np.zeros((0, 4)))
+    view = SonarView(np.ones((9, 11)), np.arange(11.0), np.arange(9.0), np.ones(2), np.zeros((0, 4)))
     monkeypatch.setattr(ImagePeaks, "regions", lambda self, view: [region])
     with pytest.raises(WrongReturn, match=rf"image_peaks\.ImagePeaks\.regions returned .*{said}"):
         detections_of(view, ImagePeaks())

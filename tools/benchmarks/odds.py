@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_dilation, maximum_filter
 
+from sonarsynth.equations.arrays.apertures import whole_beams_held
 from sonarsynth.imaging import OrderStatistic
 from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.pipeline import TracedFrame, digitise, trace_frame
 from sonarsynth.pipeline.frame_chorus import frame_chorus, with_chorus
 from sonarsynth.pipeline.frame_reverberation import frame_reverberation, with_reverberation
-from sonarsynth.pipeline.labelled_estimates import beam_width, heard_directly
+from sonarsynth.pipeline.labelled_estimates import beam_widths, heard_directly
 from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.planning import Plan, plan
 from sonarsynth.products import Signals, Snapshots
@@ -92,13 +93,13 @@ def seen(density: float, distance: float, more: tuple[str, ...] = ()) -> list[Se
     ]
     made = plan(reading.load(RECIPE, settings), products=("image",))
     beams, frames = made.scene.sonar.beams, []
-    reach = max(round(beam_width(made) / float(beams.azimuth[1] - beams.azimuth[0])), 1)
-    rows, columns = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+    high, wide = whole_beams_held(beam_widths(made), beams.azimuth, beams.elevation)
+    rows, columns = np.mgrid[-high : high + 1, -wide : wide + 1]
     for index in FRAMES:
         traced = trace_frame(made, index)
         light = float(heard_directly(made, traced.arrivals, traced.frame.moment.snaps).time[0])
         window = light + made.windows.echo_start, light + made.windows.echo_stop
-        on = binary_dilation(traced.truth.beam_target == 0, rows**2 + columns**2 <= reach**2)
+        on = binary_dilation(traced.truth.beam_target == 0, (rows / high) ** 2 + (columns / wide) ** 2 <= 1.0)
         frames.append(Seen(made, traced, window, on))
     return frames
 
