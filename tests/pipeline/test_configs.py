@@ -196,7 +196,7 @@ def test_a_grid_of_ranges_headings_and_hulls(built: Callable[[str], Path]) -> No
         meshes = set(tree["truth/targets/mesh"].values[frames, 0].tolist())
         assert len(tree["targets/body"].children) == 4 and len(meshes) == 3 and meshes < set(range(4))
         there = tree["truth/targets/position"].values[frames, 0]
-        assert np.isfinite(there).all() and np.array_equal(there[::2, 2], tree.to_dataset().depth.values[frames[::2]])
+        assert np.isfinite(there).all() and np.array_equal(there[::2, 2], tree.to_dataset().body_z.values[frames[::2]])
 
 
 def test_each_image_of_the_boat_shows_what_it_is_for() -> None:
