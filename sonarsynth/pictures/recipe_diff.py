@@ -1,161 +1,74 @@
-"""What differs between the recipes of stores, in few words: "kirchhoff, roughness 2 mm" beside "mirror lobe"."""
+"""What differs between the recipes of stores, in few words: "scattering roughness 0.002 m" beside "... 0 m"."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from math import degrees
 from pathlib import Path
 from typing import Any
 
-from sonarsynth.conventions import UNITS
 from sonarsynth.recipe.reading import RecipeError, loads
 from sonarsynth.recipe.reading.yaml_source import read_text
 from sonarsynth.recipe.variation.setting import unit_at
 
-PREFERRED = {"m": ("m", "mm", "um"), "s": ("s", "ms", "us"), "Hz": ("kHz", "Hz"), "rad": ("deg",), "rad/s": ("deg/s",)}
-"""Units that people read, largest first, of SI units."""
-
 WORDLESS = ("title", "licence")
 """Fields of a recipe that make no number of a store differ."""
 
-GROUPS = ("scene", "world", "physics", "processing")
-"""Parts of a recipe that say nothing about their fields."""
-
-MOST = 4
-"""Differences that are said of each store."""
-
-LONGEST = 40
-"""Characters of a value that are said."""
-
-
-@dataclass(frozen=True)
-class Difference:
-    """A field whose values differ, and what is said of each store that has it."""
-
-    path: tuple[str, ...]
-    is_kind: bool  # the values name methods, which need no name of a field
-    said: Mapping[int, str]  # by store
+MOST, LONGEST = 4, 40
+"""Differences that are said of each store; characters of a value that are said."""
 
 
 def names_of(recipes: Sequence[str], otherwise: Sequence[str]) -> list[str]:
-    """A name for each store: the values of the fewest fields that tell its recipe from those of the others.
+    """A name for each store: the fields that differ among the recipes that have them, and their values in SI units.
 
-    recipes: the YAML of each, as stored. A field is said of the stores that have it: a roughness, where two of three
-    scatter by a law that knows one. `otherwise`: names that are different anyhow; they stand for stores whose recipes
-    do not differ, and behind names that two stores share.
+    recipes: the YAML of each, as stored. `otherwise`: names that are different anyhow; they stand for stores of which
+    nothing is said, and behind names that stores share.
     """
-    plain = [_plain(text) for text in recipes]
-    differences = _differences(dict(enumerate(plain)), (), [_loaded(text) for text in recipes])
-    told = [d for d in differences if d.path[0] not in WORDLESS] or [d for d in differences if d.path[0] == "title"]
-    descriptions = [_said(told, store) for store in range(len(recipes))]
-    shared = Counter(descriptions)
+    fields = [_fields(text) for text in recipes]
+    paths = dict.fromkeys(path for own in fields for path in own if path[0] not in WORDLESS)
+    told = [path for path in paths if len({own[path] for own in fields if path in own}) > 1]
+    names = [_name([f"{' '.join(path[-2:])} {own[path]}" for path in told if path in own]) for own in fields]
+    shared = Counter(names)
     return [
-        fallback if not words else f"{words} ({fallback})" if shared[words] > 1 else words
-        for words, fallback in zip(descriptions, otherwise, strict=True)
+        fallback if not name else f"{name} ({fallback})" if shared[name] > 1 else name
+        for name, fallback in zip(names, otherwise, strict=True)
     ]
 
 
-def _said(told: Sequence[Difference], store: int) -> str:
-    """What differs about a store, in words."""
-    kinds = [d.path for d in told if d.is_kind]
-    words = []
-    for difference in told:
-        if store in difference.said:
-            bare = difference.is_kind and len(kinds) == 1 and difference.said[store] != "null"
-            field = "" if bare else _field(difference.path, [d.path for d in told], kinds)
-            words.append(f"{field} {difference.said[store]}".strip())
-    more = [f"{len(words) - MOST} more"] if len(words) > MOST else []
-    return ", ".join(words[:MOST] + more)
+def _name(said: Sequence[str]) -> str:
+    more = [f"{len(said) - MOST} more"] if len(said) > MOST else []
+    return ", ".join([*said[:MOST], *more]).replace("_", " ")
 
 
-def _field(path: tuple[str, ...], others: Sequence[tuple[str, ...]], kinds: Sequence[tuple[str, ...]]) -> str:
-    """A field with what it belongs to, as much as tells it from others: nothing where a kind that is said owns it."""
-    long = 1 if len(path) == 1 or path[-2] in GROUPS or (len(kinds) == 1 and path[:-1] in kinds) else 2
-    while long < len(path) and sum(other[-long:] == path[-long:] for other in others) > 1:
-        long += 1
-    return " ".join(path[-long:]).replace("_", " ")
-
-
-def _differences(values: Mapping[int, Any], path: tuple[str, ...], recipes: Sequence[Any]) -> list[Difference]:
-    """Differences of values (by store) at a path; stores that differ in form are told apart by it, and no further."""
-    forms = {store: _form(value) for store, value in values.items()}
-    differences = []
-    if len(set(forms.values())) > 1:
-        texts = {store: _value(value, path, recipes[store]) for store, value in values.items()}
-        kinds = any(form[0] == "fields" for form in forms.values())
-        differences.append(Difference(path or ("recipe",), kinds, texts))
-    for form in dict.fromkeys(forms.values()):
-        alike = {store: value for store, value in values.items() if forms[store] == form}
-        if len(alike) > 1 and form[0] != "value":
-            inner = {store: _items(value) for store, value in alike.items()}
-            for key in dict.fromkeys(key for items in inner.values() for key in items):
-                below = {store: items.get(key) for store, items in inner.items()}
-                differences += _differences(below, (*path, key), recipes)
-    return differences
-
-
-def _form(value: Any) -> tuple[str, Any]:
-    """What values have to share for their parts to be compared: fields of one kind, or the names of a list."""
-    if isinstance(value, dict):
-        return "fields", value.get("kind")
-    if isinstance(value, list) and any(isinstance(item, dict) for item in value):
-        return "many", tuple(_items(value))
-    return "value", repr(value)
-
-
-def _items(value: Any) -> dict[str, Any]:
-    """Parts of fields or of a list by name; what has no name by its number."""
-    if isinstance(value, dict):
-        return {key: item for key, item in value.items() if key != "kind"}
-    named = [
-        str(item["name"]) if isinstance(item, dict) and item.get("name") else str(i) for i, item in enumerate(value)
-    ]
-    names = named if len(set(named)) == len(named) else [str(i) for i in range(len(value))]
-    return dict(zip(names, value, strict=True))
-
-
-def _value(value: Any, path: tuple[str, ...], recipe: Any) -> str:
-    """A value as people write it: with a unit where its field has one."""
-    if isinstance(value, dict):
-        return str(value.get("kind") or "given").replace("_", " ")
-    if _form(value)[0] == "many":
-        return f"of {len(value)}" if len(value) > 3 else ", ".join(_items(value))
-    unit = found.symbol if (found := unit_at(recipe, path)) else ""
-    if isinstance(value, list):
-        text = "[" + ", ".join(_number(item, "") for item in value) + "]" + (f" {unit}" if unit else "")
-    else:
-        text = _number(value, unit)
-    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
-
-
-def _number(value: Any, unit: str) -> str:
-    """A number in the largest preferred unit in which it is not small; other values as YAML writes them."""
-    if value is None or isinstance(value, bool):
-        return "null" if value is None else str(value).lower()
-    if unit in UNITS and isinstance(value, str) and value.endswith(f" {unit}"):  # as angles are written
-        value = float(value.removesuffix(unit))
-    if isinstance(value, str):
-        return value.replace("_", " ")
-    if not isinstance(value, int | float):
-        return str(value)
-    scales = [(symbol, UNITS[unit][symbol]) for symbol in PREFERRED.get(unit, ())] or [(unit, 1.0)]
-    fitting = [(symbol, size) for symbol, size in scales if abs(value) >= 0.0999 * size]
-    symbol, size = scales[0] if value == 0 else fitting[0] if fitting else scales[-1]
-    return f"{value / size:.6g} {symbol}".rstrip()
-
-
-def _plain(text: str) -> Any:
-    """A recipe as plain values; None where it is not YAML."""
+def _fields(text: str) -> Mapping[tuple[str, ...], str]:
+    """Every value of a recipe by its path, as text; none of what is no YAML, and no units of another version."""
     try:
-        return read_text(text, "", Path()).data
+        plain = read_text(text, "", Path()).data
     except RecipeError:
-        return None
-
-
-def _loaded(text: str) -> Any:
-    """A recipe, for the units of its fields; None for one of another version."""
+        return {}
     try:
-        return loads(text, resolved=True)
+        recipe = loads(text, resolved=True)
     except (RecipeError, ValueError):
-        return None
+        recipe = None
+    return {path: _said(value, unit_at(recipe, path)) for path, value in _values(plain, ())}
+
+
+def _values(value: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Plain values below a path: a list of fields by its numbers, any other as it is."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _values(item, (*path, key))
+    elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
+        yield from _values({str(n): item for n, item in enumerate(value)}, path)
+    elif path:
+        yield path, value
+
+
+def _said(value: Any, unit: Any) -> str:
+    """A value with its unit, where its field has one; angles, which are written with theirs, in degrees."""
+    if isinstance(value, str) and value.endswith(" rad"):
+        return f"{degrees(float(value.removesuffix(' rad'))):.6g} deg"
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    text += f" {unit.symbol}" if unit is not None and not isinstance(value, str | None) else ""
+    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
