@@ -148,8 +148,6 @@ class Tolerances:
     part of the power of all from there (70 dB); each counts with the largest amplitude that it has anywhere on the
     array. Of coherent ones, which add by amplitude, so many that their amplitudes together stay below the root of this
     part of that of the largest."""
-    quadratic: float = 1e-4
-    """Error of amplitudes over the aperture, over the strongest echo's, up to which the second degree does."""
     shared: float = 1e-2
     """What moves by less than this part of the radius of a body from one snap to another, or turns by less than this
     (rad) in the sight of snap and array from one family of rays to another, and keeps as near to what its velocity and

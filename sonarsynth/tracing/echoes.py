@@ -32,7 +32,7 @@ from sonarsynth.tracing.doppler import (
 )
 from sonarsynth.tracing.echo_batches import PRUNE_MARGIN, EchoBatch, echo_batches, in_band
 from sonarsynth.tracing.expansion.amplitude_polynomials import variations
-from sonarsynth.tracing.expansion.probe_sensors import QUADRATIC_PROBES, probes
+from sonarsynth.tracing.expansion.probe_sensors import probes
 from sonarsynth.tracing.expansion.scattering_points import delay_to_scattering_points, shift_to_scattering_points
 from sonarsynth.tracing.occlusion.ray_cones import hidden, overlapping
 from sonarsynth.tracing.pruning import EchoLevels, loud_of_all, loud_ones
@@ -42,8 +42,6 @@ from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arriva
 if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
 
-FEW, MORE = slice(QUADRATIC_PROBES), slice(QUADRATIC_PROBES, None)
-"""Probes that all echoes are followed to at first, and the others."""
 MAX_PHASE_CHANGE = 1.0
 """rad: a phase of reflection that varies by more over the aperture is not followed."""
 
@@ -57,7 +55,7 @@ class _EchoBlock:
     out: TransmitPaths  # (pair,)
     leg: Ints  # (pair,)
     factor: Floats  # (pair,) what the ways do to amplitudes
-    few: Floats  # (echo, FEW) amplitudes of the law at the first probes
+    law: Floats  # (echo, probe) amplitudes of the law at the probes
     pulses: PulseResponse  # (echo,)
     carried: MotionTerms | None  # (pair,); None: nothing moves
     legs: ReceivePaths | None = None  # (pair,) with the hydrophones that do not hear it; None: not looked at
@@ -77,8 +75,8 @@ class _EchoBlock:
         groups = [g.but(row=np.arange(end - len(g.row), end)) for g, end in zip(groups, last, strict=True)]
         out, leg, factor = self.out.select(row), self.leg[row], self.factor[row]
         carried, kept = None if self.carried is None else self.carried.select(row), np.flatnonzero(loud)
-        few, pulses = rows_of(self.few, kept), self.pulses.select(kept)
-        return _EchoBlock(self.array, groups, out, leg, factor, few, pulses, carried)
+        law, pulses = rows_of(self.law, kept), self.pulses.select(kept)
+        return _EchoBlock(self.array, groups, out, leg, factor, law, pulses, carried)
 
     @cached_property
     def strength(self) -> Floats:
@@ -86,19 +84,16 @@ class _EchoBlock:
         row, amplitude = _columns(self.groups, "row", "amplitude")
         return np.asarray(amplitude * self.factor[row])
 
-    def gains(self, few: int | None) -> tuple[Floats, Floats, float]:
-        """What `probe_fits.gains` makes of the law and of the legs at all probes or the first few."""
+    @property
+    def gains(self) -> tuple[Floats, Floats, float]:
+        """What `probe_fits.gains` makes of the law and of the legs at the probes."""
         row, amplitude, tapered = _columns(self.groups, "row", "amplitude", "tapered")
-        law, gain = self.few, self.array.fronts.gain(self.leg[row], few)
-        if few is None:
-            more = [g.over(_towards_probes(self.array, self.leg, self.carried, g, MORE)) for g in self.groups]
-            law = np.concatenate([law, _joined(more)], axis=1)
-        return probe_fits.gains(law, amplitude, gain, tapered, self.strength)
+        return probe_fits.gains(self.law, amplitude, self.array.fronts.gain(self.leg[row]), tapered, self.strength)
 
     def levels(self) -> EchoLevels:
         """What decides which echoes are kept."""
         row, amplitude = _columns(self.groups, "row", "amplitude")
-        at_probes = np.abs(self.few.T, order="C").max(axis=0, initial=0.0)
+        at_probes = np.abs(self.law.T, order="C").max(axis=0, initial=0.0)
         strongest = np.maximum(at_probes, np.abs(amplitude)) * self.factor[row]
         owner = self.array.facets.owner[self.out.facet[row]]
         strength = strongest * in_band(self.pulses, self.array.context.receiver.band)
@@ -121,7 +116,7 @@ def echoes(array: FacetPaths, index: int, components: tuple[tuple[Component, ...
         return no_arrivals(array.legs)
     snap, receiver, profile = array.context.snaps[index], array.context.receiver, array.context.medium.profile
     blocks = _loudest(array, snap, components)
-    terms, error = variations(blocks)
+    terms, error = variations(receiver, (block.gains for block in blocks))
     strongest = max(float(np.abs(block.strength).max(initial=0.0)) for block in blocks)
     group, arrivals = [block.group for block in blocks], []
     blocks.reverse()
@@ -191,9 +186,9 @@ def _all_echoes(array: FacetPaths, snap: Emission, components: tuple[tuple[Compo
     out = out.select(way)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
     groups = echo_batches(array, out, leg, components, carried, factor)
-    few = _joined([g.over(_towards_probes(array, leg, carried, g, FEW)) for g in groups])
+    law = _joined([g.over(_towards_probes(array, leg, carried, g)) for g in groups])
     pulses = PulseResponse.join([g.pulses(array.context.receiver.centre) for g in groups])
-    return _EchoBlock(array, groups, out, leg, factor, few, pulses, carried)
+    return _EchoBlock(array, groups, out, leg, factor, law, pulses, carried)
 
 
 def _carried(
@@ -214,15 +209,15 @@ def _carried(
     return met_out, met_paths(array.legs, leg, MotionTerms(met, late, velocity, spin, apart).select(way), meeting)
 
 
-def _towards_probes(array: FacetPaths, leg: Ints, carried: MotionTerms | None, group: EchoBatch, some: slice) -> Floats:
-    """Where some probes are seen from the facets of a group (echo, probe, xyz), in the frame of its body; leg, carried:
+def _towards_probes(array: FacetPaths, leg: Ints, carried: MotionTerms | None, group: EchoBatch) -> Floats:
+    """Where the probes are seen from the facets of a group (echo, probe, xyz), in the frame of its body; leg, carried:
     of all pairs (pair,)."""
     body, fronts, legs = group.surface.pose, array.fronts, array.legs
     motion = MotionTerms.none(len(leg)) if carried is None else carried
     if fronts.probe_departure is not None:
         rows = leg[group.row]
-        return motion.select(group.row).departure(legs.length[rows], fronts.departure(rows, some), body)
-    offset = array.context.receiver.pose.turn_to_world(fronts.place.probe.position[some])
+        return motion.select(group.row).departure(legs.length[rows], fronts.departure(rows), body)
+    offset = array.context.receiver.pose.turn_to_world(fronts.place.probe.position)
     ray = legs.length, legs.departure, legs.bounces, offset, group.row, leg
     return np.asarray(to_moved_images(*ray, motion.apart, motion.late, motion.spin, body.rotation))
 
@@ -284,7 +279,7 @@ def _with_reflection_phases(block: _EchoBlock, strongest: float) -> ArrayExpansi
     over = array.fronts.expansion[leg[row]]
     if not any(g.part.turns for g in block.groups):
         return over
-    shift = _joined([g.turned(_towards_probes(array, leg, block.carried, g, slice(None))) for g in block.groups])
+    shift = _joined([g.turned(_towards_probes(array, leg, block.carried, g)) for g in block.groups])
     leaps = np.abs(shift).max(axis=1, initial=0.0) > MAX_PHASE_CHANGE
     if not shift.any():
         return over

@@ -58,7 +58,7 @@ def traced(moving: Moving, array: Elements, pose: Pose, bounces: int = 0) -> Arr
     )
     panel = PlacedTarget("panel", PANEL, Pose(np.array([12.0, 1.5, -4.8]), quaternion(0.6)), moving.target)
     receiver = Receiver(pose, array, SONAR, Track(pose, moving.sonar))
-    left = Tolerances(negligible=0.0, quadratic=0.0)
+    left = Tolerances(negligible=0.0)
     context = FrameContext(0.0, (panel,), (SNAP,), Medium(water, PROFILE), receiver, (Isotropic(),), left)
     found = trace(context, Straight(bounces=bounces))
     return found.select(found.direct | np.isin(found.facet, FRONT))  # those that no hydrophone sees from their edge

@@ -64,7 +64,7 @@ def traced(
     panel = PlacedTarget("panel", PANEL, Pose(PLACE + view.place, quaternion(view.heading)), np.zeros(3))
     snap = Emission(PLACE + view.snap, 0.0, LogarithmicBubble(), None)
     receiver = Receiver(Pose(place, EAST), array, SONAR)
-    none = Tolerances(negligible=0.0, quadratic=0.0)
+    none = Tolerances(negligible=0.0)
     context = FrameContext(0.0, (panel,), (snap,), Medium(WATER, profile), receiver, (law,), none)
     found = trace(context, AutoTracing(bounces=bounces))
     front = np.isin(found.facet, np.flatnonzero(PANEL.normal[:, 0] > 0.9))

@@ -45,7 +45,7 @@ def traced(
 ) -> Arrivals:
     loose = tuple(field.scatterers(BOTTOM, np.random.default_rng(seed)) for field in fields)
     receiver = Receiver(POSE, ARRAY, Sonar(), Track(POSE, np.array([speed, 0.0, 0.0])) if speed else None)
-    laws, exact = (Isotropic(strength=0.1),) * len(bodies), Tolerances(negligible=0.0, quadratic=0.0)
+    laws, exact = (Isotropic(strength=0.1),) * len(bodies), Tolerances(negligible=0.0)
     context = FrameContext(0.0, bodies, (SNAP,), WATER, receiver, laws, exact, scatterers=loose)
     return trace(context, AutoTracing(bounces=0))
 

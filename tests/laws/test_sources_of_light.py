@@ -36,7 +36,7 @@ SOURCE, PLACE = np.array([3.0, 6.0, -103.0]), np.array([12.0, -1.0, -99.0])
 
 def traced(snap: Emission, sonar: Floats = STILL) -> Arrivals:
     receiver = Receiver(POSE, ARRAY, SONAR, Track(POSE, sonar))
-    laws, none = (Isotropic(strength=1.0),), Tolerances(negligible=0.0, quadratic=0.0)
+    laws, none = (Isotropic(strength=1.0),), Tolerances(negligible=0.0)
     return trace(
         FrameContext(0.0, (ball(PLACE, 0.05, subdivisions=1),), (snap,), WATER, receiver, laws, none),
         AutoTracing(bounces=0),

@@ -21,10 +21,6 @@ from sonarsynth.signals.segments import Reception
 from sonarsynth.state import FrameContext, Receiver, Survey, Tolerances
 from sonarsynth.tracing.arrivals import trace
 
-AMPLITUDES = 0.1
-"""Share of the error of signals that amplitudes over the aperture may err by, for a lower degree to do."""
-
-
 SAMPLE = 2500
 """Facets that errors are measured on, about, where there are over four times as many."""
 FEW_LAYERS = 1000
@@ -63,7 +59,6 @@ def context_of(plan: Plan, frame: Frame, subarray: Subarray | None = None) -> Fr
     choices, accuracy, receiver = plan.choices, plan.recipe.accuracy, receiver_of(plan, frame, subarray)
     tolerances = Tolerances(
         negligible=choices.negligible,
-        quadratic=AMPLITUDES * accuracy.cheap,
         shared=accuracy.signal,
         occlusion=choices.occlusion if subarray is not None or choices.subarrays == 1 else "centre",
     )

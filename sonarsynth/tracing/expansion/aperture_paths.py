@@ -49,17 +49,17 @@ class AperturePaths:
     probe_departure: Floats | None  # (leg, probe, xyz) world; None: towards the images of the probes
     probe_gain: Floats | None  # (leg, probe); None: 1
 
-    def departure(self, rows: Ints, some: slice = slice(None)) -> Floats:
-        """Where some probes are seen from the points of some legs: (row, probe, xyz), world."""
+    def departure(self, rows: Ints) -> Floats:
+        """Where the probes are seen from the points of some legs: (row, probe, xyz), world."""
         if self.probe_departure is not None:
-            return self.probe_departure[:, some][rows]
-        return image(self.legs, self.place.probe.position[some], self.place.receiver.pose, rows)
+            return self.probe_departure[rows]
+        return image(self.legs, self.place.probe.position, self.place.receiver.pose, rows)
 
-    def gain(self, rows: Ints, few: int | None = None) -> Floats:
-        """Amplitude at each probe, or the first few, over that of the sphere (row, probe); 1 in uniform water."""
+    def gain(self, rows: Ints) -> Floats:
+        """Amplitude at each probe over that of the sphere (row, probe); 1 in uniform water."""
         if self.probe_gain is not None:
-            return self.probe_gain[:, :few][rows]
-        return np.broadcast_to(1.0, (len(rows), len(self.place.probe.sensor[:few])))
+            return self.probe_gain[rows]
+        return np.broadcast_to(1.0, (len(rows), len(self.place.probe.sensor)))
 
 
 @dataclass(frozen=True, eq=False)

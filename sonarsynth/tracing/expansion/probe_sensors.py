@@ -11,13 +11,11 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.kernels import probe_fits
 from sonarsynth.equations.kernels.row_products import row_products
 from sonarsynth.products import Paths
-from sonarsynth.products.array_expansion import FIRST_OF_DEGREE, aperture_terms
+from sonarsynth.products.array_expansion import aperture_terms
 from sonarsynth.receiver import Elements
 
 HELD_OUT = 3
 """Probes that only measure the error of a fit; those that it is fitted to are as many and as three in ten more."""
-QUADRATIC_PROBES = 9
-"""Probes, the first ones, that a polynomial of the second degree is fitted to and measured at."""
 BRANCH = 0.05
 """Largest misfit of a probe to the sphere, in travel times over the aperture: a path farther off is another branch."""
 
@@ -32,22 +30,17 @@ class Probes:
     solve: Floats  # (term, fitted): values at the fitted probes to coefficients; the row of the constant term is 0
     basis: Floats  # (probe, term)
     aperture: float  # m
-    solve_few: Floats  # (term, probe): as solve, from the first of FEW probes to terms up to the second degree
     monomials: tuple[int, ...]  # (term,) which of `aperture_terms` it is: those that do not vanish at all probes
 
     def expand(self, values: Floats) -> tuple[Floats, Floats]:
         """Terms (path, term) of `ArrayExpansion`, 0 at the centre, by least squares through values (path, probe), and
-        the largest of what they miss these by (path,); of the second degree from values at the first `QUADRATIC_PROBES`
-        alone.
+        the largest of what they miss these by (path,).
 
         Values that are NaN (no ray there) are left out, and inf is missed. A measurement at some places, those held out
         as well, not a bound: kinks of a profile within the aperture were seen to err twice as much between the probes.
         """
-        every = values.shape[1] == len(self.sensor)
-        solve = self.solve if every else self.solve_few
-        basis = self.basis[: values.shape[1], : len(solve)]
-        terms, missed = probe_fits.fits(values, np.ascontiguousarray(solve.T), np.ascontiguousarray(basis.T))
-        for i in np.flatnonzero(np.isinf(missed)) if every else ():
+        terms, missed = probe_fits.fits(values, np.ascontiguousarray(self.solve.T), np.ascontiguousarray(self.basis.T))
+        for i in np.flatnonzero(np.isinf(missed)):
             finite = np.flatnonzero(np.isfinite(values[i, : self.fitted]))
             terms[i, 1:] = np.linalg.lstsq(self.basis[finite, 1:], values[i, finite], rcond=1e-10)[0]
         return terms, missed
@@ -70,11 +63,9 @@ def probes(elements: Elements) -> Probes:
     fitted = max(len(sensor) - HELD_OUT, min(rank, len(sensor)), 1)
     basis = aperture_terms(position[sensor], scale)
     monomials = np.flatnonzero(basis.any(axis=0))
-    basis, second = basis[:, monomials], int(np.searchsorted(monomials, FIRST_OF_DEGREE[3]))
+    basis = basis[:, monomials]
     solve = np.vstack([np.zeros(fitted), np.linalg.pinv(basis[:fitted, 1:], rcond=1e-10)])
-    few = len(sensor) if len(sensor) < QUADRATIC_PROBES else QUADRATIC_PROBES - HELD_OUT  # of a small array, all
-    solve_few = np.vstack([np.zeros(few), np.linalg.pinv(basis[:few, 1:second], rcond=1e-10)])
-    return Probes(sensor, position[sensor], fitted, solve, basis, scale, solve_few, tuple(monomials.tolist()))
+    return Probes(sensor, position[sensor], fitted, solve, basis, scale, tuple(monomials.tolist()))
 
 
 def sphere(direction: Floats, radius: Floats, position: Floats) -> Floats:
