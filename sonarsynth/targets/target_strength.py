@@ -44,12 +44,12 @@ def target_strength(
 
     Parameters
     ----------
-    target: a mesh, a shape, or the target of a recipe.
+    target: a mesh, a shape, or the target of a recipe, of its `scale`.
     frequency: (...) Hz; this and the next three broadcast together.
     incident: (..., xyz) unit vectors of propagation towards it, in its own frame (x forward, y port, z up).
     scattered: (..., xyz) unit vectors away from it; backscatter is -incident.
     sound_speed: (...) m/s.
-    scattering: the law of its surface (default: `Kirchhoff()`).
+    scattering: the law of its surface (default: that of a target which has one of its own, else `Kirchhoff()`).
 
     Returns
     -------
@@ -59,7 +59,8 @@ def target_strength(
     ------
     ValueError (MeshError for a mesh) in one line for what is no target, frequency, direction or sound speed.
     """
-    law = Kirchhoff() if scattering is None else scattering
+    own = target.scattering if isinstance(target, Target) else None
+    law = scattering or own or Kirchhoff()
     k, going, away = _checked(frequency, incident, scattered, sound_speed)
     shape = np.broadcast_shapes(k.shape, going.shape[:-1], away.shape[:-1])
     if 0 in shape:
@@ -82,12 +83,12 @@ class _Body:
     """A mesh, its law, and what each direction sees of it."""
 
     def __init__(self, target: Mesh | Shape | Target, law: Scattering, wavelength: float, longest: float) -> None:
-        shape = target.shape if isinstance(target, Target) else target
+        shape, scale = (target.shape, target.scale) if isinstance(target, Target) else (target, 1.0)
         coherent = law.coherent
         if isinstance(shape, Mesh):
             self.mesh = checked(shape, wavelength) if coherent else shape
         elif isinstance(shape, SHAPES):
-            self.mesh = fine_mesh(shape, wavelength) if coherent else mesh_of(shape)
+            self.mesh = (fine_mesh(shape, wavelength / scale) if coherent else mesh_of(shape)).scaled(scale)
         else:
             raise ValueError(
                 f"target must be a Mesh, a shape such as Sphere(radius=0.25), or a Target, not {shape!r:.60}"

@@ -199,6 +199,21 @@ def test_arrays_broadcast_and_a_target_is_its_shape() -> None:
     assert ss.target_strength(shape, [], (1, 0, 0), (-1, 0, 0)).shape == (0,)
 
 
+@pytest.mark.parametrize("scale", [0.5, 3.0])
+def test_a_target_is_as_large_as_its_scale_and_scatters_by_its_own_law(scale: float) -> None:
+    """At a wavelength so many times as long a body so many times as large is 20 lg of that stronger."""
+    shape, rough = ss.Myring(nose=0.2, middle=0.3, tail=0.3, diameter=0.2), ss.MirrorLobe(width=0.3)
+    target = ss.Target(name="hull", shape=shape, motion=ss.Still(position=(0.0, 0.0, -5.0)), scale=scale)
+    incident, larger = directions(6)[:, None], 20.0 * np.log10(scale)
+    of_shape = ss.target_strength(shape, BAND[::8], incident, -incident)
+    assert ss.target_strength(target, BAND[::8] / scale, incident, -incident) == pytest.approx(of_shape + larger)
+    lobes = ss.target_strength(shape, 60e3, incident, -incident, scattering=rough)
+    own = replace(target, scattering=rough)
+    assert ss.target_strength(own, 60e3, incident, -incident) == pytest.approx(lobes + larger)
+    soft = ss.target_strength(own, 60e3, incident, -incident, scattering=ss.Kirchhoff(surface="soft"))
+    assert soft == pytest.approx(ss.target_strength(target, 60e3, incident, -incident))
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
