@@ -55,7 +55,8 @@ Longitude = Annotated[Radians, Ge(-2 * np.pi), Le(2 * np.pi)]
 
 @description
 class RecordedTrack:
-    """Along the points of a file, CSV or GPX: a curve through them of continuous velocity (Akima's, modified).
+    """Along the points of a file, CSV or GPX: a curve through them of continuous velocity (Akima's, modified), at rest
+    from a point to the next where that is the same place.
 
     Columns: time, and x and y (with z or depth) or latitude and longitude (with depth). Heading, pitch and roll as the
     file has them; a heading that it lacks is along the velocity.
@@ -143,7 +144,7 @@ def _of(track: RecordedTrack) -> _Curve:
 
 @lru_cache(maxsize=16)
 def _curve(track: RecordedTrack, changed: tuple[int, int]) -> _Curve:
-    from scipy.interpolate import Akima1DInterpolator
+    from scipy.interpolate import CubicHermiteSpline
 
     table = read_track(Path(track.path))
     clock = table.columns["time"]
@@ -151,14 +152,33 @@ def _curve(track: RecordedTrack, changed: tuple[int, int]) -> _Curve:
     position = _places(track, table)
     angles = [np.full(len(time), angle) for angle in (track.pitch, track.roll)]
     angles = [np.unwrap(table.columns.get(name, a)) for name, a in zip(("pitch", "roll"), angles, strict=True)]
-    velocity = Akima1DInterpolator(time, position, method="makima").derivative()(time)
+    velocity, way = _velocities(time, position)
     if track.heading is not None:
         heading = np.full(len(time), track.heading)
     else:
-        heading = np.unwrap(table.columns["heading"]) if "heading" in table.columns else _courses(velocity)
-    values = np.column_stack([position, heading, *angles])
-    curve = Akima1DInterpolator(time, values, method="makima")
+        heading = np.unwrap(table.columns["heading"]) if "heading" in table.columns else _courses(way)
+    turned = np.column_stack([heading, *angles])
+    curve = CubicHermiteSpline(
+        time, np.column_stack([position, turned]), np.column_stack([velocity, _rates(time, turned)])
+    )
     return _Curve(time.tolist(), np.asarray(curve.c, float))
+
+
+def _rates(time: Floats, values: Floats) -> Floats:
+    """Derivatives (point, column) at points of the curve through values (point, column)."""
+    from scipy.interpolate import Akima1DInterpolator
+
+    return np.asarray(Akima1DInterpolator(time, values, method="makima").derivative()(time))
+
+
+def _velocities(time: Floats, position: Floats) -> tuple[Floats, Floats]:
+    """Velocities (point, xyz) m/s at positions (point, xyz) m, 0 where a rest begins or ends: else the curve would
+    swing away from it, and back. And those that headings are along, there of the way to the rest or from it."""
+    velocity, chord = _rates(time, position), np.diff(position, axis=0) / np.diff(time)[:, None]
+    rest = ~chord.any(axis=1)
+    at_rest, none = np.append(rest, False) | np.append(False, rest), np.zeros((1, 3))
+    beside = np.concatenate([chord, none]) + np.concatenate([none, chord])
+    return np.where(at_rest[:, None], 0.0, velocity), np.where(at_rest[:, None], beside, velocity)
 
 
 def _places(track: RecordedTrack, table: TrackTable) -> Floats:

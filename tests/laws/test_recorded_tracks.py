@@ -96,6 +96,23 @@ def test_angles_turn_the_short_way_and_a_body_that_stands_keeps_its_course(tmp_p
         )
 
 
+def test_a_body_stands_between_two_points_at_one_place(tmp_path):
+    """It swung away from there and back, by a fifth of the way that it had come or had to go."""
+    x, y = np.array([[0.0, 0.0, 20.0, 20.0, 20.0, 20.0], [3.0, 3.0, 3.0, 3.0, 23.0, 23.0]])
+    track = RecordedTrack(path=written(tmp_path / "a.csv", "t,x,y,z", np.arange(0.0, 60.0, 10.0), x, y, -5.0 + 0.0 * x))
+    for begin, place, ahead in (
+        (-3.0, (0.0, 3.0), (1.0, 0.0)),
+        (20.0, (20.0, 3.0), None),
+        (40.0, (20.0, 23.0), (0, 1)),
+    ):
+        for late in (0.0, 3.0, 7.0, 10.0):
+            there = pose(track, begin + late)
+            np.testing.assert_allclose(there.position, (*place, -5.0), atol=1e-12)
+            np.testing.assert_allclose(velocity(track, begin + late), 0.0, atol=1e-12)
+            if ahead is not None:
+                np.testing.assert_allclose(there.turn_to_world(np.array([1.0, 0.0, 0.0])), (*ahead, 0.0), atol=1e-12)
+
+
 def test_places_on_the_earth_are_those_of_the_radii_of_curvature():
     """Along a meridian by its arc (a quadrature), along a parallel by its chord, beside the bending of the plane."""
     a, e2 = 6378137.0, 0.00669437999014
