@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal, Protocol
 
 import numpy as np
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Le
 
 from sonarsynth.conventions import Bools, Floats, Number
 from sonarsynth.description import description
@@ -18,11 +18,11 @@ class PartlyReflecting:
     """The surface of a fluid body so thick that nothing returns from inside: Rayleigh's coefficient at each angle."""
 
     kind: Literal["partly_reflecting"] = "partly_reflecting"
-    density_ratio: Annotated[Number, Gt(0)]
+    density_ratio: Annotated[Number, Ge(1e-9), Le(1e9)]
     """Density over that of the water."""
-    speed_ratio: Annotated[Number, Gt(0)]
+    speed_ratio: Annotated[Number, Ge(1e-9), Le(1e9)]
     """Sound speed over that of the water."""
-    loss_tangent: Annotated[Number, Ge(0)] = 0.0
+    loss_tangent: Annotated[Number, Ge(0), Le(1)] = 0.0
     """Imaginary over real part of the wavenumber in the body."""
 
 

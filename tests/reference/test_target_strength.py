@@ -108,6 +108,16 @@ def test_a_half_space_of_known_contrast_reflects_its_share() -> None:
     np.testing.assert_allclose(partly - rigid, 20 * np.log10((2.0 * 1.5 - 1) / (2.0 * 1.5 + 1)), atol=1e-9)
 
 
+@pytest.mark.parametrize("density", [1e-9, 1e9])
+@pytest.mark.parametrize("speed", [1e-9, 1e9])
+def test_a_body_of_any_contrast_has_an_echo_and_none_without_digits(density: float, speed: float) -> None:
+    box, along = ss.Box(size=(0.5, 0.3, 0.2)), ((1, 0, 0), (-1, 0, 0))
+    law = ss.Kirchhoff(surface=ss.PartlyReflecting(density_ratio=density, speed_ratio=speed, loss_tangent=1.0))
+    assert ss.target_strength(box, 60e3, *along, scattering=law) <= ss.target_strength(box, 60e3, *along) + 1e-9
+    with pytest.raises(ValueError, match="speed_ratio"):  # it had NaN
+        ss.PartlyReflecting(density_ratio=density, speed_ratio=1e-200)
+
+
 def test_a_rough_plate_loses_its_coherent_echo_and_keeps_a_lobe() -> None:
     """Straight on: A/lambda exp(-g^2/2) with g = 2 k h, and (1 - exp(-g^2)) A/(8 pi s^2) of power besides."""
     box, frequency, height, slope = ss.Box(size=(0.1, 1.0, 1.0)), np.array([20e3, 50e3, 200e3]), 0.002, 0.15
