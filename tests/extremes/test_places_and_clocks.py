@@ -120,6 +120,33 @@ def test_a_sound_speed_that_jumps_is_said_to_be_beyond_rays(depths: list[float],
     assert any("by 40 m/s within a wavelength of 25000 Hz at 18 m" in note for note in notes) == said
 
 
+def fold(phase: float) -> float:
+    """Modulus of int exp(i (t^3/3 - z t)) dt over that of its two stationary points, as rays have it, z such that
+    these are so much (rad) apart: the waves of a fold, by quadrature along a line where the integrand dies away."""
+    z = (0.75 * phase) ** (2.0 / 3.0)
+    u, step = np.linspace(-12.0, 12.0, 200_001, retstep=True)
+    t = u + 0.5j
+    rays = 2.0 * np.sqrt(np.pi) * z**-0.25 * np.cos(0.5 * phase - 0.25 * np.pi)
+    return float(np.abs(np.exp(1j * (t**3 / 3.0 - z * t)).sum() * step) / rays)
+
+
+@pytest.mark.parametrize("away", [228.15, 228.5, 229.0, 240.0])
+def test_rays_beside_the_caustic_at_which_they_meet_are_said_to_be_too_loud(away: float) -> None:
+    water = "{kind: tabulated, depth: [0, 20, 40], speed: [1520, 1490, 1520]}"
+    recipe = crate(
+        f"scene.world.environment.sound_speed={water}", f"{SNAP}.position=[{away}, 0, -18]", f"{SONAR}.position.2=-24"
+    )
+    plan, (start, end) = ss.plan(recipe, ["signals"]), ((away, 0.0, -18.0), (0.0, 0.0, -24.0))
+    rays = ss.eigenrays_between(recipe.scene.world.environment.sound_speed, 40.0, start, end, vertices=1)
+    turned = rays.travel_time[(rays.surface + rays.bottom == 0) & (rays.turning == 1)]
+    phase = 2.0 * np.pi * recipe.scene.sonar.band.low * float(np.diff(turned).min())
+    said = [note for note in plan.validity if "caustic" in note]
+    assert bool(said) == (phase < 1.0)
+    for note in said:
+        louder = float(note.partition("they are ")[2].split()[0])
+        assert louder == pytest.approx(-20.0 * np.log10(fold(phase)), abs=0.02 * louder + 0.05)
+
+
 def test_points_of_what_turns_may_be_none() -> None:
     mover = Mover(Circle(centre=(22.0, 3.0, -29.0), radius=4.0, speed=1.4), 0.3)
     assert mover.points(np.empty((0, 3)), np.empty(0)).shape == (0, 3)

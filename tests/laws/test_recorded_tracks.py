@@ -97,7 +97,7 @@ def test_angles_turn_the_short_way_and_a_body_that_stands_keeps_its_course(tmp_p
 
 
 def test_a_body_stands_between_two_points_at_one_place(tmp_path):
-    """It swung away from there and back, by a fifth of the way that it had come or had to go."""
+    """It swung away from there and back, by a ninth of the way that it had come or had to go."""
     x, y = np.array([[0.0, 0.0, 20.0, 20.0, 20.0, 20.0], [3.0, 3.0, 3.0, 3.0, 23.0, 23.0]])
     track = RecordedTrack(path=written(tmp_path / "a.csv", "t,x,y,z", np.arange(0.0, 60.0, 10.0), x, y, -5.0 + 0.0 * x))
     for begin, place, ahead in (

@@ -88,7 +88,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         lines += focus_notes(look) if plan.products & OF_BEAMS else []
         lines += _extent(look.scene, look.profile)
         lines += _cut(look.scene, look.profile.uniform)
-        lines += validity(look.scene, look.profile)
+        lines += validity(look)
         lines += law_notes(look)
     return once(lines, recipe)
 
@@ -116,7 +116,7 @@ def stored_validity(recipe: Recipe, looks: Sequence[SampledScene]) -> tuple[str,
     """Where formulas and laws of the scenes hold and do not, one line each: as the store has them."""
     lines: list[str] = []
     for look in noted(looks):
-        lines += [*where_laws_hold(look), *validity(look.scene, look.profile)]
+        lines += [*where_laws_hold(look), *validity(look)]
     return once(lines, recipe)
 
 
