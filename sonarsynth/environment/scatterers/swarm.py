@@ -12,6 +12,9 @@ from sonarsynth.description import description
 from sonarsynth.environment.scatterers.scattering_field import ScatteringField
 from sonarsynth.scattering import PointScatterer, Scatterers
 
+LEAST = 1e-6
+"""Of half its height: what must be in the water of a swarm, for places in less have no digits."""
+
 
 @description
 class Swarm(ScatteringField):
@@ -40,11 +43,14 @@ class Swarm(ScatteringField):
     def scatterers(self, bottom: float, random: np.random.Generator) -> Scatterers:
         """As `ScatteringField.scatterers`. Raises ValueError where none of it is in the water."""
         _, _, up = self.centre
-        if up - self.axes[2] >= 0.0 or up + self.axes[2] <= -bottom:
+        low, high = np.clip([(-bottom - up) / self.axes[2], -up / self.axes[2]], -1.0, 1.0)  # of it in the water
+        if high - low < LEAST:
             raise ValueError(f"a swarm at z {up:g} m is out of the water, which is {bottom:g} m deep")
+        wide = np.sqrt(1.0 - np.clip(0.0, low, high) ** 2)
+        middle, size = np.array([0.0, 0.0, 0.5 * (low + high)]), np.array([wide, wide, 0.5 * (high - low)])
         position = np.zeros((0, 3))
         while len(position) < self.members:
-            drawn = random.uniform(-1.0, 1.0, (4 * self.members, 3))
+            drawn = random.uniform(-1.0, 1.0, (4 * self.members, 3)) * size + middle
             drawn = drawn[np.sum(drawn**2, axis=1) < 1.0] * self.axes + self.centre
             position = np.concatenate([position, drawn[(drawn[:, 2] < 0.0) & (drawn[:, 2] > -bottom)]])
         return Scatterers(
