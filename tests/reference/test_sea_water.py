@@ -206,6 +206,7 @@ def test_fresh_water_has_no_relaxation_and_says_that_it_is_out_of_range():
         (seawater.del_grosso, (10.0, 35.0, 9807.0), "pressure 9807 dbar is outside 0 to 9806.65 dbar"),
         (seawater.depth_of_pressure, (10001.0,), "pressure 10001 dbar"),
         (seawater.francois_garrison, (2e6, 10.0, 35.0, 0.0), "frequency 2000 kHz is outside 0 to 1000 kHz"),
+        (seawater.francois_garrison, (50e3, 10.0, 35.0, 0.0, 10.0), "pH 10 is outside 7.7 to 8.3"),
         (seawater.ainslie_mccolm, (50e3, 10.0, 35.0, 0.0, 7.0), "pH 7"),
     ],
 )

@@ -105,9 +105,12 @@ FRANCOIS_GARRISON: Final = Range(
         "frequency": (0.0, 1e6, "Hz"),
         "temperature": (-2.0, 30.0, "degC"),
         "salinity": (30.0, 40.0, "psu"),
+        "ph": (7.7, 8.3, ""),
         "depth": (0.0, 10e3, "m"),
     },
 )
+"""The authors say "all oceanic conditions": the pH is that of Ainslie and McColm. At 10 boric acid absorbs 30 times as
+much as at 8.1."""
 AINSLIE_MCCOLM: Final = Range(
     "Ainslie and McColm (1998)",
     {

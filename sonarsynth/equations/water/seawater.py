@@ -186,11 +186,11 @@ def francois_garrison(
 
     Boric acid, magnesium sulphate and pure water. From 200 Hz (below, absorption is under 1e-5 dB/m) to 1 MHz; the 5 %
     are stated for -2 to 22 degC, 30 to 35 psu, 3500 m in 10 to 500 kHz and for 0 to 30 degC, 0 to 40 psu above; it
-    warns outside -2 to 30 degC, 30 to 40 psu, 0 to 10 km.
+    warns outside -2 to 30 degC, 30 to 40 psu, pH 7.7 to 8.3, 0 to 10 km.
     """
     f, t, s, z = (np.asarray(x, float) for x in (frequency, temperature, salinity, depth))
     acid = np.asarray(ph, float)
-    formula_ranges.FRANCOIS_GARRISON.check(frequency=f, temperature=t, salinity=s, depth=z)
+    formula_ranges.FRANCOIS_GARRISON.check(frequency=f, temperature=t, salinity=s, ph=acid, depth=z)
     f = f / 1e3  # kHz
     kelvin = 273.0 + t
     c = 1412.0 + 3.21 * t + 1.19 * s + 0.0167 * z
