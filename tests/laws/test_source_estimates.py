@@ -11,13 +11,14 @@ from scipy.signal import hilbert
 from scipy.stats import chi2
 
 from sonarsynth.conventions import azimuth_elevation, direction
+from sonarsynth.environment.boundaries import Rigid, SeaSurface
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, spherical_wave, wavefront_delays
 from sonarsynth.evaluation import snap_located
 from sonarsynth.evaluation.source_estimates import as_predicted
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.labels.estimate_labels import Direct, emissions
-from sonarsynth.planning.notes.source_notes import locator, off_the_bottom, standing_off
+from sonarsynth.planning.notes.source_notes import cancelled_by_image, locator, off_the_bottom, standing_off
 from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.ranging import SensorDelays
@@ -459,6 +460,15 @@ def test_the_plan_names_what_stands_off_the_bottom() -> None:
     above, on = (point_scene((20.0, 0.0, -50.0), (12.0, 5.0, -depth)).scene for depth in (60.0, 100.0))
     assert standing_off(above) == ("shrimp",) and standing_off(on) == ()
     assert "not on the bottom" in off_the_bottom(above)[0] and off_the_bottom(on) == []
+
+
+@pytest.mark.parametrize(("depth", "bounces", "said"), [(0.0, 1, True), (0.0, 0, False), (1.0, 1, False)])
+def test_the_plan_names_what_its_image_cancels(depth: float, bounces: int, said: bool) -> None:
+    recipe = point_scene((20.0, 0.0, -50.0), (12.0, 5.0, -depth))
+    scene = replace(recipe.scene, physics=replace(recipe.scene.physics, tracing=AutoTracing(bounces=bounces)))
+    assert any("cancels it" in line for line in cancelled_by_image(scene)) == said
+    rigid = replace(scene.world.environment, surface=SeaSurface(reflection=Rigid()))
+    assert cancelled_by_image(replace(scene, world=replace(scene.world, environment=rigid))) == []
 
 
 @pytest.mark.parametrize(("height", "bounces", "on"), [(0.0, 1, True), (0.05, 0, True), (0.05, 1, False)])

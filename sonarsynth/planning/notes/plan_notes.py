@@ -18,6 +18,7 @@ from sonarsynth.planning.notes.motion_rows import stretch_notes
 from sonarsynth.planning.notes.population_notes import once, population_notes
 from sonarsynth.planning.notes.source_notes import (
     assumed_speed_notes,
+    cancelled_by_image,
     direction_notes,
     lobe_notes,
     off_the_bottom,
@@ -78,7 +79,8 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     if plan.products & OF_BEAMS:
         lines += view_notes(noted(looks)) + steering_notes(noted(looks))
         lines += stretch_notes(noted(looks), recipe.accuracy.range_m)
-    lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene) + converter_notes(plan, looks)
+    lines += lost_echoes(plan) + _accuracy(plan, looks) + off_the_bottom(scene) + cancelled_by_image(scene)
+    lines += converter_notes(plan, looks)
     lines += out_of_band(scene) + unheard_scatterers(plan)
     if plan.sizes["emission"] and plan.products & OF_BEAMS:
         some = noted(looks)

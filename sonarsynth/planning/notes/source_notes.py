@@ -9,7 +9,9 @@ from scipy.fft import irfft
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description.method import Demand
+from sonarsynth.environment.boundary_numbers import rms_height
 from sonarsynth.equations.arrays.grating_lobes import loudest_lobe
+from sonarsynth.equations.rays.ray_solutions import TOLERANCE
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Plan
@@ -63,6 +65,24 @@ def off_the_bottom(scene: Scene) -> list[str]:
     """Which sources the sonar does not find where it may look for them."""
     names, note = standing_off(scene), scene.processing.locating.off_bottom_note()
     return [f"{', '.join(names)}: not on the bottom; {note}"] if names and note else []
+
+
+def cancelled_by_image(scene: Scene) -> list[str]:
+    """Which sources are cancelled by their image in the smooth boundary that they lie on, as at the surface: but for
+    paths whose partner by the image has one reflection more than is followed."""
+    environment, start, bounces = scene.world.environment, scene.trajectory.start, scene.physics.tracing.bounces
+    names = []
+    for boundary, z in ((environment.surface, 0.0), (environment.bottom, -environment.depth)):
+        value = boundary.reflection.coefficient(np.array([0.25 * np.pi]))[0]
+        if bounces and rms_height(boundary) == 0.0 and abs(1.0 + value) < 1e-9:
+            alike = [source for source in scene.sources if source.directivity(start) is None]
+            up = [float(source.position_at(environment.depth, start)[2]) for source in alike]
+            names += [source.name for source, at in zip(alike, up, strict=True) if abs(at - z) <= TOLERANCE]
+    line = (
+        "its image in the boundary that it lies on cancels it: of what is heard, the image has one reflection more "
+        f"than are followed (scene.physics.tracing.bounces: {bounces})"
+    )
+    return [f"{', '.join(names)}: {line}"] if names else []
 
 
 def unlit(plan: Plan) -> list[str]:
