@@ -18,7 +18,17 @@ from sonarsynth.cli.authoring.init_command import init
 from sonarsynth.cli.authoring.notebooks_command import notebooks
 from sonarsynth.cli.authoring.preview_command import preview
 from sonarsynth.cli.export_command import export
-from sonarsynth.cli.options import Insecure, Json, RecipeFile, Scheduler, Settings, Store, Workers, worker_bounds
+from sonarsynth.cli.options import (
+    Insecure,
+    Json,
+    RecipeFile,
+    Scheduler,
+    Settings,
+    Store,
+    Workers,
+    outside_stores,
+    worker_bounds,
+)
 from sonarsynth.cli.rays_command import rays
 from sonarsynth.cli.repair_command import repair
 from sonarsynth.cli.running import run
@@ -44,7 +54,9 @@ app = typer.Typer(
 
 Products = Annotated[
     str,
-    typer.Option(metavar="LIST", help="Stored besides truth: signals, image, cloud, beams, paths; 'truth': no more."),
+    typer.Option(
+        metavar="LIST", help="Stored besides truth: signals, image, cloud, beams, range_image, paths; 'truth': no more."
+    ),
 ]
 Scale = Literal["common", "frame"]
 ALL_PRODUCTS = "signals,image,cloud"
@@ -213,7 +225,10 @@ def show(
         list[str], typer.Argument(metavar="STORE...", help="One store, or up to four to compare.", show_default=False)
     ],
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Where to. Default: <store>.pictures, <a>-<b>.pictures.")
+        Path | None,
+        typer.Option(
+            callback=outside_stores, metavar="FOLDER", help="Where to. Default: <store>.pictures, <a>-<b>.pictures."
+        ),
     ] = None,
     frame: Annotated[
         int | None, typer.Option(min=0, help="The frame of the sheet. Default: the frame with most points.")
@@ -249,7 +264,9 @@ app.command("target-strength")(target_strength)
 @app.command()
 def snap(
     recipe: RecipeFile,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write the picture.")] = Path("snap.png"),
+    out: Annotated[
+        Path, typer.Option(callback=outside_stores, metavar="FILE", help="Where to write the picture.")
+    ] = Path("snap.png"),
     compare: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="A recording (WAV, CSV, HDF5) of a snap to compare the model with."),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from sonarsynth.cli.options import Json, Settings, check_folder
+from sonarsynth.cli.options import Json, Settings, check_folder, outside_stores
 from sonarsynth.cli.running import BadOption
 
 if TYPE_CHECKING:
@@ -50,9 +50,9 @@ def accuracy(
     peers: Annotated[
         bool, typer.Option(help="Also run other programs for comparison: the thesis's loop, FINUFFT, Acoular.")
     ] = True,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the table and the picture.")] = Path(
-        "accuracy"
-    ),
+    out: Annotated[
+        Path, typer.Option(callback=outside_stores, metavar="FOLDER", help="Where to write the table and the picture.")
+    ] = Path("accuracy"),
     as_json: Json = False,
 ) -> None:
     """Measure errors against slow, exact computations, and run times; exits 1 if any error exceeds its bound.

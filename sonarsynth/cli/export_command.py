@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sonarsynth.cli.options import Settings
+from sonarsynth.cli.options import Settings, outside_stores
 from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import frame_numbers
 
@@ -26,7 +26,10 @@ def export(
         str, typer.Argument(metavar="STORE", help="The store, or for bellhop the recipe.", show_default=False)
     ],
     folder: Annotated[
-        Path | None, typer.Argument(metavar="[DIR]", help="Where to write: the same as --out.", show_default=False)
+        Path | None,
+        typer.Argument(
+            callback=outside_stores, metavar="[DIR]", help="Where to write: the same as --out.", show_default=False
+        ),
     ] = None,
     to: Annotated[
         str,
@@ -39,7 +42,9 @@ def export(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Where to write: a file of points, else a folder. Default: beside the store."
+            callback=outside_stores,
+            metavar="FILE",
+            help="Where to write: a file of points, else a folder. Default: beside the store.",
         ),
     ] = None,
     frames: Annotated[

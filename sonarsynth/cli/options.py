@@ -61,6 +61,15 @@ def worker_bounds(
     return {"frame_timeout": timeout, "worker_memory": None if memory_gb is None else int(memory_gb * 1e9)}
 
 
+def outside_stores(out: Any) -> Any:
+    """Where to write, as it is given. Raises BadOption for a place in a store, which takes no other files."""
+    from sonarsynth.store import store_around
+
+    if out is not None and (around := store_around(str(out) + "/_")) is not None:  # itself a store, or in one
+        raise BadOption(f"--out: {out} is in the store {around}, which takes no other files: choose another place")
+    return out
+
+
 def check_folder(out: Path | None) -> None:
     """Raise BadOption where --out, a folder that is to be written, is a file or in one: before anything is computed."""
     for place in () if out is None else (out, *out.parents):

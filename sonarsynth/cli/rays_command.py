@@ -7,14 +7,17 @@ from typing import Annotated
 
 import typer
 
-from sonarsynth.cli.options import RecipeFile, Settings
+from sonarsynth.cli.options import RecipeFile, Settings, outside_stores
 from sonarsynth.cli.running import BadOption
 
 
 def rays(
     recipe: RecipeFile,
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Where to write the pictures. Default: <recipe>.rays.")
+        Path | None,
+        typer.Option(
+            callback=outside_stores, metavar="FOLDER", help="Where to write the pictures. Default: <recipe>.rays."
+        ),
     ] = None,
     frame: Annotated[int, typer.Option(min=0, help="The frame to trace.")] = 0,
     compare: Annotated[

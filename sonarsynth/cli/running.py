@@ -31,6 +31,8 @@ STATUS = (
 """Of errors that say all there is to say, by name: what raises them may not be imported yet."""
 BAD_PLACE = FileNotFoundError, PermissionError, NotADirectoryError, IsADirectoryError, FileExistsError
 """What the system says of a place that a command was given and cannot use."""
+UNUSABLE = errno.ELOOP, errno.ENAMETOOLONG
+"""The same, of errors without a class: a link in a store or in a circle, a name that is too long."""
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -92,7 +94,7 @@ def _explain(error: Exception, shown: bool) -> int:
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""
         what = "is a file, and a folder is needed" if isinstance(error, FileExistsError) else error.strerror
-        given = isinstance(error, BAD_PLACE) or error.errno == errno.ELOOP  # a link in a store, or in a circle
+        given = isinstance(error, BAD_PLACE) or error.errno in UNUSABLE
         return _say(f"{file}{what}", INPUT if given else OURS)
     if isinstance(error, KeyError) and (lacks := LACKS.search(str(error))):
         return _say(f"the store has no {lacks[1]}: another version wrote it, or another program", INPUT)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from sonarsynth.cli.options import Json, Settings
+from sonarsynth.cli.options import Json, Settings, outside_stores
 from sonarsynth.cli.running import BadOption
 
 SHORTEST, LONGEST = 0.05, 120.0
@@ -20,7 +20,9 @@ def soundscape(
         str, typer.Argument(metavar="RECIPE|STORE", help="A recipe (YAML), or a store.", show_default=False)
     ],
     *,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write the picture.")] = Path("soundscape.png"),
+    out: Annotated[
+        Path, typer.Option(callback=outside_stores, metavar="FILE", help="Where to write the picture.")
+    ] = Path("soundscape.png"),
     seconds: Annotated[float, typer.Option(metavar="S", help="Of a recipe's sound that is made.")] = 2.0,
     compare: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A recording of the sea (WAV, HDF5) to put beside it.")

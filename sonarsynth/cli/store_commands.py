@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sonarsynth.cli.options import Json, Split, Store
+from sonarsynth.cli.options import Json, Split, Store, outside_stores
 from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import described
 
@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 def card(
     store: Store,
     out: Annotated[
-        str | None, typer.Option(metavar="FOLDER", help="Where to write the two files. Default: beside the store.")
+        str | None,
+        typer.Option(
+            callback=outside_stores, metavar="FOLDER", help="Where to write the two files. Default: beside the store."
+        ),
     ] = None,
 ) -> None:
     """Describe a store: a dataset card to read (Markdown), and Croissant metadata for programs; where there are images,
@@ -39,7 +42,11 @@ def report(
     store: Store,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Where to write: a file or a folder. Default: <store>.report.html."),
+        typer.Option(
+            callback=outside_stores,
+            metavar="FILE",
+            help="Where to write: a file or a folder. Default: <store>.report.html.",
+        ),
     ] = None,
 ) -> None:
     """Write a page about a store: film, contents by split, leaks between splits, errors, baselines, hardest frames."""
@@ -62,7 +69,12 @@ def detect(
     split: Split = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Where to write. Default: <store>.<method>.json.", show_default=False),
+        typer.Option(
+            callback=outside_stores,
+            metavar="FILE",
+            help="Where to write. Default: <store>.<method>.json.",
+            show_default=False,
+        ),
     ] = None,
 ) -> None:
     """Run a baseline detector on the images of a store: boxes, scores, ranges as JSON, the results format of COCO."""

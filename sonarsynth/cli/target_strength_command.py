@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from sonarsynth.cli.options import Json, check_folder
+from sonarsynth.cli.options import Json, check_folder, outside_stores
 from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import described
 
@@ -44,9 +44,9 @@ def target_strength(
     unit: Annotated[
         str, typer.Option(metavar="UNIT", help="Unit of the mesh file's coordinates: m, cm, mm, in, ft, or auto.")
     ] = "auto",
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the table and the picture.")] = Path(
-        "target_strength"
-    ),
+    out: Annotated[
+        Path, typer.Option(callback=outside_stores, metavar="FOLDER", help="Where to write the table and the picture.")
+    ] = Path("target_strength"),
     as_json: Json = False,
 ) -> None:
     """Monostatic target strength over aspect and frequency, in dB re 1 m2: a table (CSV) and a polar plot."""

@@ -14,7 +14,7 @@ from sonarsynth.detection.detection_method import DetectionMethod, Region, detec
 from sonarsynth.detection.detections import Detections, from_rows, read
 from sonarsynth.detection.image_peaks import ImagePeaks
 from sonarsynth.detection.sonar_view import SonarView, beam_width, beam_widths, views
-from sonarsynth.store import chosen_frames, open_store
+from sonarsynth.store import chosen_frames, tree_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,10 +65,12 @@ def detect(
     ------
     FieldError for a store without images, an unknown method or a split that the store has not.
     """
-    tree = open_store(store) if isinstance(store, str | Path) else store
+    tree = tree_of(store)
     if "image" not in tree.children:
         raise FieldError(("image",), "the store has no images: it was built without that product")
     chosen = by_kind(method) if isinstance(method, str) else method
+    if isinstance(chosen, type) or not hasattr(chosen, "regions"):
+        raise TypeError(f"method must be a kind such as 'peaks', or a method such as ImagePeaks(), not {chosen!r:.60}")
     frames = chosen_frames(tree, split)
     rows = []
     for done, (frame, view) in enumerate(views(tree, frames), 1):

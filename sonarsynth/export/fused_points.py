@@ -11,7 +11,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description import FieldError
 from sonarsynth.geometry import Pose, rotation_matrix, turned
-from sonarsynth.store import open_store, some_frames
+from sonarsynth.store import some_frames, tree_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +49,7 @@ def points(
     """
     import xarray as xr
 
-    tree = store if isinstance(store, xr.DataTree) else open_store(store)
+    tree = tree_of(store)
     if "cloud" not in tree.children:
         raise FieldError(("cloud",), "the store has no cloud: it was built without that product")
     for group, variable in NEEDED:

@@ -84,8 +84,10 @@ def measure(
 
     Raises
     ------
-    FieldError as `plan` does.
+    FieldError as `plan` does, IndexError for a frame that is not there, ValueError for no hydrophone.
     """
+    if hydrophones is not None and hydrophones < 1:
+        raise ValueError(f"hydrophones must be 1 or more, not {hydrophones}")
     say("planning")
     plan = plan_of(recipe)
     if seed is not None:

@@ -63,6 +63,8 @@ def with_sources(
     whose recipe cannot be followed.
     """
     resolved = _planned(dataset, products, files).at(frame)
+    if not isinstance(sources, Iterable):
+        raise TypeError(f"sources must be several, such as [SnappingShrimp(...)], not one {type(sources).__name__}")
     choices = [of if isinstance(of, tuple) else (of,) for of in sources]
     plans = [plan_with(resolved, frame, of) for of in choices]
     frames = [of.frame(frame) for of in plans]
@@ -90,6 +92,9 @@ def _planned(dataset: xr.DataTree | Recipe | Plan, products: Iterable[str] | Non
         return dataset if chosen == dataset.products else _plan_of(dataset.recipe, chosen, dataset.choices)
     if isinstance(dataset, Recipe):
         return _plan_of(dataset, chosen_products(PRODUCTS if products is None else products), None)
+    if not hasattr(dataset, "attrs"):
+        kind = type(dataset).__name__
+        raise TypeError(f"sources are moved in a store as sonarsynth.open gives it, a recipe or a plan, not a {kind}")
     attrs = {str(name): value for name, value in dataset.attrs.items()}
     try:
         chosen = chosen_products(attrs["products"] if products is None else products)

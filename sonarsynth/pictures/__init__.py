@@ -67,10 +67,11 @@ def show(
 
     Raises
     ------
-    NothingToDraw, a ValueError, where there is no store, or not that frame.
+    NothingToDraw, a ValueError, where there is no store, or not that frame; ValueError for another scale.
     """
-    path = folder_of(store)
-    tree = opened(path)
+    if scale not in ("common", "frame"):
+        raise ValueError(f"scale must be 'common' or 'frame', not {scale!r}")
+    tree = opened(path := folder_of(store))
     frames = built(tree)
     if not len(frames):
         say(summary(tree, path))

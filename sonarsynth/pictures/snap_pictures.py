@@ -10,7 +10,7 @@ from sonarsynth.equations.bubble.pulses import Pulse
 from sonarsynth.pictures.figures.snap_comparison import SnapComparison, compare_snaps
 from sonarsynth.pictures.figures.snap_figure import snap_figure
 from sonarsynth.pictures.figures.style import save
-from sonarsynth.recipe import Recipe
+from sonarsynth.recipe import Recipe, must_be_recipe
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.sources.recordings import RecordedSnap, RecordingError, read_recording
 
@@ -41,6 +41,7 @@ def snap(recipe: Recipe, out: Path | str = "snap.png", compare: Path | str | Non
 
 def draw_snap(recipe: Recipe, out: Path, compare: Path | str | None = None) -> tuple[Path, SnapComparison | None]:
     """As `snap`; the file and the comparison."""
+    must_be_recipe(recipe, "drawn")
     sources = recipe.scene.world.sources
     if not sources:
         raise FieldError(("scene", "world", "sources"), "is empty: there is no snap to draw")

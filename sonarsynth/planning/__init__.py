@@ -22,7 +22,7 @@ from sonarsynth.planning.notes.scene_checks import check_frame, read_inputs
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan, Windows
 from sonarsynth.receiver import elements
-from sonarsynth.recipe import Recipe
+from sonarsynth.recipe import Recipe, must_be_recipe
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.recipe.sequence_checks import check_spanned, most_emissions
 from sonarsynth.threads import in_one_thread
@@ -83,8 +83,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
     snap that cannot be made, a missing or broken file, or methods that cannot serve the scene; ValueError for an
     unknown product.
     """
-    if not isinstance(recipe, Recipe):
-        raise TypeError(f"a recipe is planned, not a {type(recipe).__name__}: sonarsynth.load reads one from a file")
+    must_be_recipe(recipe, "planned")
     products = chosen_products(products)
     check_spanned(recipe.spanned)
     with recipe.spanned.naming(0):

@@ -118,7 +118,8 @@ class Recipe:
         return int(self.spanned.steps[sequence])
 
     def sequence(self, index: int) -> int:
-        """Which sequence a frame is of. Raises IndexError for a frame that is not there."""
+        """Which sequence a frame is of. Raises IndexError for a frame that is not there, TypeError for no number."""
+        _must_be_whole(index)
         if not 0 <= index < self.frames:
             raise IndexError(f"frame {index} is outside 0..{self.frames - 1}")
         return int(np.searchsorted(self.spanned.first_frames, index, side="right")) - 1
@@ -189,6 +190,17 @@ class Recipe:
         meshes = {name: [mesh.digest for mesh in variants] for name, variants in self.meshes.items()}
         text = json.dumps([_by_content(deciding), meshes], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _must_be_whole(index: object) -> None:
+    if not isinstance(index, int | np.integer) or isinstance(index, bool):
+        raise TypeError(f"a frame is a whole number, not {index!r}")
+
+
+def must_be_recipe(given: object, what: str) -> None:
+    """Raise TypeError for what is no recipe, such as the path of one; what: is done with it, in a word."""
+    if not isinstance(given, Recipe):
+        raise TypeError(f"a recipe is {what}, not a {type(given).__name__}: sonarsynth.load reads one from a file")
 
 
 def _by_content(value: Any) -> Any:

@@ -11,7 +11,10 @@ from pydantic_core import ErrorDetails
 from sonarsynth.conventions import UNITS
 from sonarsynth.description import unknown
 from sonarsynth.recipe.variation.values import Where
-from sonarsynth.targets.target import NAME
+from sonarsynth.targets.target import CATEGORY, NAME
+
+ALLOWED = {NAME: "letters, digits, hyphens and underscores", CATEGORY: "letters, digits and _.+-"}
+"""What names may be made of."""
 
 
 def error_path(details: ErrorDetails, data: Any) -> Where:
@@ -51,8 +54,8 @@ def _text(details: ErrorDetails) -> str:
             return str(context["error"])
         case "dataclass_type" | "dict_type" | "model_attributes_type":
             return f"must be a mapping of fields, not {value}"
-        case "string_pattern_mismatch" if context["pattern"] == NAME:
-            return f"must be letters, digits, hyphens and underscores, a letter first, not {value}"
+        case "string_pattern_mismatch" if context["pattern"] in ALLOWED:
+            return f"must be at most 64 {ALLOWED[context['pattern']]}, a letter first, not {value}"
         case "tuple_type" | "list_type":
             return f"must be a list, not {value}"
         case "too_long":

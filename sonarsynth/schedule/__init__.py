@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, fields, replace
 from typing import Final
 
+import numpy as np
+
 from sonarsynth import planning, store
 from sonarsynth.conventions import Progress, format_bytes
 from sonarsynth.description.memory import free_bytes
@@ -31,7 +33,7 @@ def build(
     recipe: Recipe | Plan,
     path: Folder | str,
     *,
-    frames: Iterable[int] | None = None,
+    frames: int | Iterable[int] | None = None,
     products: Iterable[str] = PRODUCTS,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -60,7 +62,7 @@ def build(
     ----------
     recipe: a recipe, or the plan of one.
     path: folder of the store, or a URL that fsspec knows, such as s3://bucket/remus.zarr.
-    frames: numbers of the frames (default: all).
+    frames: numbers of the frames, one or several, or a mask (frame,) (default: all).
     products: of signals, image and cloud, those that are stored; a plan has its own.
     workers: processes on this machine (default: one a usable core, and none for a single shard of a few seconds' work
         that no other option is for; 0: in this process).
@@ -87,14 +89,15 @@ def build(
     FieldError for a scene that cannot be, IndexError for frames that are not there, store.Mismatch for a store of
     something else, store.StoreLocked while another build runs, store.Damage where the store cannot go on, TooLarge
     where `agreed` is needed, OSError where it cannot be written or the scheduler is gone, store.Unreachable for a URL
-    that cannot be used, RuntimeError where workers do not start, ValueError for options that cannot be. After any of
-    these, and after an interruption, the same call resumes where it ended.
+    that cannot be used, RuntimeError where workers do not start, ValueError for options that cannot be, TypeError for
+    frames and workers that are no whole numbers. After any of these, and after an interruption, the same call resumes
+    where it ended.
     """
     plan = recipe if isinstance(recipe, Plan) else planning.plan(recipe, chosen_products(products))
     _check(workers, scheduler, frame_timeout, worker_memory, insecure)
     _check_memory(plan, scheduler, workers, worker_memory, agreed)
-    path = reachable_by_workers(store.absolute(path), workers)
-    chosen = range(plan.recipe.frames) if frames is None else sorted(set(frames))
+    path, count = _place(path, workers), plan.recipe.frames
+    chosen = range(count) if frames is None else sorted(set(store.frame_numbers(frames, count)))
     if not path.exists() and not agreed:
         check_space(path, _room(plan, len(chosen)))
     report = BuildReport(str(path), plan.recipe.frames, len(chosen), 0)
@@ -124,6 +127,14 @@ def build(
             )  # fmt: skip
         _describe(path, report, prediction)
     return report
+
+
+def _place(path: Folder | str, workers: int | None) -> Folder:
+    """Where the store is. Raises Mismatch for a place in another store, which would be damaged by it."""
+    place = reachable_by_workers(store.absolute(path), workers)
+    if (around := store.store_around(place)) is not None:
+        raise Mismatch(f"{place} is in the store {around}: choose another path")
+    return place
 
 
 def _describe(path: Folder, report: BuildReport, prediction: Prediction | None) -> None:
@@ -182,6 +193,8 @@ def _check(
     insecure: bool,
 ) -> None:
     """Raise ValueError for options that cannot be."""
+    if workers is not None and not isinstance(workers, int | np.integer):
+        raise TypeError(f"workers must be a whole number, not {workers!r}")
     if workers is not None and workers < 0:
         raise ValueError(f"workers must be 0 or more, not {workers}")
     if frame_timeout is not None and not 0 <= frame_timeout < float("inf"):

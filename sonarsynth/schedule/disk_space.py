@@ -24,6 +24,9 @@ FULL: Final = {
 }
 """Errors of a disk that takes no more."""
 
+MENDED_BY: Final = {errno.EROFS: "make it writable", errno.EFBIG: "raise the limit of the shell (ulimit -f)"}
+"""What helps, where that is not space."""
+
 
 class TooLarge(ValueError):
     """A build needs more than is free, or very much, and nobody agreed to it; str() is one line."""
@@ -74,5 +77,6 @@ def told_when_full(path: Folder, needed: Callable[[], DiskRoom]) -> Iterator[Non
         lacking = f"up to {format_bytes(more.bytes)} more are needed, {format_bytes(free.bytes)} are free"
         if more.files > free.files:
             lacking = f"up to {more.files:.0f} more files and folders are needed, {free.files:.0f} more fit"
-        line = f"{FULL[error.errno]}: {lacking}; free some space and run the same command again to resume"
+        mend = MENDED_BY.get(error.errno, "free some space")
+        line = f"{FULL[error.errno]}: {lacking}; {mend} and run the same command again to resume"
         raise OSError(error.errno, line, os.fspath(path)) from error

@@ -17,10 +17,13 @@ from sonarsynth.store.marks import Damage, Mark
 from sonarsynth.store.opening import (
     built_frames,
     chosen_frames,
+    frame_numbers,
     open_store,
     root_attributes,
     some_frames,
     splits_of,
+    store_around,
+    tree_of,
 )
 
 if TYPE_CHECKING:
@@ -57,6 +60,7 @@ __all__ = [
     "create",
     "examine",
     "folder_of",
+    "frame_numbers",
     "frames_there",
     "here",
     "layout_of",
@@ -70,6 +74,8 @@ __all__ = [
     "shared_lock",
     "some_frames",
     "splits_of",
+    "store_around",
+    "tree_of",
     "try_writing",
     "verify",
     "write_shard",

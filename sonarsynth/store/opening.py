@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,9 +13,10 @@ import numpy as np
 from sonarsynth.conventions import FORMAT_VERSION
 from sonarsynth.description import FieldError
 from sonarsynth.products import SPLITS
-from sonarsynth.store.files.place import Folder, Opened, absolute, read_json, record, there
+from sonarsynth.store.files.place import Folder, Opened, absolute, folder_of, read_json, record, there
+from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import Mismatch
-from sonarsynth.store.marks import Damage, load_layout, warn_unmarked
+from sonarsynth.store.marks import MARKS, Damage, load_layout, warn_unmarked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -94,6 +97,20 @@ def open_store(path: Folder | str) -> xr.DataTree:
     return tree
 
 
+def store_around(place: Folder | str) -> Path | None:
+    """The store that a place is in: it takes no other files, which `verify` calls damage. None of another place."""
+    folder = folder_of(place)
+    above = () if isinstance(folder, Remote) else Path(os.path.realpath(folder)).parents
+    return next((of for of in above if (of / MARKS).is_dir()), None)
+
+
+def tree_of(store: Folder | str | xr.DataTree) -> xr.DataTree:
+    """The tree of a store: as it is, or opened. Raises as `open_store`."""
+    import xarray as xr
+
+    return store if isinstance(store, xr.DataTree) else open_store(store)
+
+
 def built_frames(tree: xr.DataTree) -> np.ndarray:
     """Numbers (frame,) of the frames of a tree that were built: the others read as NaN and -1."""
     return np.flatnonzero(np.isfinite(np.asarray(tree["truth/sonar_position"].values)[:, 0]))
@@ -106,8 +123,13 @@ def some_frames(tree: xr.DataTree, frames: int | Iterable[int] | None) -> list[i
     """
     if frames is None:
         return [int(frame) for frame in built_frames(tree)]
+    return frame_numbers(frames, tree["truth"].sizes["frame"])
+
+
+def frame_numbers(frames: int | Iterable[int], count: int) -> list[int]:
+    """Numbers of frames, of `count`: one, several, or those of a mask (frame,). Raises as `some_frames`."""
     listed = list(frames) if isinstance(frames, Iterable) and not hasattr(frames, "__array__") else frames
-    chosen, count = np.atleast_1d(np.asarray(listed)), tree["truth"].sizes["frame"]
+    chosen = np.atleast_1d(np.asarray(listed))
     if chosen.dtype == bool and chosen.shape != (count,):
         raise IndexError(f"a mask of {chosen.size} frames, where there are {count}")
     numbers = np.flatnonzero(chosen) if chosen.dtype == bool else chosen

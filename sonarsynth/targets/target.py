@@ -20,7 +20,8 @@ NO_CATEGORY = "target"
 """What targets are called that are called nothing else."""
 NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,63}$"
 Name = Annotated[str, StringConstraints(pattern=NAME)]
-Category = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_.+-]{0,63}$")]
+CATEGORY = r"^[A-Za-z][A-Za-z0-9_.+-]{0,63}$"
+Category = Annotated[str, StringConstraints(pattern=CATEGORY)]
 Scale = Annotated[Number, Ge(1e-3), Le(1e3)]
 
 

@@ -60,7 +60,9 @@ def target_strength(
     ValueError (MeshError for a mesh) in one line for what is no target, frequency, direction or sound speed.
     """
     own = target.scattering if isinstance(target, Target) else None
-    law = scattering or own or Kirchhoff()
+    law = (own or Kirchhoff()) if scattering is None else scattering
+    if not hasattr(law, "coherent"):
+        raise ValueError(f"scattering must be a law such as Kirchhoff(), not {law!r:.60}")
     k, going, away = _checked(frequency, incident, scattered, sound_speed)
     shape = np.broadcast_shapes(k.shape, going.shape[:-1], away.shape[:-1])
     if 0 in shape:

@@ -8,13 +8,16 @@ from typing import Annotated
 
 import typer
 
-from sonarsynth.cli.options import Json, RecipeFile, Settings
+from sonarsynth.cli.options import Json, RecipeFile, Settings, outside_stores
 
 
 def preview(
     recipe: RecipeFile,
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Where to write the pictures. Default: <recipe>.preview.")
+        Path | None,
+        typer.Option(
+            callback=outside_stores, metavar="FOLDER", help="Where to write the pictures. Default: <recipe>.preview."
+        ),
     ] = None,
     sequences: Annotated[int, typer.Option(min=1, metavar="N", help="Look at so many sequences at most.")] = 1000,
     settings: Settings = [],  # noqa: B006 - typer copies it

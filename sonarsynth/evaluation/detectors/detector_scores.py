@@ -25,7 +25,7 @@ from sonarsynth.evaluation.detectors.matching import (
     threshold_at,
 )
 from sonarsynth.evaluation.detectors.true_objects import TrueObjects, as_detections, category_names, true_objects
-from sonarsynth.store import chosen_frames, open_store
+from sonarsynth.store import chosen_frames, tree_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -177,7 +177,7 @@ def evaluate(
     FieldError for a split or a category that the store has not, or a frame that was not built; DetectionsError for a
     file that cannot be read, TypeError for what is neither.
     """
-    tree = open_store(store) if isinstance(store, str | Path) else store
+    tree = tree_of(store)
     frames = chosen_frames(tree, split)
     objects = true_objects(tree, frames)
     file = "detections" if detections == TRUTH or not isinstance(detections, str | Path) else str(detections)

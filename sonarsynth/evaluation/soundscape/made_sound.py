@@ -10,6 +10,7 @@ from sonarsynth.conventions import depth
 from sonarsynth.evaluation.soundscape.sound import (
     BLOCK,
     FEWEST_BLOCKS,
+    LEAST_SECONDS,
     MOST_SAMPLES,
     ArrivalElevations,
     NothingHeard,
@@ -47,6 +48,8 @@ def listening_plan(recipe: Recipe, seconds: float = 1.0) -> Plan:
         )
     array = elements(sonar.array)
     used = listeners(array, np.ones(array.count, bool))
+    if not seconds >= LEAST_SECONDS:
+        raise NothingHeard(f"{seconds:g} s are too short to measure: make {LEAST_SECONDS:g} s at least")
     if (total := seconds * sonar.sampling_frequency * len(used)) > MOST_SAMPLES:
         raise NothingHeard(
             f"{seconds:g} s at {len(used)} hydrophones are {total:.3g} samples, more than {MOST_SAMPLES:.3g}: make less"

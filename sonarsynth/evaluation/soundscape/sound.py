@@ -17,6 +17,7 @@ SHORTEST = 64
 """Samples of a block, at least."""
 BLOCK, FEWEST_BLOCKS = 0.1, 8
 """s: of a block of running sound, or less, so that there are so many at least."""
+LEAST_SECONDS = 0.05
 MOST_SAMPLES = 1 << 28
 """Of all hydrophones together: 1 GiB."""
 ALONG = 0.97

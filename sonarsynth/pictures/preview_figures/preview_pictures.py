@@ -17,7 +17,7 @@ from sonarsynth.pictures.preview_figures.overview_figure import Overview, overvi
 from sonarsynth.pictures.ray_figures.scene_geometry import scene_geometry
 from sonarsynth.planning.notes.scene_checks import read_inputs
 from sonarsynth.products import SPLITS
-from sonarsynth.recipe import Recipe
+from sonarsynth.recipe import Recipe, must_be_recipe
 from sonarsynth.recipe.sampled_geometry import SEQUENCES, frame_of, sample_geometry
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.store.files.place import write_atomically
@@ -45,7 +45,7 @@ def preview(recipe: Recipe, out: Path | str = "preview", sequences: int = SEQUEN
 
     Raises
     ------
-    FieldError for a scene that cannot be.
+    FieldError for a scene that cannot be, ValueError for fewer than one sequence.
     """
     return draw_preview(recipe, Path(out), sequences)[0]
 
@@ -57,6 +57,9 @@ def draw_preview(
 
     Scenes are those of the first, the middle and the last sequence. Raises FieldError.
     """
+    must_be_recipe(recipe, "drawn")
+    if sequences < 1:
+        raise ValueError(f"sequences must be 1 or more, not {sequences}")
     read_inputs(recipe.scene_of(0))
     sampled = sample_geometry(recipe, sequences, progress)
     value = sampled.as_json()

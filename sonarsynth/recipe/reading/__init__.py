@@ -19,7 +19,7 @@ from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml import YAML
 
 from sonarsynth.description import FieldError
-from sonarsynth.recipe import FILE_KINDS, Recipe
+from sonarsynth.recipe import FILE_KINDS, Recipe, must_be_recipe
 from sonarsynth.recipe.reading.json_schema import schema, schema_text
 from sonarsynth.recipe.reading.messages import explain
 from sonarsynth.recipe.reading.recipe_tables import with_tables
@@ -131,7 +131,12 @@ def dump(recipe: Recipe) -> str:
     Returns
     -------
     Text of which `loads` makes an equal recipe.
+
+    Raises
+    ------
+    TypeError for what is no recipe.
     """
+    must_be_recipe(recipe, "written")
     text = io.StringIO()
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None  # mappings and lists of plain values in one line, the rest as blocks

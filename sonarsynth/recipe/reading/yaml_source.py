@@ -81,6 +81,8 @@ def dotted(keys: Where) -> str:
 def read_file(path: Path | str) -> Source:
     """Read a recipe file. Raises RecipeError."""
     path, name = Path(path), str(path)
+    if "\n" in name:
+        raise RecipeError("recipe", "", "", "this is a text, not the path of one: sonarsynth.loads reads it")
     try:
         if not path.is_file():
             there = "is not a file" + " but a folder" * path.is_dir()
@@ -101,13 +103,16 @@ def read_file(path: Path | str) -> Source:
 
 def read_text(text: str, name: str, folder: Path) -> Source:
     """Read the text of a recipe. Raises RecipeError."""
+    if not isinstance(text, str | bytes):
+        raise TypeError(f"a recipe is read from a text, not from a {type(text).__name__}")
     node = _compose(text, name)
     if node is None:
         raise RecipeError(name, "1", "", "is empty")
     reader = _Reader(name, {})
     data = reader.value(node, ())
     if not isinstance(data, dict):
-        raise RecipeError(name, "1", "", "must be a mapping of fields (title, seed, scene, ...)")
+        given = f", not {str(data)[:40]!r}" if isinstance(data, str) else ""
+        raise RecipeError(name, "1", "", f"must be a mapping of fields (title, seed, scene, ...){given}")
     return Source(name, folder, data, reader.places, text)
 
 

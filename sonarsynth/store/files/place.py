@@ -38,12 +38,13 @@ MOST_METADATA: Final = 1 << 28
 
 
 def folder_of(address: Folder | str) -> Folder:
-    """The place that a path or a URL names; file:// is a path. Raises Unreachable for a URL that cannot be one."""
+    """The place that a path or a URL names; file:// is a path. Raises Unreachable for a bad URL, else TypeError."""
     if isinstance(address, Path | Remote):
         return address
-    if address.startswith("file://"):
-        return Path(address.removeprefix("file://"))
-    return Remote(address) if re.match(r"[A-Za-z][A-Za-z0-9+.-]*://", address) else Path(address)
+    if not isinstance(address, str):
+        raise TypeError(f"a store is named by a path or a URL, not by a {type(address).__name__}")
+    elsewhere = re.match(r"(?!file:)[A-Za-z][A-Za-z0-9+.-]*://", address)
+    return Remote(address) if elsewhere else Path(address.removeprefix("file://"))
 
 
 def absolute(address: Folder | str) -> Folder:
