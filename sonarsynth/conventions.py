@@ -115,9 +115,10 @@ class Unit:
         if bare and info.mode == "json" and not (info.context or {}).get("resolved"):
             raise ValueError(f"{value} could be {value} {self._written} or {value} {self.symbol}: write the unit")
         number = self.parse(value)
+        number = bounded(number, f" {self.symbol}") if info.mode == "json" else number
         if self.symbol == "rad" and isinstance(number, int | float) and 4.0 * np.pi < abs(number) < np.inf:
             raise ValueError(f"must be within two turns, not {number:.6g} rad: in Python angles are in radians")
-        return bounded(number, f" {self.symbol}") if info.mode == "json" else number
+        return number
 
     def write(self, value: float) -> str | float:
         """The value as a recipe (JSON) holds it: with its unit where a bare number would be refused."""

@@ -31,6 +31,8 @@ def rays(
     from sonarsynth.pictures.ray_pictures import show_rays
     from sonarsynth.recipe import reading
 
+    if compare is not None and not compare.is_file():
+        raise BadOption(f"--compare: {compare}: no such file")
     with reading.opened(recipe, settings) as made_from:
         if frame >= made_from.frames:
             raise BadOption(f"--frame {frame} is outside 0..{made_from.frames - 1}")

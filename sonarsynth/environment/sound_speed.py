@@ -100,7 +100,7 @@ class TemperatureSalinity(SpeedModel):
 
 @description
 class Cast(SpeedModel):
-    """A cast in a file, as the instrument or the archive has it: what is read is in the page on recipes.
+    """A cast in a file, as the instrument or the archive has it: what is read is in the page on casts.
 
     Depth (m or dbar) and sound speed, or temperature and salinity (or conductivity), are found by name. The down-cast
     is taken (the up-cast where there is none), without rows in the air, heave loops and missing values; a note says so.

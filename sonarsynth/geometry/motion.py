@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Literal, assert_never
 
 import numpy as np
 from annotated_types import MinLen
@@ -147,6 +147,7 @@ def pose(motion: Motion, time: float) -> Pose:
             angle = _angle(motion, time)
             position = np.array(motion.centre) + motion.radius * np.array([np.cos(angle), np.sin(angle), 0.0])
             return Pose(position, quaternion(_course(velocity(motion, time)), motion.pitch, motion.roll))
+    assert_never(motion)
 
 
 def velocity(motion: Motion, time: float) -> Floats:
@@ -171,6 +172,7 @@ def velocity(motion: Motion, time: float) -> Floats:
         case Circle():
             angle = _angle(motion, time)
             return np.asarray(motion.speed * np.array([-np.sin(angle), np.cos(angle), 0.0]))
+    assert_never(motion)
 
 
 def spin(motion: Motion, time: float) -> Floats:
@@ -190,6 +192,7 @@ def spin(motion: Motion, time: float) -> Floats:
             return np.array([0.0, 0.0, -_turn(motion, a, b) / (b.time - a.time)])
         case Still() | Line() | ConstantVelocity():
             return np.zeros(3)
+    assert_never(motion)
 
 
 @dataclass(frozen=True, eq=False)

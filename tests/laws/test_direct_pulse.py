@@ -13,6 +13,7 @@ from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.imaging import Clean, FocusedDelayAndSum
 from sonarsynth.pipeline import render
 from sonarsynth.planning import plan
+from sonarsynth.planning.measured import lost_echoes
 from sonarsynth.planning.measured.lost_echoes import losses
 from sonarsynth.products import SourceEstimates
 from sonarsynth.ranging import SensorDelays, range_profiles
@@ -261,3 +262,12 @@ def test_the_plan_says_that_images_may_have_nothing_but_what_is_left_of_the_dire
     alone = replace(ahead, scene=replace(ahead.scene, world=replace(ahead.scene.world, targets=())))
     for recipe, said in ((ahead, False), (alone, True)):
         assert any("but no echo is heard in the frames measured" in note for note in plan(recipe).warnings) == said
+
+
+@pytest.mark.parametrize(("below", "said"), [(29.0, "to 29 dB below the echoes"), (-29.0, "to 29 dB over the echoes")])
+def test_a_pulse_that_stays_louder_than_the_echoes_is_said_to_be_over_them(
+    below: float, said: str, monkeypatch: pytest.MonkeyPatch
+):
+    made = plan(overlapped((3.5, 0.2, -50.0)))
+    monkeypatch.setattr(lost_echoes, "losses", lambda *_: lost_echoes.EchoLosses(0, {}, 3.0, below))
+    assert said in lost_echoes.lost_echoes(made)[0]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sonarsynth.geometry import Pose
-from sonarsynth.geometry.motion import Circle, Motion, Track, Waypoint, Waypoints, pose, velocity
+from sonarsynth.geometry.motion import Circle, Motion, Track, Waypoint, Waypoints, pose, spin, velocity
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
@@ -239,3 +240,13 @@ def test_each_sensor_of_a_moving_array_meets_the_wavefront_when_it_is_there(u, f
                 at = sent + np.linalg.norm(track.later(at).pose.to_world(q[n]) - source) / C
             assert abs(late[n] - at) < (3e-9 if motion else 1e-10) + 2.0 * found.expansion.error[i]
     assert found.expansion.error.max() < 1e-8
+
+
+@pytest.mark.parametrize("of", [pose, velocity, spin])
+def test_a_kind_of_motion_that_a_function_does_not_know_is_named(of: Callable[[Motion, float], object]) -> None:
+    class Bobbing:
+        def __repr__(self) -> str:
+            return "Bobbing()"
+
+    with pytest.raises(AssertionError, match="Bobbing"):
+        of(Bobbing(), 0.0)  # type: ignore[arg-type]

@@ -111,3 +111,12 @@ def test_membership_is_drawn_not_laid_out() -> None:
     one, other = (splits(recipe(variations=VARIED, repeats=60, splits=asked, seed=s)) for s in (1, 2))
     assert 10 < np.sum(one != other) < 50
     assert 5 < np.sum(one[:30] == 0) < 25
+
+
+@pytest.mark.parametrize(("repeats", "empty"), [(1, ["validation", "test"]), (5, ["test"]), (10, [])])
+def test_a_split_that_no_sequence_is_in_is_said(repeats: int, empty: list[str]) -> None:
+    made = recipe(variations=VARIED, repeats=repeats, splits=Splits(train=0.7, validation=0.2, test=0.1))
+    assert [name for name, n in zip(SPLITS, np.bincount(splits(made), minlength=3), strict=True) if not n] == empty
+    notes = [note for note in plan(made, ()).warnings if note.startswith("splits: ")]
+    assert len(notes) == bool(empty)
+    assert all(f"splits: {' and '.join(empty)} will not have " in note for note in notes)

@@ -171,3 +171,22 @@ def test_no_space_is_asked_for_where_space_is_not_what_is_lacking(tmp_path: Path
     ):
         raise OSError(number, "no")
     assert "free some space" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("field", "meant"), [("frames", "scene.trajectory.frames"), ("depth", "scene.world.environment.depth")]
+)
+def test_a_field_that_is_not_at_the_root_is_found_where_it_stands(small_file: Path, field: str, meant: str) -> None:
+    with pytest.raises(
+        ss.RecipeError, match=rf"--set: {field}: '{field}' is not a field here; did you mean '{meant}'\?$"
+    ):
+        ss.load(small_file, [f"{field}=3"])
+
+
+def test_the_arrivals_to_compare_with_are_looked_for_before_anything_is_drawn(
+    small_file: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(small_file.parent)
+    assert run(cli.app, ["rays", "small.yaml", "--compare", "none.arr"]) == 2
+    assert capfd.readouterr().err == "sonarsynth: --compare: none.arr: no such file\n"
+    assert [file.name for file in Path().iterdir()] == ["small.yaml"]

@@ -38,7 +38,8 @@ def row(parameter: Any) -> tuple[str, str, str]:
     spelling = "/".join([*parameter.opts, *parameter.secondary_opts])
     takes = "" if parameter.is_flag else f" {parameter.metavar or words(parameter)}"
     silent = parameter.default in (None, False, "", []) or parameter.is_flag
-    return f"`{spelling}{takes}`", "" if silent else str(parameter.default), parameter.help or ""
+    said = parameter.show_default if isinstance(parameter.show_default, str) else ""
+    return f"`{spelling}{takes}`", said if silent else str(parameter.default), parameter.help or ""
 
 
 def words(parameter: Any) -> str:

@@ -59,8 +59,8 @@ def lost_echoes(plan: Plan) -> list[str]:
         fall, below = (min([MOST, *(getattr(row, name) for row in rows)]) for name in ("fall", "below"))
         frames = ", ".join(str(row.frame) for row in rows)
         lines.append(
-            f"the direct pulse is removed ({why}): it is reduced by {fall:.0f} dB, to {below:.0f} dB below the echoes "
-            f"in their window (measured, frame {frames})"
+            f"the direct pulse is removed ({why}): it is reduced by {fall:.0f} dB, to {abs(below):.0f} dB "
+            f"{'below' if below >= 0 else 'over'} the echoes in their window (measured, frame {frames})"
         )
     loss = "the removal of the direct pulse" if windows.direct_removed else "the echo window"
     for name in plan.recipe.target_names:

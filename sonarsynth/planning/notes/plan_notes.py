@@ -40,6 +40,7 @@ from sonarsynth.planning.notes.target_notes import (
 )
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import SUPPORT, extreme_waveforms
+from sonarsynth.products import SPLITS
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.signals.filtered_pulse import LONGEST_TAIL, cut_tail
@@ -136,7 +137,10 @@ def _shared(recipe: Recipe, looks: Sequence[SampledScene]) -> list[str]:
     """What sequences of different splits have in common, so that one tells of the other."""
     if recipe.splits is None:
         return []
-    lines = []
+    counts = np.bincount(recipe.spanned.split, minlength=len(SPLITS))
+    empty = [name for name, share, n in zip(SPLITS, recipe.splits.shares, counts, strict=True) if share and not n]
+    few = "the only sequence" if recipe.sequences == 1 else f"any of the {recipe.sequences} sequences"
+    lines = [f"splits: {' and '.join(empty)} will not have {few}: more repeats, or a grid, give more"] if empty else []
     splits_by_value: dict[str, dict[object, set[int]]] = {"target poses": {}, "snap positions": {}}
     for look in looks:
         if look.real:

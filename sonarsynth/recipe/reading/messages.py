@@ -40,10 +40,18 @@ def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
     if items[0][1] == "is required":  # which a misspelt field explains
         items.sort(key=lambda item: "did you mean" not in item[1])
     (keys, message), *others = items
+    message = _with_full_path(keys, message, source)
     lines = [source.error(*other) for other in others[: MOST_SHOWN - 1]]
     if len(items) > MOST_SHOWN:
         lines.append(RecipeError(source.name, "", "", f"and {len(items) - MOST_SHOWN} more"))
     return source.error(keys, message + _of_another_kind(keys, source), lines)
+
+
+def _with_full_path(keys: Where, message: str, source: Source) -> str:
+    """The message of a field that no recipe has at its root, with where it stands in this one, as of `frames`."""
+    places = [at for at in source.places if len(at) > 1 and at[-1] == keys[-1]] if len(keys) == 1 else []
+    said, field, _ = message.partition(" is not a field here; ")
+    return f"{said}{field}did you mean '{dotted(places[0])}'?" if field and len(places) == 1 else message
 
 
 def _of_another_kind(keys: Where, source: Source) -> str:
