@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import SupportsIndex
 
 import numpy as np
 
@@ -75,7 +76,9 @@ class Frames:
         return len(self.frames)
 
     def __getitem__(self, row: int) -> Sample:
-        """A sample. Raises IndexError."""
+        """A sample. Raises IndexError for a row that is not there, TypeError for what is no whole number."""
+        if not isinstance(row, SupportsIndex):
+            raise TypeError(f"a sample is chosen by a whole number, not by {row!r}")
         frame = int(self.frames[row])
         return self._form.sample(frame, lambda name: self._reader.array(name)[frame])
 
@@ -89,7 +92,7 @@ class RenderedFrames:
     """The frames of a recipe as an iterable dataset without a store: each is rendered when it is its turn.
 
     Samples are as those of `Frames`. They come in an order that `seed` draws; `part` = (k, n) takes each n-th from the
-    k-th on, for n processes. Raises FieldError as `Frames` and `plan` do.
+    k-th on, k from 0, for n processes. Raises FieldError as `Frames` and `plan` do, ValueError for another part.
     """
 
     collate = staticmethod(collate)
@@ -105,6 +108,8 @@ class RenderedFrames:
         seed: int = 0,
         part: tuple[int, int] = (0, 1),
     ) -> None:
+        if not 0 <= part[0] < part[1]:
+            raise ValueError(f"part must be (k, n) with k from 0 to n - 1, not {part}")
         self._form = SampleForm(image, targets, signals)
         self._plan = plan(recipe, products=self._form.products)
         candidates = np.arange(recipe.frames)

@@ -13,6 +13,7 @@ import pytest
 import sonarsynth as ss
 from sonarsynth import cli
 from sonarsynth.cli.running import run
+from sonarsynth.loading import Frames, RenderedFrames
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule import disk_space
 
@@ -190,3 +191,19 @@ def test_the_arrivals_to_compare_with_are_looked_for_before_anything_is_drawn(
     assert run(cli.app, ["rays", "small.yaml", "--compare", "none.arr"]) == 2
     assert capfd.readouterr().err == "sonarsynth: --compare: none.arr: no such file\n"
     assert [file.name for file in Path().iterdir()] == ["small.yaml"]
+
+
+def test_samples_are_chosen_by_whole_numbers_and_parts_are_counted_from_none(small: Recipe, tmp_path: Path) -> None:
+    ss.build(small, tmp_path / "s.zarr", frames=range(3), workers=0, products=["image"])
+    data = Frames(tmp_path / "s.zarr")
+    assert data[np.int64(1)]["frame"] == 1
+    for row in (slice(0, 2), "0", 1.5, None):
+        with pytest.raises(TypeError, match="a sample is chosen by a whole number, not by "):
+            data[row]  # type: ignore[index]
+    parts = np.concatenate([RenderedFrames(small, part=(k, 3)).frames for k in range(3)])
+    assert np.sort(parts).tolist() == list(range(small.frames))
+    for part in ((3, 3), (-1, 3), (0, 0)):
+        with pytest.raises(ValueError, match=r"part must be \(k, n\) with k from 0 to n - 1, not "):
+            RenderedFrames(small, part=part)
+    with pytest.raises(ValueError, match=r"frame '1' is outside 0\.\.19"):
+        ss.open(tmp_path / "s.zarr").sonar.image("1")

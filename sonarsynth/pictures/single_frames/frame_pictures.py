@@ -42,7 +42,7 @@ def cloud_picture(tree: xr.DataTree, frame: int) -> Figure:
 
 def _read(tree: xr.DataTree, frame: int) -> tuple[StoredFrame, View]:
     if frame not in range(total := tree["truth"].sizes["frame"]):
-        raise NothingToDraw(f"frame {frame} is outside 0..{total - 1}")
+        raise NothingToDraw(f"frame {frame!r} is outside 0..{total - 1}")
     if frame not in built(tree):
         raise NothingToDraw(f"frame {frame} has not been built")
     stored_frame = stored(tree, frame)
