@@ -90,8 +90,8 @@ def bins_of(
 ) -> tuple[ArrayPaths, Bins]:
     """The paths of a stretch, with the modes of their pulses, and its bins.
 
-    Errors are relative to the least blurred path. Raises FieldError for facets with corners more than `MOST_PHASE` from
-    their middle at what the filter passes.
+    Errors are relative to the least blurred path; paths that are silent beside it are left out. Raises FieldError
+    for facets with corners more than `MOST_PHASE` from their middle at what the filter passes.
     """
     fs = sonar.sampling_frequency
     frequency, spectrum = pulse_spectrum(segment.waveform, sonar.antialias, fs, segment.samples)
@@ -108,11 +108,15 @@ def bins_of(
         front, spectrum, series = _shared(front, frequency, spectrum, series, widest, tolerance)
     loud = audible(spectrum, tolerance / _coherent_gain(front))
     frequency, spectrum, series = frequency[loud], spectrum[loud], series[:, loud]
+    if front.variance.any():
+        front = _loud(front, frequency, spectrum, tolerance)
     if front.corner_delays.any():
         taken = slice(_bins_of_corners(front, frequency, sonar))
         frequency, spectrum, series = frequency[taken], spectrum[taken], series[:, taken]
     modes, variation = np.zeros((0, spectrum.size), complex), UNCHANGING
     relative = relative_absorption(absorption, frequency, sonar.band.centre)
+    if front.count > 1:
+        front = _changing(front, frequency[-1:], tolerance)
     if len(series) or _shaped(front):
         front, spectrum, modes = _with_modes(front, frequency, spectrum, relative, series, widest, tolerance)
         variation = changes(front, frequency, modes) if front.count > 1 else UNCHANGING
@@ -125,6 +129,19 @@ def _shaped(front: ArrayPaths) -> bool:
         front.variance.any() or front.phase.any() or front.corner_delays.any() or front.coherent_fraction.any()
     )
     return shaped or (front.count > 1 and bool(front.expansion.phase.any() or front.expansion.delay_variance.any()))
+
+
+def _changing(front: ArrayPaths, highest: Floats, tolerance: float) -> ArrayPaths:
+    """Paths without what their pulses change by over the aperture, up to the highest frequency (1,), where that is
+    nothing beside the loudest."""
+    if not (front.expansion.phase.shape[1] or front.expansion.delay_variance.shape[1]):
+        return front
+    loud = np.abs(front.amplitude)
+    turn = np.linalg.norm(front.expansion.largest("phase") * loud)
+    spread = np.linalg.norm(front.expansion.largest("delay_variance") * loud) * float(blur_exponent(highest)[0])
+    least = SHAPES * tolerance * loud.max()
+    quiet = [name for name, size in (("phase", turn), ("delay_variance", spread)) if size <= least]
+    return front.but(expansion=front.expansion.without(*quiet))
 
 
 def _bins_of_corners(front: ArrayPaths, frequency: Floats, sonar: Sonar) -> int:
@@ -209,3 +226,17 @@ def _shared_facet(front: ArrayPaths, frequency: Floats) -> tuple[ArrayPaths, Com
         facet = facet * rough_factor(frequency, first.coherent_fraction, first.height_delay_std)[0]
         front = front.but(coherent_fraction=np.zeros(front.count))
     return front, facet
+
+
+def _loud(front: ArrayPaths, frequency: Floats, spectrum: Complexes, tolerance: float) -> ArrayPaths:
+    """The paths without those that their blur leaves, all together, less than 0.01 `tolerance` of the loudest."""
+    sampled = slice(None, None, max(1, frequency.size // 128))
+    mass, exponent = np.abs(spectrum[sampled]), blur_exponent(frequency[sampled])
+    blurred = exponent[exponent > 0.0]  # 0 Hz is not
+    if not blurred.size:
+        return front
+    variance = np.append(0.0, np.geomspace(1e-4 / blurred[-1], 1e3 / blurred[0], 257))
+    level = np.exp(-np.multiply.outer(variance, exponent)) @ mass / mass.sum()
+    loudness = np.abs(front.amplitude) * np.interp(front.variance, variance, level)
+    keep = loudness > 0.01 * tolerance / front.count * loudness.max()
+    return front if keep.all() else front.select(np.flatnonzero(keep))

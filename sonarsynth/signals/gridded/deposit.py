@@ -88,7 +88,7 @@ def prepared(
     tails = highest > stop or tolerance <= 10.0 * filters.SUPPORT_TOLERANCE
     stage = Stage(aim, bins, origin, segment, grid, oversampling, wave, dtype, tails)
     front = Wavefronts(**{name: getattr(front, name) for name in Wavefronts.__dataclass_fields__})  # no more is needed
-    front = front.without_faint_shadows(0.1 * tolerance, elements)
+    front = _in_parts(front.without_faint_shadows(0.1 * tolerance, elements), elements.count)
     chosen = tiles(front, aim) if front.count else []
     later = partial(_waves, front, chosen, stage)
     if sum(len(tile.nodes(elements)) * tile.reference.count for tile in chosen) * samples > HELD:
@@ -128,6 +128,21 @@ def _neighbours_apart(paths: Ints) -> Ints:
     cannot be read at once, and deposits take a third more."""
     places = np.arange(-(-paths.size // 8) * 8).reshape(8, -1).T.ravel()
     return paths[places[places < paths.size]]
+
+
+def _in_parts(front: Wavefronts, sensors: int) -> Wavefronts:
+    """Paths of which none misses less than half of the hydrophones: those that do reach all, and after all paths there
+    is one for each that takes away what the few hear of it."""
+    some = np.flatnonzero(front.occluded.any(axis=1))
+    most = some[2 * np.bitwise_count(front.occluded[some]).sum(axis=1) < sensors]
+    if not most.size:
+        return front
+    occluded = front.occluded.copy()
+    occluded[most] = 0
+    parts = front.but(occluded=occluded).select(np.append(np.arange(front.count), most))
+    parts.occluded[front.count :] = ~front.occluded[most] & np.packbits(np.arange(1 + sensors) > 0)
+    parts.amplitude[front.count :] *= -1.0
+    return parts
 
 
 def _on_grid(bins: Bins, highest: float, width: int, oversampling: float, dtype: str) -> tuple[Bins, Kernel]:
