@@ -165,7 +165,7 @@ def test_wrong_boundaries_are_named_with_their_line_and_field(old: str, new: str
         ({"grazing": [0, 1, 1, "90 deg"]}, "must rise, but entry 2 (1 rad) is not above entry 1 (1 rad)"),
         ({"grazing": ["0 deg", "20 deg", "60 deg"]}, "must reach from 0 to 90 deg, but ends at 60 deg"),
         ({"grazing": ["5 deg", "20 deg", "90 deg"]}, "must reach from 0 to 90 deg, but begins at 5 deg"),
-        ({"grazing": [0, 45, 90]}, "less than or equal to"),
+        ({"grazing": [0, 45, 90]}, "must be within two turns, not 45 rad"),
         ({"grazing": [0]}, "at least 2"),
         ({"modulus": [1, 0.5]}, "has 2 entries, but grazing has 3"),
         ({"modulus": [1, 0.5, 1.1]}, "less than or equal to 1"),
@@ -173,7 +173,7 @@ def test_wrong_boundaries_are_named_with_their_line_and_field(old: str, new: str
         ({"modulus": None}, "give either modulus or loss"),
         ({"loss": ["0 dB", "1 dB", "2 dB"]}, "give either modulus or loss"),
         ({"modulus": None, "loss": [0, -1, 2]}, "greater than or equal to 0"),
-        ({"phase": [180, 175, 170]}, "less than or equal to"),
+        ({"phase": [180, 175, 170]}, "must be within two turns, not 180 rad"),
         ({"phase": ["180 deg", "175 deg"]}, "has 2 entries, but grazing has 3"),
     ],
 )
