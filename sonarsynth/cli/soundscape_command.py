@@ -11,8 +11,8 @@ import typer
 from sonarsynth.cli.options import Json, Settings, outside_stores
 from sonarsynth.cli.running import BadOption
 
-SHORTEST, LONGEST = 0.05, 120.0
-"""s."""
+LONGEST = 120.0
+"""s: of sound that is made, at most."""
 
 
 def soundscape(
@@ -50,11 +50,12 @@ def soundscape(
     coherence, gaps. A recording can be put beside it."""
     from sonarsynth.cli import printing
     from sonarsynth.evaluation.soundscape.recorded_sound import SeaRecording
+    from sonarsynth.evaluation.soundscape.sound import LEAST_SECONDS
     from sonarsynth.pictures.soundscape_figures import soundscape_pictures as pictures
     from sonarsynth.recipe import reading
 
-    if not SHORTEST <= seconds <= LONGEST:
-        raise BadOption(f"--seconds: must be from {SHORTEST:g} to {LONGEST:g}")
+    if not LEAST_SECONDS <= seconds <= LONGEST:
+        raise BadOption(f"--seconds: must be from {LEAST_SECONDS:g} to {LONGEST:g}")
     of_recording = (full_scale, sensitivity, dataset, sampling_frequency)
     if compare is None and (channel or any(option is not None for option in of_recording)):
         raise BadOption(

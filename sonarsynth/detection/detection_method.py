@@ -49,7 +49,9 @@ def detections_of(view: SonarView, method: DetectionMethod) -> list[dict[str, An
 def _detection(view: SonarView, region: Region) -> dict[str, Any]:
     x0, x1 = float(region.columns.min()), float(region.columns.max() + 1)
     y0, y1 = float(region.rows.min()), float(region.rows.max() + 1)
-    sides = [_narrowed(low, high, held) for low, high, held in zip((x0, y0), (x1, y1), view.held, strict=True)]
+    sides = [
+        _narrowed(low, high, held) for low, high, held in zip((x0, y0), (x1, y1), view.beams_per_width, strict=True)
+    ]
     detection: dict[str, Any] = {
         "score": region.score,
         "box": (*(narrow[0] for narrow in sides), *(narrow[1] for narrow in sides)),

@@ -10,7 +10,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description import FieldError
-from sonarsynth.equations.arrays.apertures import beams_held, half_power_width, whole_beams_held
+from sonarsynth.equations.arrays.apertures import beams_per_width, half_power_width, whole_beams_per_width
 from sonarsynth.store import Damage
 
 if TYPE_CHECKING:
@@ -41,14 +41,14 @@ class SonarView:
     points: Floats
 
     @property
-    def held(self) -> Floats:
-        """Beams (2,) that a beam width holds, along azimuth and elevation; one where no beam follows another."""
-        return beams_held(self.beam_width, self.azimuth, self.elevation)
+    def beams_per_width(self) -> Floats:
+        """Beams (2,) of the image in a beam width, along azimuth and elevation; one along an axis of a single beam."""
+        return beams_per_width(self.beam_width, self.azimuth, self.elevation)
 
     @property
     def reach(self) -> tuple[int, int]:
-        """`held` in whole beams, one at least, along elevation and azimuth as the axes of the image."""
-        return whole_beams_held(self.beam_width, self.azimuth, self.elevation)
+        """`beams_per_width` in whole beams, one at least, along elevation and azimuth as the axes of the image."""
+        return whole_beams_per_width(self.beam_width, self.azimuth, self.elevation)
 
 
 def beam_widths(
@@ -60,7 +60,7 @@ def beam_widths(
     the attributes of the store, or that of a disc where an old one does not say it. Raises FieldError for an extent
     that no build writes.
     """
-    extent = np.array(tree.attrs.get("aperture_rms") or [0.5 * tree.attrs["aperture_radius"]] * 2)
+    extent = np.array(tree.attrs.get("aperture_rms", [0.5 * tree.attrs["aperture_radius"]] * 2))
     if extent.shape != (2,) or extent.dtype.kind not in "fiu":
         raise FieldError(("aperture_rms",), "must be two numbers, m across and up")
     wavenumber = 0.5 * (tree.attrs["band_low"] + tree.attrs["band_high"]) / tree.attrs["assumed_sound_speed"]

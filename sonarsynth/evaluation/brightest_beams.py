@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.detection import beam_widths
-from sonarsynth.equations.arrays.apertures import whole_beams_held
+from sonarsynth.equations.arrays.apertures import whole_beams_per_width
 from sonarsynth.evaluation.checks import SmallVariables, blocks, every, numbered, of_frame, other_sounds
 from sonarsynth.evaluation.level_checks import echoes_heard, snaps_heard
 from sonarsynth.products import View
@@ -85,7 +85,7 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """
     name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
     azimuth, elevation = (np.deg2rad(every(tree, f"truth/beams/{axis}")) for axis in ("azimuth", "elevation"))
-    reach = whole_beams_held(beam_widths(tree), azimuth, elevation)
+    reach = whole_beams_per_width(beam_widths(tree), azimuth, elevation)
     hits, ghosts, judged, unlocated, missed = 0, 0, 0, 0, []
     for block, i in ((b, i) for b in blocks(tree, frames) for i in b.frames):
         energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/beams/target", i)

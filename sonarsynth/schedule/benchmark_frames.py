@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from sonarsynth import store
-from sonarsynth.equations.arrays.apertures import whole_beams_held
+from sonarsynth.equations.arrays.apertures import whole_beams_per_width
 from sonarsynth.labels.odds import NO_ODDS, Odds, odds
 from sonarsynth.pipeline import Values
 from sonarsynth.pipeline.labelled_estimates import beam_widths
@@ -107,7 +107,7 @@ def _odds(plan: Plan, values: Values) -> Odds:
     energy, beams = values.get(("/image", "energy")), plan.scene.sonar.beams
     if energy is None:
         return NO_ODDS
-    reach = whole_beams_held(beam_widths(plan), beams.azimuth, beams.elevation)
+    reach = whole_beams_per_width(beam_widths(plan), beams.azimuth, beams.elevation)
     clutter = values["/truth/targets", "clutter"] != 0
     snr = values.get(("/truth/targets", "snr"))
     return odds(energy, values["/truth/beams", "target"], clutter, snr, reach)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_dilation, maximum_filter
 
-from sonarsynth.equations.arrays.apertures import whole_beams_held
+from sonarsynth.equations.arrays.apertures import whole_beams_per_width
 from sonarsynth.imaging import OrderStatistic
 from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.pipeline import TracedFrame, digitise, trace_frame
@@ -93,7 +93,7 @@ def seen(density: float, distance: float, more: tuple[str, ...] = ()) -> list[Se
     ]
     made = plan(reading.load(RECIPE, settings), products=("image",))
     beams, frames = made.scene.sonar.beams, []
-    high, wide = whole_beams_held(beam_widths(made), beams.azimuth, beams.elevation)
+    high, wide = whole_beams_per_width(beam_widths(made), beams.azimuth, beams.elevation)
     rows, columns = np.mgrid[-high : high + 1, -wide : wide + 1]
     for index in FRAMES:
         traced = trace_frame(made, index)

@@ -65,18 +65,18 @@ def half_power_width(extent: npt.ArrayLike, wavenumber: float) -> Floats:
     return np.minimum(2.0 * half_power_angle(extent, wavenumber), 2.0 * np.pi)
 
 
-def beams_held(width: Floats, azimuth: Floats, elevation: Floats) -> Floats:
-    """Beams (2,) of a grid that beam widths (2,) hold, along azimuth (azimuth,) and elevation (elevation,), all in one
-    unit; one along an axis of a single beam."""
+def beams_per_width(width: Floats, azimuth: Floats, elevation: Floats) -> Floats:
+    """Beams (2,) of a grid in beam widths (2,), along azimuth (azimuth,) and elevation (elevation,), all in one unit;
+    one along an axis of a single beam."""
     axes = zip((azimuth, elevation), np.asarray(width).tolist(), strict=True)
     return np.array([across / np.diff(axis).mean() if len(axis) > 1 else 1.0 for axis, across in axes])
 
 
-def whole_beams_held(width: Floats, azimuth: Floats, elevation: Floats) -> tuple[int, int]:
-    """`beams_held` in whole beams, along elevation and azimuth as the axes of an image: one at least, and no more than
-    the longer of these."""
+def whole_beams_per_width(width: Floats, azimuth: Floats, elevation: Floats) -> tuple[int, int]:
+    """`beams_per_width` in whole beams, along elevation and azimuth as the axes of an image: one at least, and no more
+    than the longer of these."""
     most = max(len(azimuth), len(elevation))
-    across, up = np.clip(np.round(beams_held(width, azimuth, elevation)), 1, most).astype(int).tolist()
+    across, up = np.clip(np.round(beams_per_width(width, azimuth, elevation)), 1, most).astype(int).tolist()
     return up, across
 
 

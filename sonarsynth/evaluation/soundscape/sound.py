@@ -18,6 +18,7 @@ SHORTEST = 64
 BLOCK, FEWEST_BLOCKS = 0.1, 8
 """s: of a block of running sound, or less, so that there are so many at least."""
 LEAST_SECONDS = 0.05
+"""Of sound that is made to be measured."""
 MOST_SAMPLES = 1 << 28
 """Of all hydrophones together: 1 GiB."""
 ALONG = 0.97
