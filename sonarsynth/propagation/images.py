@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.equations.rays.ray_solutions import TOLERANCE
+from sonarsynth.products import Paths
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,3 +56,29 @@ def family(surface: Ints, bottom: Ints, falls: Bools) -> Ints:
     bounces = surface + bottom
     down = np.where(bounces % 2 == 1, bottom > surface, falls)
     return np.asarray(np.maximum(2 * bounces - down, 0))
+
+
+def boundary_at(depth: float, bottom_depth: float) -> str:
+    """Which boundary a point at a depth (m) lies on: surface, bottom, or neither ("")."""
+    at_surface, at_bottom = abs(depth) <= TOLERANCE, abs(depth - bottom_depth) <= TOLERANCE
+    return "bottom" if at_bottom else "surface" if at_surface else ""
+
+
+def with_own_images(paths: Paths, source_depth: float, bottom_depth: float) -> tuple[Paths, Ints | slice]:
+    """Paths from a source and, where it lies on a boundary, from its image there: each that leaves into the water, then
+    the one that is reflected at the source first. And which of the given ones (path,) each is, or goes along with.
+
+    The two are one place: ways of the image are followed as far as those of the source, with one reflection more. Those
+    that `paths` have of it lack the last, and are left out. Depths in m.
+    """
+    own = boundary_at(source_depth, bottom_depth)
+    if not own:
+        return paths, slice(None)
+    climb = paths.departure[:, 2] if own == "bottom" else -paths.departure[:, 2]
+    leaves = (climb > 0.0) | ((climb == 0.0) & (getattr(paths, own) == 0))  # level ones go along the boundary
+    along = np.repeat(np.flatnonzero(leaves), 2)
+    both, image = paths.select(along), np.arange(len(along)) % 2 == 1
+    x, y, z = both.departure.T
+    grazing = np.where(image, np.arctan2(np.abs(z), np.hypot(x, y)), getattr(both, f"{own}_grazing"))
+    departure = np.column_stack([x, y, np.where(image, -z, z)])
+    return both.but(departure=departure, **{own: getattr(both, own) + image, f"{own}_grazing": grazing}), along

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonarsynth.columns import picked
-from sonarsynth.conventions import NO_TARGET, depth
-from sonarsynth.products import Arrivals, Kind
+from sonarsynth.conventions import NO_TARGET, Bools, depth
+from sonarsynth.products import Arrivals, Kind, Paths
+from sonarsynth.propagation.images import family
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Emission, FrameContext
 from sonarsynth.tracing.doppler import Meeting, MotionTerms, apply_doppler, received
@@ -23,7 +24,7 @@ from sonarsynth.tracing.expansion.coincident_paths import with_coincident_added
 from sonarsynth.tracing.facet_paths import FacetPaths, bending, facet_paths, facet_paths_at_rest
 from sonarsynth.tracing.meetings import meetings, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
-from sonarsynth.tracing.receive_paths import ReceivePaths, Starts, rays_to_centre
+from sonarsynth.tracing.receive_paths import ReceivePaths, Starts, rays_to_centre, usable
 from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, directed, join, no_arrivals
 
 if TYPE_CHECKING:
@@ -140,9 +141,16 @@ def direct_sound(of: _DirectSound) -> tuple[ReceivePaths, Arrivals]:
     """Rays from a snap to the array centre, and what is heard of them where there are no bodies: that of the last
     frame, where the sonar and the snap are where they were."""
     receiver, snap = of.context.receiver, of.context.snaps[of.index]
-    rays = rays_to_centre(snap.position[None, :], of.context.medium, receiver, of.propagation).by(of.ways)
+    chosen = usable if of.ways is None else partial(_by_families, of.ways)
+    ends, own_images = (of.context.medium, receiver), of.propagation.bounces > 0
+    rays = rays_to_centre(snap.position[None, :], *ends, of.propagation, chosen, own_images)
     rays = rays.select(picked(directed(snap, rays.departure)[0] * rays.spreading != 0.0))
     return rays, _heard(of, rays)
+
+
+def _by_families(families: tuple[int, ...], paths: Paths) -> Bools:
+    """Which paths (path,) are by some families."""
+    return np.asarray(np.isin(family(paths.surface, paths.bottom, paths.departure[:, 2] < 0.0), families))
 
 
 def _heard(of: _DirectSound, legs: ReceivePaths) -> Arrivals:

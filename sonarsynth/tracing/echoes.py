@@ -16,6 +16,7 @@ from sonarsynth.geometry import unit
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind
+from sonarsynth.propagation.images import family, with_own_images
 from sonarsynth.propagation.reflections import reflections
 from sonarsynth.scattering import Component
 from sonarsynth.scattering.facet_geometry import PulseResponse
@@ -241,11 +242,17 @@ def _ways_to_facets(array: FacetPaths, snap: Emission) -> TransmitPaths:
     paths = array.propagation.checked_paths(medium.profile, medium.depth, start, rows_of(facets.point, row))
     lit = array.lit or facets.lit(row[paths.pair], paths.arrival)
     paths = paths.select(picked(usable(paths) & lit))
-    bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
-    out = TransmitPaths.of(paths, bounced, row[paths.pair], snap, float(medium.profile.at(depth(snap.position))))
-    out = out.select(picked(out.spreading != 0.0)).merged()
+    families = family(paths.surface, paths.bottom, paths.arrival[:, 2] < 0.0)
     if array.ways is not None:
-        out = out.select(np.isin(out.family, [way for way, _ in array.ways]))
+        wanted = np.flatnonzero(np.isin(families, [way for way, _ in array.ways]))
+        paths, families = paths.select(wanted), families[wanted]
+    down = float(depth(snap.position))
+    if bounces:
+        paths, along = with_own_images(paths, down, medium.depth)
+        families = families[along]
+    bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
+    out = TransmitPaths.of(paths, bounced, row[paths.pair], families, snap, float(medium.profile.at(down)))
+    out = out.select(picked(out.spreading != 0.0)).merged()
     if not array.lit:
         owner, facet = facets.owner[out.facet], facets.facet[out.facet]
         out = out.select(picked(~_hides(array, bodies, snap, out, rows_of(facets.clear, out.facet), (owner, facet))))

@@ -20,7 +20,7 @@ from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Paths
-from sonarsynth.propagation.images import family
+from sonarsynth.propagation.images import family, with_own_images
 from sonarsynth.propagation.reflections import Reflections, reflections
 from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Medium, Receiver
@@ -29,9 +29,6 @@ from sonarsynth.tracing.occlusion.ray_cones import layer_curvatures
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
 
-
-COINCIDENCE_TIME = 1e-12
-"""s: rays from or to one point whose travel times differ by less, and that arrive alike, are one."""
 
 SEEN, DOUBTFUL = 1, 2
 """Legs of which it is not known which hydrophones bodies hide them from: by some they are seen, or maybe by none."""
@@ -131,23 +128,13 @@ def usable(paths: Paths) -> Bools:
     return np.asarray((paths.flag != COINCIDENT) & np.isfinite(paths.spreading))
 
 
-def apart(row: Ints, travel_time: Floats, arrival: Floats) -> Bools:
-    """Which rays (ray,) do not coincide with the one before, of the same row: one from a point on the bottom does with
-    the one from its image there."""
-    first = np.ones(len(row), bool)
-    same = np.flatnonzero(row[1:] == row[:-1])
-    same = same[np.abs(travel_time[1 + same] - travel_time[same]) < COINCIDENCE_TIME]
-    turned = np.abs(np.subtract(rows_of(arrival, 1 + same).T, rows_of(arrival, same).T, order="C"))
-    first[1 + same] = (turned >= 1e-9).any(axis=0)
-    return first
-
-
 def rays_to_centre(
     point: Floats, medium: Medium, receiver: Receiver, propagation: Propagation,
-    chosen: Callable[[Paths], Bools] = usable,
+    chosen: Callable[[Paths], Bools] = usable, own_images: bool = False,
 ) -> ReceivePaths:  # fmt: skip
     """Rays from points (point, xyz) in the world to the array centre, sorted by point: all, or those that are chosen
-    (path,) of the usable ones. Raises FieldError for an array that has moved out of the water."""
+    (path,) of the usable ones; own_images: the points are one source, heard as of `with_own_images`. Raises FieldError
+    for an array that has moved out of the water."""
     if receiver.track is not None and not receiver.track.still:
         down = depth(receiver.pose.to_world(receiver.elements.position))
         ends, path = (float(down.min()), float(down.max())), ("scene", "trajectory", "sonar")
@@ -155,6 +142,8 @@ def rays_to_centre(
     end = alike(receiver.pose.position, len(point))
     paths = propagation.checked_paths(medium.profile, medium.depth, point, end)
     paths = paths.select(picked(usable(paths) & chosen(paths)))
+    if own_images:
+        paths, _ = with_own_images(paths, float(depth(point[0])), medium.depth)
     start = rows_of(point, paths.pair)
     bounced: Reflections = reflections(medium.environment, medium.profile, paths, receiver.centre)
     return ReceivePaths(

@@ -12,11 +12,13 @@ from sonarsynth.columns import Columns, alike, picked
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import ArrayExpansion, Arrivals, Kind, Paths
 from sonarsynth.products.array_expansion import stacked
-from sonarsynth.propagation.images import family
 from sonarsynth.propagation.reflections import Reflections, as_sign
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Emission
-from sonarsynth.tracing.receive_paths import ReceivePaths, apart
+from sonarsynth.tracing.receive_paths import ReceivePaths
+
+SILENCE = 1e-12
+"""Ways of a snap and of its image that cancel to less than this share of what they are apart are none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +26,7 @@ class TransmitPaths(Columns):
     """Ways from a snap to facets."""
 
     facet: Ints  # (way,) which facet
+    family: Ints  # (way,) as `images.family`; of a snap's own image in the boundary it lies on: as of the snap
     departure: Floats  # (way, xyz) world
     arrival: Floats  # (way, xyz) world
     travel_time: Floats  # (way,) s
@@ -39,12 +42,14 @@ class TransmitPaths(Columns):
     approach: Floats  # (way,) speed of the source along the way, over that of sound: pulses are shorter by it
 
     @staticmethod
-    def of(paths: Paths, bounced: Reflections, facet: Ints, snap: Emission, speed: float) -> TransmitPaths:
-        """Of paths to facets (path,) from a snap where sound has this speed (m/s)."""
+    def of(
+        paths: Paths, bounced: Reflections, facet: Ints, family: Ints, snap: Emission, speed: float
+    ) -> TransmitPaths:  # fmt: skip
+        """Of paths to facets (path,) by families (path,) from a snap where sound has this speed (m/s)."""
         loud, turned = directed(snap, paths.departure)
         approach = paths.departure @ snap.velocity / speed if snap.velocity.any() else alike(0.0, len(facet))
         return TransmitPaths(
-            facet, paths.departure, paths.arrival, paths.travel_time, paths.length, paths.spreading * loud,
+            facet, family, paths.departure, paths.arrival, paths.travel_time, paths.length, paths.spreading * loud,
             paths.surface, paths.bottom, paths.turning, paths.caustics, bounced.modulus,
             bounced.phase + turned if np.any(turned) else bounced.phase, bounced.delay_std, approach,
         )  # fmt: skip
@@ -61,20 +66,27 @@ class TransmitPaths(Columns):
         """No way at all, of paths that come straight from the snap; its spreading is that of the leg."""
         zero, none, nowhere = np.zeros(count), np.zeros(count, int), np.zeros((count, 3))
         return TransmitPaths(
-            none, nowhere, nowhere, zero, zero, zero + 1.0, none, none, none, none, zero + 1.0, zero, zero, zero
+            none, none, nowhere, nowhere, zero, zero, zero + 1.0, none, none, none, none, zero + 1.0, zero, zero, zero
         )
 
     def merged(self) -> TransmitPaths:
-        """The ways with those that coincide added up: from a snap on the bottom, say, and its image there."""
-        first = self._apart
-        first[1:] |= np.diff(self.delay_std) != 0
-        if first.all():
+        """The ways with those of the own image of a snap added to those that they coincide with, where the two sound
+        alike: what a rough bottom blurs stays apart from what it does not, as do pulses of a snap that rises."""
+        image = np.flatnonzero(self.bounces > self.counted)
+        if not len(image):
             return self
-        begin = np.flatnonzero(first)
-        value = np.add.reduceat(self.spreading * self.boundary * np.exp(1j * self.phase), begin)
-        number = np.cumsum(first) * (1 + self.bounces.max()) + self.bounces
-        merged = self.select(np.argsort(number, kind="stable")[begin])  # by the fewest bounces
-        return merged.but(boundary=np.abs(value) / merged.spreading, phase=np.angle(value + 0.0))
+        before = image - 1
+        alike = self.bounces[before] == self.counted[before]  # a source may send nothing up, and then there is none
+        for column in (self.facet, self.family, self.travel_time, self.delay_std, self.approach):
+            alike &= column[image] == column[before]
+        image, before = image[alike], before[alike]
+        own = self.spreading * self.boundary * np.exp(1j * self.phase)
+        value, silent = own[before] + own[image], SILENCE * (np.abs(own[before]) + np.abs(own[image]))
+        boundary, phase = self.boundary.copy(), self.phase.copy()
+        boundary[before] = np.abs(value) / self.spreading[before]
+        phase[before] = np.angle(value + 0.0)
+        gone = np.concatenate([image, before[np.abs(value) <= silent]])
+        return self.but(boundary=boundary, phase=phase).select(np.delete(np.arange(len(boundary)), gone))
 
     @cached_property
     def bounces(self) -> Ints:
@@ -82,23 +94,9 @@ class TransmitPaths(Columns):
         return np.asarray(self.surface + self.bottom)
 
     @property
-    def family(self) -> Ints:
-        """(way,) as `images.family`."""
-        return family(self.surface, self.bottom, self.arrival[:, 2] < 0.0)
-
-    @property
     def counted(self) -> Ints:
-        """(way,) reflections that count towards the most of a path, once ways are merged: the fewest of those that
-        coincide. A snap on a rough bottom and its image there, which comes blurred, are one place."""
-        if not self.delay_std.any():
-            return self.bounces
-        first = self._apart
-        return np.asarray(np.minimum.reduceat(self.bounces, np.flatnonzero(first))[np.cumsum(first) - 1])
-
-    @property
-    def _apart(self) -> Bools:
-        """Which ways (way,) do not coincide with the one before."""
-        return apart(self.facet, self.travel_time, self.arrival)
+        """(way,) reflections that count towards the most of a path: not that of a snap at its own place."""
+        return np.asarray((self.family + 1) // 2)
 
 
 def directed(snap: Emission, departure: Floats) -> tuple[Floats | float, Floats | float]:

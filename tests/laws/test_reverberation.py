@@ -312,7 +312,7 @@ def test_what_lights_a_scatterer_is_what_a_hydrophone_hears_there(source: tuple[
     water = replace(WATER, bottom=SeaBottom(reflection=Sediment(name="medium sand")))
     direct = heard_at_rest((), np.array(source), (), array=place, bounces=bounces, water=water)
     _, same = np.unique(np.round(direct.delay, 12), return_inverse=True)
-    pressure = np.zeros(same.max() + 1, complex)
+    pressure = np.zeros(same.max(initial=-1) + 1, complex)
     np.add.at(pressure, same, direct.amplitude * np.exp(1j * direct.phase))
     medium = Medium(water, PROFILE)
     snap = Emission(np.array(source), 0.0, LogarithmicBubble(), None)

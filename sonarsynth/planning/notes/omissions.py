@@ -220,12 +220,13 @@ def reflected_bound(plan: Plan) -> str:
     bodies, receiver = frame.moment.bodies, Receiver(frame.sonar_pose, plan.elements, sonar)
     fewer = Tolerances(every=one_facet_in(plan.profile, sum(len(body.mesh.faces) for body in bodies), ENOUGH))
     context = FrameContext(frame.time, bodies, frame.moment.snaps, plan.medium, receiver, laws, fewer)
-    arrivals = trace(context, plan.propagation.reflected(bounces + 1))
-    delay_std = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * arrivals.delay_std) ** 2)
-    power, more = (arrivals.amplitude * delay_std) ** 2, arrivals.surface + arrivals.bottom > bounces
-    levels = []
-    for name, mask in (("echoes", ~arrivals.direct), ("snap itself", arrivals.direct)):
-        traced, omitted = float(power[mask & ~more].sum()), float(power[mask & more].sum())
-        if traced > 0.0 and omitted > 0.0:
-            levels.append(f"{name} {10 * np.log10(omitted / traced):+.1f} dB")
+    levels, powers = [], []
+    for most in (bounces, bounces + 1):
+        arrivals = trace(context, plan.propagation.reflected(most))
+        delay_std = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * arrivals.delay_std) ** 2)
+        power = (arrivals.amplitude * delay_std) ** 2
+        powers.append([float(power[mask].sum()) for mask in (~arrivals.direct, arrivals.direct)])
+    for name, traced, every in zip(("echoes", "snap itself"), *powers, strict=True):
+        if every > traced > 0.0:
+            levels.append(f"{name} {10 * np.log10(every / traced - 1.0):+.1f} dB")
     return "one reflection more would add, re the paths kept in frame 0: " + (", ".join(levels) or "nothing")

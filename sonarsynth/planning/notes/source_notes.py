@@ -11,11 +11,11 @@ from sonarsynth.conventions import Floats
 from sonarsynth.description.method import Demand
 from sonarsynth.environment.boundary_numbers import rms_height
 from sonarsynth.equations.arrays.grating_lobes import loudest_lobe
-from sonarsynth.equations.rays.ray_solutions import TOLERANCE
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import extreme_waveforms
+from sonarsynth.propagation.images import boundary_at
 from sonarsynth.ranging import LocatingMethod
 from sonarsynth.ranging.picking.beyond_the_grid import FARTHEST
 from sonarsynth.ranging.range_profiles import aperture_moments
@@ -68,20 +68,16 @@ def off_the_bottom(scene: Scene) -> list[str]:
 
 
 def cancelled_by_image(scene: Scene) -> list[str]:
-    """Which sources are cancelled by their image in the smooth boundary that they lie on, as at the surface: but for
-    paths whose partner by the image has one reflection more than is followed."""
-    environment, start, bounces = scene.world.environment, scene.trajectory.start, scene.physics.tracing.bounces
-    names = []
-    for boundary, z in ((environment.surface, 0.0), (environment.bottom, -environment.depth)):
-        value = boundary.reflection.coefficient(np.array([0.25 * np.pi]))[0]
-        if bounces and rms_height(boundary) == 0.0 and abs(1.0 + value) < 1e-9:
-            alike = [source for source in scene.sources if source.directivity(start) is None]
-            up = [float(source.position_at(environment.depth, start)[2]) for source in alike]
-            names += [source.name for source, at in zip(alike, up, strict=True) if abs(at - z) <= TOLERANCE]
-    line = (
-        "its image in the boundary that it lies on cancels it: of what is heard, the image has one reflection more "
-        f"than are followed (scene.physics.tracing.bounces: {bounces})"
-    )
+    """Which sources are cancelled by their image in the smooth boundary that they lie on, as at the surface."""
+    environment, start, names = scene.world.environment, scene.trajectory.start, []
+    for source in scene.sources if scene.physics.tracing.bounces else ():
+        down = -float(source.position_at(environment.depth, start)[2])
+        at = boundary_at(down, environment.depth)
+        if at and source.directivity(start) is None:
+            boundary = environment.bottom if at == "bottom" else environment.surface
+            value = boundary.reflection.coefficient(np.array([0.25 * np.pi]))[0]
+            names += [source.name] if rms_height(boundary) == 0.0 and abs(1.0 + value) < 1e-9 else []
+    line = "its image in the boundary that it lies on cancels it: nothing of it is heard"
     return [f"{', '.join(names)}: {line}"] if names else []
 
 

@@ -8,10 +8,8 @@ from sonarsynth.conventions import Floats
 from sonarsynth.products import ArrayExpansion
 from sonarsynth.state import Receiver
 from sonarsynth.tracing.expansion.probe_sensors import probes
-from sonarsynth.tracing.receive_paths import ReceivePaths, apart
-
-SILENCE = 1e-12
-"""Legs that cancel to less than this share of what they are apart are none: those of a snap on the surface do."""
+from sonarsynth.tracing.receive_paths import ReceivePaths
+from sonarsynth.tracing.transmit_paths import SILENCE
 
 
 def with_coincident_added(
@@ -23,8 +21,9 @@ def with_coincident_added(
     legs (leg,): sorted by time; over (leg,): their wavefronts, but for amplitudes; gain (leg, probe): their amplitudes
     at the probes over that at the centre.
     """
-    first = apart(legs.row, legs.travel_time, legs.arrival)
-    first[1:] |= np.diff(legs.delay_std) != 0
+    first = np.ones(len(legs.row), bool)
+    columns = legs.travel_time[:, None], legs.arrival, legs.delay_std[:, None]
+    first[1:] = (np.diff(np.hstack(columns), axis=0) != 0.0).any(axis=1)
     if first.all():
         return legs, over, gain
     probe, begin, number = probes(receiver.elements), np.flatnonzero(first), np.cumsum(first) - 1

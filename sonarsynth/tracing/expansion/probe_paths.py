@@ -11,6 +11,7 @@ from sonarsynth.columns import Columns, rows_of
 from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.equations.kernels.unit_vectors import to_images
 from sonarsynth.geometry import Pose
+from sonarsynth.propagation.bounces import MOST_BOUNCES
 from sonarsynth.propagation.path_model import KnownRays
 from sonarsynth.propagation.reflections import at_boundaries
 from sonarsynth.state import Medium, Receiver
@@ -137,7 +138,9 @@ def _searched(
     """Time, spreading (leg, probe) and departure of the rays nearest in time among all; NaN where there is none."""
     count, sensors = predicted.shape
     start, end = np.repeat(legs.point, sensors, axis=0), np.tile(position, (count, 1))
-    paths = geometry.propagation.checked_paths(geometry.medium.profile, geometry.medium.depth, start, end)
+    most = min(int(legs.bounces.max()), MOST_BOUNCES)  # those of a snap's own image have one more than others
+    model = geometry.propagation.reflected(most)
+    paths = model.checked_paths(geometry.medium.profile, geometry.medium.depth, start, end)
     same = (paths.surface == legs.surface[paths.pair // sensors]) & (paths.bottom == legs.bottom[paths.pair // sensors])
     nearest = pick_branch(paths, predicted, tolerance, same)
     missing = nearest < 0

@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays.ray_solutions import Water, mean_slowness, water
-from sonarsynth.propagation.images import images
+from sonarsynth.propagation.images import boundary_at, images
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +29,6 @@ class UnfoldedPaths:
         return self.surface + self.bottom
 
 
-TOUCHING = 1e-9
-"""m: a point so near to a boundary and its image there are one."""
-
-
 @lru_cache(maxsize=16)
 def _water(profile: Profile, bottom_depth: float) -> Water:
     return water(profile.depth, profile.speed, bottom_depth)
@@ -44,10 +40,10 @@ def ways(
     """All ways from depth start (m) to depths end (point,) by at most so many reflections, the straight one first.
 
     To the bottom those that arrive from above, to the surface from below: a reflection there is none before it. A point
-    on a boundary and its image there are one: its ways are those that leave the boundary, for both of them as far as
-    one reflection more is allowed.
+    on a boundary and its image there are one, where reflections are followed: its ways are those that leave the
+    boundary, for both of them.
     """
-    own = "surface" if start < TOUCHING else "bottom" if bottom_depth - start < TOUCHING else ""
+    own = boundary_at(start, bottom_depth)
     layers, begin, paths = _water(profile, bottom_depth), np.full(end.shape, start), []
     top, low, bottom = np.minimum(begin, end), np.maximum(begin, end), np.full(end.shape, bottom_depth)
 
@@ -64,11 +60,10 @@ def ways(
         into_it = image.climb > 0.0 if own == "surface" else image.climb < 0.0
         if own and into_it.any():
             continue
-        both = own if image.surface + image.bottom < bounces else ""
         if (owner == "bottom" and not falls.all()) or (owner == "surface" and (falls | (image.climb == 0.0)).any()):
             continue
         crossed = image.above * above + image.between * between + image.below * below
         all_of_it = image.above + image.between + image.below
         slowness = np.where(all_of_it > 1e-9, crossed / np.maximum(all_of_it, 1e-9), between)
-        paths.append(UnfoldedPaths(both, image.surface, image.bottom, image.climb, slowness))
+        paths.append(UnfoldedPaths(own if bounces else "", image.surface, image.bottom, image.climb, slowness))
     return paths

@@ -34,7 +34,7 @@ from sonarsynth.validation.references.frames.path_sum import Contributions, stre
 from sonarsynth.validation.references.frames.snap_spectrum import absorption, duration, filter_response, spectrum
 from sonarsynth.validation.references.frames.sound_paths import Solid, arrival_times, depths, hidden, met
 from sonarsynth.validation.references.rays.boundaries_met import reflected
-from sonarsynth.validation.references.rays.layered_rays import Family, Rays, families
+from sonarsynth.validation.references.rays.layered_rays import Family, Rays, families, source_families
 from sonarsynth.validation.references.rays.layers_crossed import Water
 from sonarsynth.validation.references.rays.rays_missed import knows_every_ray
 
@@ -143,7 +143,7 @@ class FramePressure:
     def _lit(self, snap: Emission, body: Body) -> list[_LitFacets]:
         """The facets of a body that a snap lights, by each family."""
         groups = []
-        for family in families(self.bounces):
+        for family, counted in source_families(self.bounces, -snap.position[2], self.water.bottom, back=True):
             rows = self._towards(
                 body, np.arange(len(body.centre)), np.full(len(body.centre), snap.time), snap.position, family
             )
@@ -159,7 +159,6 @@ class FramePressure:
             end = np.broadcast_to(snap.position, clear.shape)
             sent = np.full(len(time), snap.time)
             free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, back, time, sent))
-            counted = family.bounces - family.ends_at(-snap.position[2], self.water.bottom)
             of = rows[free], time[free], back.select(free), normal[free]
             groups.append(_LitFacets(body, *of, family, counted, *self._sent(snap, -back.arrival[free])))
         return groups
@@ -217,7 +216,7 @@ class FramePressure:
     def _direct(self, snap: Emission, position: Floats) -> list[Contributions]:
         """What one hydrophone hears without a target."""
         contributions, sent = [], np.array([snap.time])
-        for family in families(self.bounces):
+        for family, _ in source_families(self.bounces, -snap.position[2], self.water.bottom):
             late, ray = arrival_times(self.water, snap.position[None], sent, self.sonar, position, family)
             end = self.sonar.points(position[None], late)
             if not hidden(self.solids, self.water, snap.position[None], end, ray, sent, late)[0]:

@@ -50,15 +50,21 @@ class Family(NamedTuple):
         """Reflections at the bottom."""
         return (self.bounces + 1) // 2 if self.down else self.bounces // 2
 
-    def ends_at(self, depth: float, bottom: float) -> bool:
-        """Whether the last reflection is at the boundary on which an end at this depth (m) lies."""
-        at_bottom = self.down == (self.bounces % 2 == 1)
-        return self.bounces > 0 and depth == (bottom if at_bottom else 0.0)
-
 
 def families(bounces: int) -> list[Family]:
     """All with at most so many reflections."""
     return [Family(n, down) for n in range(bounces + 1) for down in ((True, False) if n else (True,))]
+
+
+def source_families(bounces: int, depth: float, bottom: float, back: bool = False) -> list[tuple[Family, int]]:
+    """Those of rays from a source at this depth (m), or back to it, and how many reflections of each count: one at the
+    source itself, which lies on a boundary, does not, where any are followed."""
+    found = []
+    for family in families(bounces + (bounces > 0)):
+        at_bottom = family.down == (family.bounces % 2 == 1) if back else family.down
+        own = family.bounces > 0 and depth == (bottom if at_bottom else 0.0)
+        found += [(family, family.bounces - own)] if family.bounces - own <= bounces else []
+    return found
 
 
 STEEPEST = 1e-6
