@@ -9,14 +9,17 @@ which is the registry, and `kind:` in YAML is the tag.
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable
-from typing import Any, Final, TypeVar, cast, dataclass_transform
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar, cast, dataclass_transform
 
-from pydantic import ConfigDict, Discriminator, Field
+from pydantic import ConfigDict, Discriminator, Field, ValidationError
 from pydantic.dataclasses import dataclass
 
+from sonarsynth.description.field_messages import unknown, wrong_fields
 from sonarsynth.description.schemas import HelpText
+
+__all__ = ["BY_KIND", "ONE_OR_SEVERAL", "FieldError", "description", "unknown"]
 
 BY_KIND: Any = Field(discriminator="kind")
 """Annotation of a union of descriptions: `kind` says which one."""
@@ -28,9 +31,6 @@ def _one_or_several(value: object) -> str:
 
 ONE_OR_SEVERAL: Any = Discriminator(_one_or_several)
 """Annotation of a union of one (`Tag("one")`) and a tuple of such (`Tag("several")`)."""
-
-SYNONYMS: Final = {"file": "path", "filename": "path"}
-"""What people write for a field, and its name, which is not spelt alike."""
 
 _CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True)
 
@@ -49,23 +49,38 @@ class FieldError(ValueError):
         return type(self), (self.path, self.message)
 
 
-def unknown(name: str, names: Iterable[str], noun: str = "field") -> str:
-    """That there is no such name, and which one it may be."""
-    meant = [word for word in names if word == SYNONYMS.get(name)]
-    close = meant or difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(names)}"
-    return f"'{name}' is not a {noun} here; {hint}"
-
-
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(Field,))
 def description(cls: type[T]) -> type[T]:
     """Make a class a description: keyword arguments only, frozen, hashable, unknown fields refused, no NaN or infinity.
 
-    Sequences are tuples; `help` lists the fields. Raises `pydantic.ValidationError` (a ValueError) when a field is
-    wrong.
+    Sequences are tuples; `help` lists the fields. Raises ValueError, one line, when fields are wrong.
     """
     written = cls.__doc__
     described = cast(type[T], dataclass(frozen=True, kw_only=True, config=_CONFIG)(cls))
+    described.__init__ = _in_one_line(described.__init__)  # type: ignore[method-assign]
     if written:
         described.__doc__ = HelpText(written)  # type: ignore[assignment]  # Python asks it for the text
     return described
+
+
+def _in_one_line(init: Callable[..., None]) -> Callable[..., None]:
+    """A constructor whose errors are one line of what pydantic reports in several."""
+
+    @wraps(init)
+    def checked(self: object, *args: Any, **fields: Any) -> None:
+        if args:
+            raise TypeError(f"{type(self).__name__} takes its fields by name, as in {_by_name(type(self))}")
+        try:
+            init(self, **fields)
+        except ValidationError as error:
+            wrong = [(".".join(map(str, keys)), text) for keys, text in wrong_fields(error, type(self), fields)]
+            lines = [f"{field}: {text}" if field else text for field, text in wrong]
+            raise ValueError(f"{type(self).__name__}: {'; '.join(lines)}") from None
+
+    return checked
+
+
+def _by_name(cls: type) -> str:
+    """A class with one of its fields by name."""
+    name = next((name for name in getattr(cls, "__pydantic_fields__", {}) if name != "kind"), "")
+    return f"{cls.__name__}({name}=...)" if name else f"{cls.__name__}()"

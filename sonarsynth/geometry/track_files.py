@@ -14,7 +14,7 @@ import numpy as np
 
 from sonarsynth.conventions import UNITS, Floats
 from sonarsynth.description import named_files
-from sonarsynth.description.plain_xml import parsed_xml
+from sonarsynth.description.file_formats.plain_xml import parsed_xml
 
 MAX_BYTES: Final = 1 << 26
 MOST_POINTS: Final = 200_000

@@ -6,13 +6,14 @@ from itertools import product
 from math import prod
 
 from sonarsynth.description import FieldError
+from sonarsynth.description.field_messages import Where
 from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences, name_of
 from sonarsynth.recipe.variation.grid import Axis
 from sonarsynth.recipe.variation.named_paths import listed_values
 from sonarsynth.recipe.variation.random_variations import Choice, NumberVariation, Sobol
 from sonarsynth.recipe.variation.setting import Setting, plain_scene, with_settings
 from sonarsynth.recipe.variation.sobol_points import OF_VARIATIONS
-from sonarsynth.recipe.variation.values import MOST_FRAMES, Where, where
+from sonarsynth.recipe.variation.values import MOST_FRAMES, where
 
 RESERVED = ("frame", "trajectory", "step", "time", "split", "repeat")
 """Names of the store that no entry can have."""

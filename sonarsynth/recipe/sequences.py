@@ -19,6 +19,7 @@ import numpy as np
 
 from sonarsynth.conventions import ASSUMED_SPEED, Ints
 from sonarsynth.description import FieldError
+from sonarsynth.description.field_messages import Where
 from sonarsynth.products import SPLITS
 from sonarsynth.randomness import number
 from sonarsynth.recipe.populations.drawn_bodies import DrawnBodies, draw
@@ -28,7 +29,7 @@ from sonarsynth.recipe.splits import Splits, assign
 from sonarsynth.recipe.variation.grid import Axis, Zip, axes
 from sonarsynth.recipe.variation.random_variations import Choice, Integers, Sobol, Variation, as_drawn
 from sonarsynth.recipe.variation.setting import Setting, Stamps, file_stamps, mesh_files, plain_scene, with_settings
-from sonarsynth.recipe.variation.values import FRAMES, MOST_FRAMES, Plain, Where, default_name, leads_through, where
+from sonarsynth.recipe.variation.values import FRAMES, MOST_FRAMES, Plain, default_name, leads_through, where
 
 MOST_SEQUENCES = 1_000_000
 NOTHING = Plain.of(None)

@@ -11,7 +11,8 @@ from annotated_types import Ge, Gt, MinLen
 from pydantic import model_validator
 
 from sonarsynth.conventions import Floats, Number, PositiveHertz, PositiveMetres, Seconds
-from sonarsynth.description import BY_KIND, description, named_files, waveform_files
+from sonarsynth.description import BY_KIND, description, named_files
+from sonarsynth.description.file_formats import waveform_files
 from sonarsynth.environment.noise import Noise
 from sonarsynth.equations.noise.filters import TAPS, windowed_sinc
 from sonarsynth.geometry.motion import Motion

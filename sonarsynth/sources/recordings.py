@@ -12,7 +12,8 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 
 from sonarsynth.conventions import UNITS, Floats, Number, PositiveHertz, PositiveMetres, Seconds
-from sonarsynth.description import description, named_files, waveform_files
+from sonarsynth.description import description, named_files
+from sonarsynth.description.file_formats import waveform_files
 from sonarsynth.equations.bubble import waveforms
 from sonarsynth.equations.bubble.pulses import Pulse
 from sonarsynth.sources.pulse_model import PulseModel, Stamp

@@ -9,6 +9,7 @@ from pydantic import StringConstraints
 
 from sonarsynth.conventions import Number
 from sonarsynth.description import description
+from sonarsynth.description.field_messages import CATEGORY, NAME
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Motion
 from sonarsynth.scattering import Scattering
@@ -18,9 +19,7 @@ from sonarsynth.targets.shapes import Shape
 
 NO_CATEGORY = "target"
 """What targets are called that are called nothing else."""
-NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,63}$"
 Name = Annotated[str, StringConstraints(pattern=NAME)]
-CATEGORY = r"^[A-Za-z][A-Za-z0-9_.+-]{0,63}$"
 Category = Annotated[str, StringConstraints(pattern=CATEGORY)]
 Scale = Annotated[Number, Ge(1e-3), Le(1e3)]
 

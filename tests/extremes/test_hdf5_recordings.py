@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from sonarsynth.description import hdf5_files
+from sonarsynth.description.file_formats import hdf5_files
 from sonarsynth.sources.noise_source import NoiseRecording
 from sonarsynth.sources.recordings import RecordingError, read_recording
 from sonarsynth.sources.snap_models import RecordedSnap

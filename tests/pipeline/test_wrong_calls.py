@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import errno
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +104,34 @@ def test_numbers_that_cannot_be(small: Recipe, tmp_path: Path) -> None:
     for seconds in (-1.0, float("nan"), 0.01):
         with pytest.raises(ValueError, match=r"s are too short to measure: make 0\.05 s at least"):
             ss.soundscape(noise, tmp_path / "s.png", seconds=seconds)
+
+
+SITE: dict[str, Any] = {"position": (0.0, 0.0, -5.0)}
+BUOY = ss.Target(name="buoy", shape=ss.Sphere(radius=1.0), motion=ss.Still(**SITE))
+DESCRIBED: list[tuple[str, Callable[[], object]]] = [
+    ("Still: headng: 'headng' is not a field here; did you mean 'heading'?", lambda: ss.Still(**SITE, headng=1.0)),
+    ("Still: position.2: is required; roll: must be a finite number", lambda: ss.Still(position=(1, 2), roll=np.inf)),
+    ("Sonar: array.kind: 'still' is not a kind here; known: ", lambda: ss.Sonar(array=ss.Still(**SITE))),
+    ("AutoTracing: bounces: must be less than or equal to 8, not 99", lambda: ss.AutoTracing(bounces=99)),
+    (
+        "MirrorLobe: diffuse: with reflectivity 0.9 scatters more power",
+        lambda: ss.MirrorLobe(reflectivity=0.9, diffuse=0.2),
+    ),
+    ("Target: name: must be at most 64 letters", lambda: replace(BUOY, name="a b")),
+]
+"""Mistaken descriptions, and what is said of them."""
+
+
+@pytest.mark.parametrize(("said", "make"), DESCRIBED)
+def test_all_that_is_wrong_with_a_description_is_one_line(said: str, make: Callable[[], object]) -> None:
+    with pytest.raises(ValueError, match=re.escape(said)) as raised:
+        make()
+    assert "\n" not in str(raised.value)
+
+
+def test_fields_are_given_by_name() -> None:
+    with pytest.raises(TypeError, match=r"Still takes its fields by name, as in Still\(position=\.\.\.\)"):
+        ss.Still((0.0, 0.0, -5.0))  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("heading", [90.0, -45, 4.01 * np.pi])

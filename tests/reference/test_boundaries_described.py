@@ -6,7 +6,6 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 import sonarsynth as ss
 from sonarsynth.environment.boundaries import SedimentName
@@ -178,15 +177,14 @@ def test_wrong_boundaries_are_named_with_their_line_and_field(old: str, new: str
     ],
 )
 def test_wrong_tables_are_refused_in_one_line(fields: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValidationError) as caught:
+    with pytest.raises(ValueError) as caught:
         ss.ReflectionTable(**TABLE | {"modulus": [1.0, 0.95, 0.9]} | fields)
-    errors = [e for e in caught.value.errors() if message in e["msg"]]
-    assert errors and "\n" not in errors[0]["msg"]
     named = "loss" if "loss" in fields or message == "give either modulus or loss" else next(iter(fields))
-    assert errors[0]["loc"][0] == named
+    said = [part for part in str(caught.value).partition(": ")[2].split("; ") if message in part]
+    assert said and said[0].startswith(named) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("fields", [{"density_ratio": 0.0}, {"speed_ratio": -1.0}, {"loss_tangent": -0.1}])
 def test_impossible_media_are_refused(fields: dict[str, float]) -> None:
-    with pytest.raises(ValidationError):
+    with pytest.raises(ValueError, match=f"FluidHalfSpace: {next(iter(fields))}: must be greater than"):
         ss.FluidHalfSpace(**{"density_ratio": 1.5, "speed_ratio": 1.1} | fields)

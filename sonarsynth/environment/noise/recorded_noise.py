@@ -10,7 +10,8 @@ from annotated_types import Ge, Gt
 from pydantic import model_validator
 
 from sonarsynth.conventions import Floats, Number, PositiveHertz, Seconds
-from sonarsynth.description import description, named_files, waveform_files
+from sonarsynth.description import description, named_files
+from sonarsynth.description.file_formats import waveform_files
 from sonarsynth.environment.noise.directions import Directions
 from sonarsynth.environment.noise.noise_field import NoiseField
 

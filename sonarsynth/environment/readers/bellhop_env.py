@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from sonarsynth.description import named_files
-from sonarsynth.description.fortran_rows import fortran_rows
+from sonarsynth.description.file_formats.fortran_rows import fortran_rows
 from sonarsynth.environment.readers.cast_table import MAX_ROWS, CastError, CastTable, Column, is_number
 
 WORD: Final = re.compile(r"('(?:[^']|'')*'|\"[^\"]*\"|/|[^\s,/'\"]+)")

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.description import named_files, netcdf_files
+from sonarsynth.description import named_files
+from sonarsynth.description.file_formats import netcdf_files
 from sonarsynth.environment.readers.cast_columns import Meaning, UnitError, meaning
 from sonarsynth.environment.readers.cast_table import MAX_ROWS, CastError, CastTable, Column, without_flags
 

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from sonarsynth.conventions import Floats
-from sonarsynth.description import named_files, waveform_files
+from sonarsynth.description import named_files
+from sonarsynth.description.file_formats import waveform_files
 from sonarsynth.equations.noise.filters import response
 from sonarsynth.evaluation.soundscape.sound import BLOCK, FEWEST_BLOCKS, SHORTEST, Sound
 from sonarsynth.receiver import Sonar

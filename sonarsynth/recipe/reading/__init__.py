@@ -19,12 +19,12 @@ from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml import YAML
 
 from sonarsynth.description import FieldError
+from sonarsynth.description.field_messages import Where
 from sonarsynth.recipe import FILE_KINDS, Recipe, must_be_recipe
 from sonarsynth.recipe.reading.json_schema import schema, schema_text
 from sonarsynth.recipe.reading.messages import explain
 from sonarsynth.recipe.reading.recipe_tables import with_tables
 from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, override, read_file, read_text
-from sonarsynth.recipe.variation.values import Where
 
 __all__ = [
     "RecipeError",

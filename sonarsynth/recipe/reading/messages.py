@@ -1,4 +1,4 @@
-"""Validation errors as people read them: the field as it stands in the file, and one clear line."""
+"""What is wrong with a recipe: the field as it stands in the file, and one clear line."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from sonarsynth.recipe.field_messages import error_message, error_path
+from sonarsynth.description.field_messages import Where, wrong_fields
 from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, dotted
-from sonarsynth.recipe.variation.values import Where
 
 MOST_SHOWN: Final = 20
 """Errors that are told of a recipe."""
@@ -16,29 +15,7 @@ MOST_SHOWN: Final = 20
 
 def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
     """The errors of a validation, each with its place in the file: of a misspelt field first, at most `MOST_SHOWN`."""
-    texts: dict[Where, str] = {}
-    explained = set[Where]()  # by what is wrong with one of their fields or entries
-    for details in error.errors(include_url=False):
-        keys, message = error_message(details, error_path(details, source.data), root, source.data)
-        if details["type"] == "dataclass_type" and (texts.get(keys) or "").startswith("must be '"):
-            texts[keys] = texts[keys].replace("' or '", "', '").replace(", not ", " or a mapping, not ", 1)
-        if details["type"] == "literal_error" and (texts.get(keys) or "").startswith("must be a list, not "):
-            texts[keys] = texts[keys].replace("a list, not ", f"a list or {details['ctx']['expected']}, not ", 1)
-        number = details["type"].startswith(("less_than", "greater_than")) or message.startswith("has unit ")
-        if number and (texts.get(keys) or "").startswith("must be '"):  # or a word
-            said = texts[keys].rpartition(", not ")[0].replace("' or '", "', '")
-            texts[keys] = message.replace("must be ", f"{said} or ", 1)
-        texts.setdefault(keys, message)
-        if details["type"] == "too_short":  # only entries that are right are counted
-            explained.add(keys)
-    meant = ("not a mapping", "not a list")
-    words = {keys for keys, text in texts.items() if text.startswith("must be '") and text.endswith(meant)}
-    for keys in explained | words:  # of a word, or a mapping or list, it is the latter that was meant
-        if any(len(longer) > len(keys) and longer[: len(keys)] == keys for longer in texts):
-            del texts[keys]
-    items = list(texts.items())
-    if items[0][1] == "is required":  # which a misspelt field explains
-        items.sort(key=lambda item: "did you mean" not in item[1])
+    items = wrong_fields(error, root, source.data)
     (keys, message), *others = items
     message = _with_full_path(keys, message, source)
     lines = [source.error(*other) for other in others[: MOST_SHOWN - 1]]

@@ -12,8 +12,8 @@ from pathlib import PurePosixPath
 from typing import Any, Final
 
 from sonarsynth.description import named_files
+from sonarsynth.description.field_messages import Where
 from sonarsynth.recipe.reading.yaml_source import SET, Source
-from sonarsynth.recipe.variation.values import Where
 
 MOST_BYTES: Final = 1 << 23
 OF_SHAPE: Final = ("unit", "sides", "heading", "pitch", "roll", "edge", "smooth", "crease")

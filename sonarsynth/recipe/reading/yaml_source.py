@@ -19,7 +19,8 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from sonarsynth.recipe.variation.values import Where, by_number, in_full, put, where
+from sonarsynth.description.field_messages import Where
+from sonarsynth.recipe.variation.values import by_number, in_full, put, where
 
 MAX_BYTES: Final = 2_000_000
 MAX_VALUES: Final = 50_000

@@ -5,11 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 from sonarsynth.description import FieldError
+from sonarsynth.description.field_messages import Where
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.sequences import Sequences
 from sonarsynth.recipe.variation.setting import Stamps
-from sonarsynth.recipe.variation.values import Where, where
+from sonarsynth.recipe.variation.values import where
 from sonarsynth.targets.target import base_mesh
 
 MOST_VARIANTS = 1000

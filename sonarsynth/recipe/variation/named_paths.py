@@ -6,10 +6,11 @@ from dataclasses import replace
 from typing import TypeVar
 
 from sonarsynth.description import FieldError
+from sonarsynth.description.field_messages import Where
 from sonarsynth.recipe.scene import World
 from sonarsynth.recipe.variation.grid import Axis, Zip
 from sonarsynth.recipe.variation.random_variations import Choice, Variation
-from sonarsynth.recipe.variation.values import Plain, Where
+from sonarsynth.recipe.variation.values import Plain
 
 Entry = TypeVar("Entry", bound=Axis | Variation)
 LISTS = ("targets", "sources", "noise_sources", "populations")

@@ -13,10 +13,10 @@ from pydantic import TypeAdapter, ValidationError
 
 from sonarsynth.conventions import Unit
 from sonarsynth.description import FieldError, named_files, unknown
+from sonarsynth.description.field_messages import Where, wrong_fields
 from sonarsynth.receiver import Sonar
-from sonarsynth.recipe.field_messages import error_message, error_path
 from sonarsynth.recipe.scene import Scene, Trajectory, World
-from sonarsynth.recipe.variation.values import Plain, Where, put, where
+from sonarsynth.recipe.variation.values import Plain, put, where
 
 _SCENE: TypeAdapter[Scene] = TypeAdapter(Scene)
 _PARTS: dict[str, tuple[type, TypeAdapter[Any]]] = {
@@ -87,9 +87,7 @@ def with_settings(scene: Scene, plain: dict[str, Any], settings: Sequence[Settin
 def _explained(error: ValidationError, part: str, data: Any, by_path: Sequence[tuple[Where, Setting]]) -> FieldError:
     """The first error of the validation of a part of a scene, with the setting that is to blame: the one that sets most
     of its path."""
-    errors = error.errors(include_url=False)  # a misspelt field explains a missing one
-    details = next((d for d in errors if d["type"] == "unexpected_keyword_argument"), errors[0])
-    keys, message = error_message(details, error_path(details, data), _PARTS[part][0], data)
+    keys, message = wrong_fields(error, _PARTS[part][0], data)[0]
     field = ("scene", part, *keys)
 
     def shared(item: tuple[Where, Setting]) -> int:

@@ -12,9 +12,7 @@ from typing import Annotated, Any
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter, WithJsonSchema
 
 from sonarsynth.conventions import ASSUMED_SPEED, bounded
-
-Where = tuple[str | int, ...]
-"""A path into a recipe: field names and indices from the top."""
+from sonarsynth.description.field_messages import Where
 
 WORLD = ("environment", "targets", "sources", "populations", "noise_sources", "scatterers", "chorus")
 SHORT = dict.fromkeys(WORLD, "scene.world.") | {"trajectory": "scene.", "sonar": "scene."}

@@ -14,8 +14,8 @@ from typing import Any, Final
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
-from sonarsynth.description import netcdf_files
-from sonarsynth.description.fortran_rows import FortranRow, fortran_rows
+from sonarsynth.description.file_formats import netcdf_files
+from sonarsynth.description.file_formats.fortran_rows import FortranRow, fortran_rows
 from sonarsynth.description.memory import max_facets
 from sonarsynth.geometry.surfaces import MeshError, Surface, weld
 from sonarsynth.targets.mesh_readers.mesh_repair import without_area

@@ -12,8 +12,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.description.file_formats.plain_xml import parsed_xml
 from sonarsynth.description.memory import max_facets
-from sonarsynth.description.plain_xml import parsed_xml
 from sonarsynth.geometry.surfaces import MeshError, Surface
 from sonarsynth.targets.mesh_readers.mesh_archives import only_file
 

@@ -14,8 +14,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from sonarsynth.conventions import Ints
+from sonarsynth.description.file_formats.plain_xml import parsed_xml, plain_xml
 from sonarsynth.description.memory import max_facets
-from sonarsynth.description.plain_xml import parsed_xml, plain_xml
 from sonarsynth.geometry.surfaces import MeshError, Surface, join
 from sonarsynth.targets.mesh_readers.mesh_archives import only_file
 from sonarsynth.targets.mesh_readers.mesh_text import polygons

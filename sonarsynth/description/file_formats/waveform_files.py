@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.description import hdf5_files
+from sonarsynth.description.file_formats import hdf5_files
 from sonarsynth.description.named_files import FileError
 
 RATES: Final = ("sampling_frequency", "sampling_rate", "sample_rate", "samplerate", "fs")

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
-from sonarsynth.description.hdf5_files import refuse_other_files
+from sonarsynth.description.file_formats.hdf5_files import refuse_other_files
 from sonarsynth.description.named_files import FileError
 
 if TYPE_CHECKING:

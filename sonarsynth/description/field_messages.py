@@ -2,28 +2,76 @@
 
 from __future__ import annotations
 
+import difflib
 import types
+from collections.abc import Iterable
 from dataclasses import is_dataclass
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, Final, Union, get_args, get_origin
 
+from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from sonarsynth.conventions import UNITS
-from sonarsynth.description import unknown
-from sonarsynth.recipe.variation.values import Where
-from sonarsynth.targets.target import CATEGORY, NAME
 
+NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,63}$"
+CATEGORY = r"^[A-Za-z][A-Za-z0-9_.+-]{0,63}$"
 ALLOWED = {NAME: "letters, digits, hyphens and underscores", CATEGORY: "letters, digits and _.+-"}
 """What names may be made of."""
 
 
-def error_path(details: ErrorDetails, data: Any) -> Where:
+SYNONYMS: Final = {"file": "path", "filename": "path"}
+"""What people write for a field, and its name, which is not spelt alike."""
+
+Where = tuple[str | int, ...]
+"""A path into a recipe, or a part of one: field names and indices from the top."""
+
+
+def unknown(name: str, names: Iterable[str], noun: str = "field") -> str:
+    """That there is no such name, and which one it may be."""
+    meant = [word for word in names if word == SYNONYMS.get(name)]
+    close = meant or difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(names)}"
+    return f"'{name}' is not a {noun} here; {hint}"
+
+
+def wrong_fields(error: ValidationError, root: Any, data: Any) -> list[tuple[Where, str]]:
+    """Path and text of all that is wrong with a description, a misspelt field first; root, data: its class, or a union
+    of such, and what its fields were to be."""
+    texts: dict[Where, str] = {}
+    explained = set[Where]()  # by what is wrong with one of their fields or entries
+    for details in error.errors(include_url=False):
+        keys, message = _message(details, _path(details, root, data), root, data)
+        if details["type"] == "dataclass_type" and (texts.get(keys) or "").startswith("must be '"):
+            texts[keys] = texts[keys].replace("' or '", "', '").replace(", not ", " or a mapping, not ", 1)
+        if details["type"] == "literal_error" and (texts.get(keys) or "").startswith("must be a list, not "):
+            texts[keys] = texts[keys].replace("a list, not ", f"a list or {details['ctx']['expected']}, not ", 1)
+        number = details["type"].startswith(("less_than", "greater_than")) or message.startswith("has unit ")
+        if number and (texts.get(keys) or "").startswith("must be '"):  # or a word
+            said = texts[keys].rpartition(", not ")[0].replace("' or '", "', '")
+            texts[keys] = message.replace("must be ", f"{said} or ", 1)
+        texts.setdefault(keys, message)
+        if details["type"] == "too_short":  # only entries that are right are counted
+            explained.add(keys)
+    meant = ("not a mapping", "not a list")
+    words = {keys for keys, text in texts.items() if text.startswith("must be '") and text.endswith(meant)}
+    for keys in explained | words:  # of a word, or a mapping or list, it is the latter that was meant
+        if any(len(longer) > len(keys) and longer[: len(keys)] == keys for longer in texts):
+            del texts[keys]
+    items = list(texts.items())
+    if items[0][1] == "is required":  # which a misspelt field explains
+        items.sort(key=lambda item: "did you mean" not in item[1])
+    return items
+
+
+def _path(details: ErrorDetails, root: Any, data: Any) -> Where:
     """The path of an error in the file: pydantic's, without the parts that name members of unions."""
     path: list[str | int] = []
     loc = details["loc"]
+    if len(loc) == 1 and loc[0] in _fields(root):  # maybe one that was left out, and has a default that cannot be
+        return loc
     for n, key in enumerate(loc):
         named = isinstance(data, dict) and key in data and data.get("kind") != key
-        if named or (isinstance(data, list) and isinstance(key, int) and key < len(data)):
+        if named or (isinstance(data, list | tuple) and isinstance(key, int) and key < len(data)):
             data = data[key]
         elif not (details["type"] == "missing" and n == len(loc) - 1):
             continue
@@ -31,7 +79,7 @@ def error_path(details: ErrorDetails, data: Any) -> Where:
     return tuple(path)
 
 
-def error_message(details: ErrorDetails, keys: Where, root: type, data: Any) -> tuple[Where, str]:
+def _message(details: ErrorDetails, keys: Where, root: Any, data: Any) -> tuple[Where, str]:
     """Path and text of an error."""
     context = details.get("ctx", {})
     if details["type"] == "union_tag_invalid":
@@ -89,8 +137,8 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
-def _fields(cls: type | None) -> list[str]:
-    return [] if cls is None else list(getattr(cls, "__pydantic_fields__", {}))
+def _fields(cls: Any) -> list[str]:
+    return list(getattr(cls, "__pydantic_fields__", {}))
 
 
 def _class_at(root: Any, keys: Where, data: Any) -> type | None:
@@ -137,7 +185,7 @@ def _chosen(kind: Any, data: Any) -> Any:
     options = members(kind)
     if len(options) == 1:
         return options[0]
-    if isinstance(data, list):
+    if isinstance(data, list | tuple):
         return next((m for m in options if get_origin(m) is tuple), None)
     tag = data.get("kind") if isinstance(data, dict) else None
     tagged = [m for m in options if _tag(m) is not None]
