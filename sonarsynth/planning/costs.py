@@ -162,6 +162,15 @@ def _traced(plan: Plan) -> str:
     return ", ".join(word for word in words if word)
 
 
+def _why_so_traced(plan: Plan) -> str:
+    """Why rays are straight or bent, in words."""
+    if plan.propagation == plan.scene.physics.tracing:
+        return "requested"
+    if plan.profile.uniform:
+        return "the sound speed is uniform"
+    return "the sound speed varies" if plan.propagation.bends else "refraction is below the required accuracy"
+
+
 def _steered(plan: Plan) -> str:
     """What the beamformer errs by, in words."""
     if np.isnan(plan.errors.image):
@@ -198,11 +207,9 @@ def _trace_rows(plan: Plan, size: FrameSize) -> list[Row]:
     rows = list[Row]()
     if plan.products:
         traced = 1 if plan.choices.subarrays == 1 else 1 + plan.choices.subarrays
-        bent = plan.propagation.bends
-        why = "the sound speed varies with depth" if bent else "refraction is below the required accuracy"
         seconds = _tracing(plan, size) * max(size.emissions, 1) * _ways(plan) * traced
         stored = PATH_BYTES * plan.sizes["path"] if "paths" in plan.products else 0
-        rows.append(("trace", _traced(plan), why, _expanded(plan), seconds, stored))
+        rows.append(("trace", _traced(plan), _why_so_traced(plan), _expanded(plan), seconds, stored))
     seconds = size.beams * SECONDS["label beam"] + size.facets * SECONDS["label facet"] + plan.propagation.cost(size)
     return [*rows, ("label", "one ray per beam", "always", "none", seconds, size.beams * 10 + 4096)]
 

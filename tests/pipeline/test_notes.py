@@ -128,3 +128,22 @@ def test_what_very_many_facets_cost_is_said_with_the_field_that_makes_them(
     for line in said:
         assert line.startswith(f"needle: {len(plan.scene.meshes[0].faces)} facets up to ") and why in line
         assert " s of one core and " in line and line.endswith(" of memory")
+
+
+@pytest.mark.parametrize(
+    ("water", "tracing", "why"),
+    [
+        (ss.Isovelocity(speed=1540.0), ss.AutoTracing(), "the sound speed is uniform"),
+        (ss.Isovelocity(speed=1540.0), ss.Refracted(), "requested"),
+        (ss.Linear(surface_speed=1540.0, gradient=1.0), ss.AutoTracing(), "the sound speed varies"),
+        (ss.Linear(surface_speed=1540.0, gradient=1.0), ss.Straight(), "requested"),
+    ],
+)
+def test_the_reason_why_rays_are_traced_so_is_the_true_one(
+    small: ss.Recipe, water: ss.Isovelocity | ss.Linear, tracing: ss.AutoTracing | ss.Refracted | ss.Straight, why: str
+) -> None:
+    """Straight rays that a recipe asks for in bending water were said to err by little enough."""
+    world = replace(small.scene.world, environment=replace(small.scene.world.environment, sound_speed=water))
+    scene = replace(small.scene, world=world, physics=replace(small.scene.physics, tracing=tracing))
+    (trace,) = (stage for stage in ss.plan(replace(small, scene=scene), ["paths"]).stages if stage.stage == "trace")
+    assert trace.why == why
