@@ -43,8 +43,8 @@ class AccuracyReport:
 
     @property
     def ok(self) -> bool:
-        """Whether every verdict is good, and the exact way itself right."""
-        return all(v.ok for v in self.verdicts) and all(p.meets for p in self.points if p.role == "check")
+        """Whether the errors of all choices are within what is allowed, and the exact way itself is right."""
+        return all(v.meets for v in self.verdicts) and all(p.meets for p in self.points if p.role == "check")
 
     def as_json(self) -> list[dict[str, Any]]:
         """A list of rows, for programs: points, peers and checks, then verdicts."""

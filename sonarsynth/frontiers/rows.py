@@ -59,7 +59,13 @@ class Verdict:
     """The cheapest setting of the walk that keeps within the accuracy too."""
     cheapest_seconds: float
     ok: bool
+    """Whether the error is within what is allowed, and the choice takes little more than the cheapest setting."""
     note: str = ""
+
+    @property
+    def meets(self) -> bool:
+        """As `Point.meets`: unlike `ok`, it does not depend on times."""
+        return self.error <= self.allowed
 
     @property
     def ratio(self) -> float:
@@ -68,7 +74,7 @@ class Verdict:
 
     def as_json(self) -> dict[str, Any]:
         """The row for programs."""
-        return {"row": "verdict"} | asdict(self) | {"ratio": self.ratio}
+        return {"row": "verdict"} | asdict(self) | {"ratio": self.ratio, "meets": self.meets}
 
 
 def merged(points: Iterable[Point]) -> list[Point]:

@@ -232,7 +232,7 @@ def test_the_command(
 
     def measures(recipe: Recipe, frames: object = None, **more: object) -> AccuracyReport:
         asked.extend([recipe.accuracy.signal, frames, more["hydrophones"], more["seed"], more["peers"]])
-        return replace(measured, verdicts=tuple(replace(v, ok=True) for v in measured.verdicts))
+        return replace(measured, verdicts=tuple(replace(v, ok=False) for v in measured.verdicts))  # all too slow
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sonarsynth.cli.accuracy_tables.frontier_table.measure", measures)
@@ -240,7 +240,7 @@ def test_the_command(
         assert run(app, ["accuracy", str(file), *options, "--out", str(tmp_path)]) == 0
     assert asked == [0.003, (1,), 7, 5, False]
     said = capsys.readouterr().out
-    assert "verdicts" in said and "dynamic" in said and "not installed" in said
+    assert "verdicts" in said and "slow" in said and "dynamic" in said and "not installed" in said
     assert str(tmp_path / "scene.json") in said and (tmp_path / "scene.png").exists()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
@@ -248,7 +248,7 @@ def test_the_command(
         )
         assert run(app, ["accuracy", str(file), "--json", "--out", str(tmp_path)]) == 0
         assert len(json.loads(capsys.readouterr().out)) == len(measured.points)
-        wrong = (replace(measured.verdicts[0], ok=False),)
+        wrong = (replace(measured.verdicts[0], error=1.0),)
         patch.setattr(
             "sonarsynth.cli.accuracy_tables.frontier_table.measure", lambda *a, **k: replace(measured, verdicts=wrong)
         )
