@@ -16,7 +16,7 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from benchmarks.timing import once
+from benchmarks.timing import markdown, once
 from sonarsynth.casting.surface_distances import surface_distances
 from sonarsynth.geometry import Pose
 from sonarsynth.pipeline import BeamformedFrame, beamform_frame, cloud_of, trace_frame
@@ -27,13 +27,13 @@ from sonarsynth.recipe.scene import Frame
 
 RECIPE, EVERY = "configs/remus.yaml", 4
 SCENES = {
-    "silent": [],
-    "45 dB of noise": ["scene.world.environment.noise={kind: flat, level: 45 dB}"],
+    "as shipped": [],
+    "noise of 45 dB re 1 uPa2/Hz": ["scene.world.environment.noise={kind: flat, level: 45 dB}"],
     "Kirchhoff facets": ["scene.physics.scattering={kind: kirchhoff}"],
 }
 PICKINGS: dict[str, Any] = {
-    "first echo, the thesis's": FirstEcho(locality=60.0),
-    "beam axis, 3 dB": BeamAxis(),
+    "the thesis's first echo": FirstEcho(locality=60.0),
+    "on the axes of beams": BeamAxis(),
     "peaks": Peaks(),
 }
 NEAR, TOUCHED = 0.05, 0.10
@@ -94,10 +94,12 @@ def bench() -> dict[str, Any]:
 
 
 def table(result: dict[str, Any]) -> str:
-    """The figures as a table."""
-    columns = ("points_a_frame", "within_5_cm", "median_cm", "covered", "chamfer_cm", "ms")
-    lines = [f"{'':44}" + "".join(f"{name:>15}" for name in columns)]
+    """A row for each scene and way of picking."""
+    rows = [("scene, picking", "points a frame", "within 5 cm", "median, cm", "covered", "Chamfer, cm", "ms")]
     for scene in SCENES:
         for name, row in result[scene].items():
-            lines.append(f"{scene + ', ' + name:44}" + "".join(f"{row[column]:15.3g}" for column in columns))
-    return "\n".join(lines)
+            points, near, *lengths = (row[key] for key in ("points_a_frame", "within_5_cm", "median_cm", "chamfer_cm"))
+            median, chamfer = (f"{length:.2g}" for length in lengths)
+            figures = f"{points:.2g}", f"{near:.2f}", median, f"{row['covered']:.2f}", chamfer, f"{row['ms']:.1f}"
+            rows.append((f"{scene}, {name}", *figures))
+    return "\n".join(markdown(rows))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import sonarsynth as ss
-from benchmarks.timing import RECIPE, cpu
+from benchmarks.timing import RECIPE, cpu, markdown
 from sonarsynth import pipeline, planning
 from sonarsynth.pipeline import TracedFrame
 from sonarsynth.planning import Plan
@@ -19,7 +19,7 @@ from sonarsynth.signals import DirectSum
 
 LAWS = {
     "lobe": ss.MirrorLobe(),
-    "kirchhoff": ss.Kirchhoff(),
+    "Kirchhoff": ss.Kirchhoff(),
     "rough, 2 mm": ss.Kirchhoff(roughness=0.002, slope=0.2),
     "rough, 20 mm": ss.Kirchhoff(roughness=0.02, slope=0.2),
 }
@@ -90,7 +90,19 @@ def bench(index: int = 20) -> dict[str, Any]:
             "trace_and_label_ms": 1e3 * tracing,
             "synthesise_ms": shaped,
             "synthesise_as_scaled_snaps_ms": scaled,
-            "shapes_cost": shaped / scaled,
             "error_over_echo_peak": error,
         }
     return {"method": plan.scene.physics.synthesis.kind, "exact": DirectSum().kind, "laws": rows}
+
+
+def table(result: dict[str, Any]) -> str:
+    """A column for each law."""
+    laws = result["laws"]
+    rows = [("", *laws)]
+    rows.append(("facets, paths", *(f"{law['facets']}, {law['paths']}" for law in laws.values())))
+    rows.append(("trace and label, ms", *(f"{law['trace_and_label_ms']:.0f}" for law in laws.values())))
+    synthesis = (f"{law['synthesise_ms']:.0f}; {law['synthesise_as_scaled_snaps_ms']:.0f}" for law in laws.values())
+    rows.append(("synthesise, ms; the same paths as scaled snaps", *synthesis))
+    errors = (f"{law['error_over_echo_peak']:.0e}" for law in laws.values())
+    rows.append(("error of the signals against direct sums, of the echo's peak", *errors))
+    return "\n".join(markdown(rows))
