@@ -39,7 +39,7 @@ class Target:
     category: Category = NO_CATEGORY
     """What a detector is to call it: a word."""
     clutter: bool = False
-    """Whether it is there to be taken for a target, and is none."""
+    """Whether it is clutter, which no detector is asked to find: what it reports there is a false alarm."""
     scale: Scale = 1.0
     """So many times as large as the shape, about its origin."""
     mesh_scale: Scale | None = None

@@ -35,9 +35,8 @@ targets, emissions = store["truth/targets"], store["truth/emissions"]
 # %% [markdown]
 # ## The image and the box of the target
 #
-# `image_box` bounds the visible part of the target in azimuth and elevation, at the instant of the frame. The image
-# shows where the sound met the target, some milliseconds later. The brightest beam may lie beside the box by a
-# part of a beam's width.
+# `image_box` bounds the visible part of the target in azimuth and elevation, where the sound met it, as the image shows
+# it. The brightest beam may lie beside the box by a part of a beam's width.
 
 # %%
 peak = image["energy"].argmax(["elevation", "azimuth"])

@@ -26,7 +26,7 @@ TARGETS = group_of(
         "clutter",
         TARGET,
         "1",
-        "whether it is there to be taken for a target, and is none",
+        "whether it is clutter, which no detector is asked to find",
         dtype="int8",
         attributes=_YES,
     ),
@@ -36,7 +36,7 @@ TARGETS = group_of(
         "position",
         (*TARGET, "xyz"),
         "m",
-        "position of the target's origin in the world at the instant of the frame",
+        "position of the target's origin in the world",
         attributes=INSTANT,
     ),
     row(

@@ -23,10 +23,10 @@ class BeamAxis(Method):
     and all others; error of range along the beam):
 
         locality    on    off    median    nine in ten
-        0.5 dB      61     45    2.4 cm         4.4 cm
-        1 dB        83     93    2.6 cm         5.9 cm
-        3 dB       121    248    3.3 cm         9.6 cm
-        60 dB      149    609    4.4 cm          12 cm
+        0.5 dB      66     37    2.5 cm         5.1 cm
+        1 dB        82     86    2.8 cm         6.3 cm
+        3 dB       125    233    3.2 cm          11 cm
+        60 dB      154    611    3.8 cm          14 cm
 
     Points come out a few centimetres short: beside a glint a beam takes the shortest path that it hears. Predicted
     errors hold it (all of these are within three).

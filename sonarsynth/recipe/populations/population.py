@@ -72,7 +72,7 @@ class Population:
     """Whether their number and the first places that are tried are spread over the repeats of a grid point more evenly
     than by chance (as `kind: sobol` of variations)."""
     clutter: bool = False
-    """Whether they are there to be taken for targets, and are none."""
+    """Whether they are clutter, which no detector is asked to find: what it reports there is a false alarm."""
 
     @model_validator(mode="after")
     def _check(self) -> Population:
