@@ -23,7 +23,10 @@ Settings = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Split = Annotated[str | None, typer.Option(metavar="NAME", help="Only these frames: train, validation or test.")]
 Workers = Annotated[
-    int | None, typer.Option(min=0, help="Worker processes (default: one per core, none for a short build; 0 runs in this process).")
+    int | None,
+    typer.Option(
+        min=0, help="Worker processes (default: one per core, none for a short build; 0 runs in this process)."
+    ),
 ]
 Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="A running Dask scheduler, such as tcp://127.0.0.1:8786.")
