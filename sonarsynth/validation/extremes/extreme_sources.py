@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
 from sonarsynth.conventions import Floats, azimuth_elevation, direction
+from sonarsynth.environment.boundaries import Rigid, SeaBottom
+from sonarsynth.geometry import Pose
 from sonarsynth.pipeline import render
 from sonarsynth.planning import Plan, plan
 from sonarsynth.products import REASONS, Signals, SourceEstimates
+from sonarsynth.propagation import AutoTracing
 from sonarsynth.ranging import SensorDelays
-from sonarsynth.receiver import Band, Elements, PlanarLattice, Sonar, elements
+from sonarsynth.receiver import POINT, Band, Elements, PlanarLattice, Sonar, elements
 from sonarsynth.recipe import reading
-from sonarsynth.state import Receiver, Survey
-from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, together
-from sonarsynth.validation.extremes.plain_scenes import BOTTOM_DEPTH, POSE, PROFILE, RATE, C, direct
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Survey
+from sonarsynth.tracing.arrivals import trace
+from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, relative, together
+from sonarsynth.validation.extremes.plain_scenes import (
+    BOTTOM_DEPTH,
+    POSE,
+    PROFILE,
+    PULSE,
+    RATE,
+    SONAR,
+    WATER,
+    C,
+    direct,
+)
 
 LATTICE = PlanarLattice(columns=16, rows=16, pitch=0.08, face=0.0)
 BAND = Band(low=25e3, high=85e3)
@@ -199,6 +214,28 @@ def _pings() -> CaseResult:
     return together(results)
 
 
+def _mirrored() -> CaseResult:
+    """A snap on a rigid bottom, 12 m under the surface, and one at the surface, by 1 to 8 reflections."""
+    depth, down, away, results = 12.0, 5.0, 9.0, []
+    environment = replace(WATER, depth=depth, bottom=SeaBottom(reflection=Rigid()))
+    receiver = Receiver(Pose(np.array([0.0, 0.0, -down]), POSE.orientation), POINT, SONAR)
+    for most in range(1, 9):
+        at_bottom, at_surface = (
+            trace(
+                FrameContext(0.0, (), (Emission(np.array([away, 0.0, z]), 0.0, PULSE, None),),
+                             Medium(environment, PROFILE), receiver, ()),
+                AutoTracing(bounces=most),
+            )
+            for z in (-depth, 0.0)
+        )  # fmt: skip
+        k = np.arange(most + 1)  # reflections on the way of the snap, one less than on that of its image
+        height = np.where(k % 2 == 0, (k + 1) * depth - down, k * depth + down)
+        pressure = 2.0 * (-1.0) ** ((k + 1) // 2) / np.hypot(away, height)
+        found = at_bottom.amplitude[np.argsort(at_bottom.delay)]
+        results += [relative(found, pressure, 1e-12), holds(not len(at_surface.delay), "nothing at the surface")]
+    return together(results)
+
+
 CASES = (
     Case("a snap in mid-water, 10 m to 5 km away", "the bearing; the place within its errors, or none", _middle),
     Case("bands of 100 Hz to 60 kHz", "the place within its errors, or none with a reason", _bands),
@@ -206,5 +243,6 @@ CASES = (
     Case("a stranger 20 dB louder", "the louder one first, each within its errors", _stranger),
     Case("1e5 snaps of a chorus a second", "the mean square of Campbell's theorem", _dense),
     Case("pings of 0.2 to 20 ms, targets 2 and 20 m off", "a point within its errors; none under the ping", _pings),
+    Case("a snap on a rigid bottom, at a free surface", "it and its image, by every reflection; nothing", _mirrored),
     Case("a chorus at the surface and on the bottom", "finite, no louder than at the bubble", _bounded),
 )
