@@ -200,8 +200,9 @@ def plan_report(plan: Plan, prediction: Prediction) -> None:
         out.print(line, markup=False)
     out.print(", ".join(counted(count, name) for name, count in plan.sizes.items()))
     p = prediction
+    made = f"with {counted(p.workers, 'worker')}" if p.workers else "in one process"
     out.print(
-        f"predicted: {duration(p.seconds)} for {counted(p.frames, 'frame')} with {counted(p.workers, 'worker')}, "
+        f"predicted: {duration(p.seconds)} for {counted(p.frames, 'frame')} {made}, "
         f"{duration(p.core_seconds)} of CPU time; {format_bytes(p.bytes)} on disk, {format_bytes(p.raw_bytes)} before "
         "compression"
     )

@@ -16,7 +16,7 @@ from sonarsynth.labels.odds import NO_ODDS, Odds
 from sonarsynth.planning import Plan
 from sonarsynth.planning.costs import machine_factor
 from sonarsynth.schedule.benchmark_frames import Sizes, Trial, disk_use, try_frames
-from sonarsynth.schedule.making import usable_cores
+from sonarsynth.schedule.making import brief, usable_cores
 
 if TYPE_CHECKING:
     from sonarsynth.schedule.build_report import BuildReport
@@ -171,7 +171,10 @@ def predict(
         result = replace(result, basis=f"counts of operations: no frame could be timed ({line})", failures=(line,))
     else:
         result = _from(result, trial)
-    return result.of(frames=frames, workers=workers)
+    wanted = plan.recipe.frames if frames is None else frames
+    if workers is None and wanted <= result.shard_frames and brief(plan, range(wanted)):
+        workers = 0  # as `build` has it
+    return result.of(frames=wanted, workers=workers)
 
 
 def _from(prediction: Prediction, trial: Trial) -> Prediction:

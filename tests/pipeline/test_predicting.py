@@ -49,6 +49,13 @@ def split(names: str) -> list[str]:
     return [name for name in names.split(",") if name]
 
 
+def test_a_brief_build_of_one_shard_is_predicted_in_the_process_itself(small_plan: Plan) -> None:
+    """As it is built: the 4 s in which workers start are not in it."""
+    one, two = (schedule.predict(small_plan, frames=frames) for frames in (8, 9))
+    assert (one.workers, two.workers) == (0, min(schedule.usable_cores(), 2))
+    assert one.core_seconds == one.frames * one.frame_seconds
+
+
 @pytest.mark.parametrize("products", TASKS)
 def test_only_what_was_asked_for_runs(small: Recipe, tmp_path: Path, products: str) -> None:
     """Of worker processes too: test_object_store builds images."""

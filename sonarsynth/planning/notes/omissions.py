@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonarsynth.conventions import counted
 from sonarsynth.environment.boundary_numbers import rms_height
 from sonarsynth.environment.casts import profile_of
 from sonarsynth.geometry.mesh import Mesh
@@ -40,9 +41,8 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     if not plan.propagation.bends:
         rows.append(Omission("refraction", "straight rays", _refraction_bound(plan, frame)))
     bounces = plan.propagation.bounces
-    families = (
-        "the direct family" if not bounces else f"paths by at most {bounces} reflections at surface and bottom in all"
-    )
+    reflected = f"paths by at most {counted(bounces, 'reflection')} at surface and bottom in all"
+    families = reflected if bounces else "the direct family"
     rows.append(Omission("more reflections", f"requested: {families}", reflected_bound(plan)))
     rows += curved_waves(plan)
     rough = [b for b in (environment.surface, environment.bottom) if rms_height(b) > 0.0]
