@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -124,7 +125,7 @@ def pick(some: Any, random: np.random.Generator) -> Any:
 def by_schema(case: Case, random: np.random.Generator) -> Case:
     """A field of the whole schema, there or left out, set to a value that its schema allows."""
     try:
-        data = YAML(typ="safe", pure=True).load(case.text.decode())
+        data = loaded(case.text)
         holder, key, schema = pick(spots(data, whole(), random), random)
         holder[key] = drawn(schema, random)
         text = json.dumps(data, indent=1)
@@ -136,7 +137,7 @@ def by_schema(case: Case, random: np.random.Generator) -> Case:
 def by_structure(case: Case, random: np.random.Generator) -> Case:
     """Another value, a missing or added field, entries repeated, a number scaled, a part of the recipe elsewhere."""
     try:
-        data = YAML(typ="safe", pure=True).load(case.text.decode())
+        data = loaded(case.text)
         where = list(places(data))
         text = json.dumps(data, indent=1)
     except Exception:  # an earlier mutation left no YAML
@@ -166,7 +167,16 @@ def by_structure(case: Case, random: np.random.Generator) -> Case:
     return replace(case, text=text.encode("utf-8", "replace"), done=(*case.done, f"{how} {key}"[:60]))
 
 
+MOST_PLACES = 1_000_000
 HOWS = ("value", "value", "scale", "scale", "scale", "elsewhere", "field", "repeat", "delete")
+
+
+def loaded(text: bytes) -> Any:
+    """The values of a YAML text. Raises ValueError where there are very many: aliases of aliases fill any memory."""
+    data = YAML(typ="safe", pure=True).load(text.decode())
+    if sum(1 for _ in islice(places(data), MOST_PLACES)) == MOST_PLACES:
+        raise ValueError("an earlier mutation left too many values")
+    return data
 
 
 def places(data: Any) -> Any:
