@@ -296,4 +296,4 @@ def kink(profile: Profile, depth: float, reach: float) -> float:
     inside = profile.depth[np.abs(profile.depth - depth) < reach]
     node = np.unique([depth - reach, *inside, depth + reach])
     slope = np.diff(profile.at(node)) / np.diff(node)
-    return float(np.ptp(slope))
+    return float(np.ptp(slope)) if len(slope) else 0.0  # a reach that rounding swallows

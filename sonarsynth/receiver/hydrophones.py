@@ -19,6 +19,9 @@ ROMANIS_ROWS = (4, 10, 14, 18, 20, 20, 22, 22, 24, 24, 24, 26, 26, 26, 26, 24, 2
 
 MOST_PLACES = 100_000
 """Of a lattice."""
+CLOSEST = 1e-9
+"""m: hydrophones that span less, and are not at one place, differ by less than paths can be told apart."""
+Pitch = Annotated[PositiveMetres, Ge(CLOSEST)]
 
 
 @description
@@ -34,7 +37,7 @@ class PlanarLattice:
     """Places in a row, from port to starboard."""
     rows: Annotated[int, Ge(1), Le(4096)]
     """Rows, from top to bottom."""
-    pitch: PositiveMetres
+    pitch: Pitch
     """Distance between neighbours in a row and in a column."""
     face: NonNegativeMetres | None = None
     """Side of the square face of an element; the pitch if left out, 0 for point hydrophones."""
@@ -65,7 +68,7 @@ class Romanis:
     """
 
     kind: Literal["romanis"] = "romanis"
-    pitch: PositiveMetres = 49.53e-3
+    pitch: Pitch = 49.53e-3
     """Distance between neighbours in a row and in a column."""
     face: NonNegativeMetres = 49.53e-3
     """Side of the square face of an element, 0 for point hydrophones."""
@@ -85,6 +88,13 @@ class PositionTable:
     """Side of the square face of an element, 0 for point hydrophones."""
     dead: tuple[int, ...] = ()
     """Numbers of elements that give nothing."""
+
+    @model_validator(mode="after")
+    def _check(self) -> PositionTable:
+        span = float(np.ptp(np.array(self.positions), axis=0).max())
+        if 0.0 < span < CLOSEST:
+            raise ValueError(f"positions span {span:g} m: they must be one place, or span {CLOSEST:g} m or more")
+        return self
 
 
 Array = Annotated[PlanarLattice | Romanis | PositionTable, BY_KIND]

@@ -233,6 +233,14 @@ def test_a_region_that_is_too_small_names_the_population_and_the_sequence() -> N
     assert raised.value.path[:4] == ("scene", "world", "populations", 0)
 
 
+def test_a_model_that_has_no_mesh_is_named() -> None:
+    """It ended with a traceback where a sequence was drawn before the models were looked at."""
+    fine = BodyModel(shape=Sphere(radius=400.0, edge=0.01), weight=1e6)
+    with pytest.raises(FieldError, match="use a longer edge") as raised:
+        recipe(some(least=1, models=(CRATE, fine))).scene_of(0)
+    assert raised.value.path == ("scene", "world", "populations", 0, "models", 1, "shape")
+
+
 def test_a_plan_says_how_many_bodies_there_are_and_how_many_places_were_refused() -> None:
     """Half of the box is in the air."""
     half = some(least=2, most=2, region=BoxRegion(low=(5.0, -8.0, -15.0), high=(25.0, 8.0, 15.0)), apart=0.0)

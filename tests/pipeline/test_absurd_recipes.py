@@ -50,6 +50,12 @@ ABSURD = [
         "columns: 4000, rows: 4000",
         "14: scene.sonar.array: has 16000000 places, more than 100000",
     ),
+    ("pitch: 5 cm", "pitch: 1e-299", "14: scene.sonar.array.pitch: must be greater than or equal to 0.000000001"),
+    (
+        "kind: planar_lattice, columns: 5, rows: 4, pitch: 5 cm",
+        "kind: position_table, positions: [[0, 0, 0], [0, 1e-299, 0], [0, 0, 1e-299]]",
+        "14: scene.sonar.array: positions span 1e-299 m: they must be one place, or span 1e-09 m or more",
+    ),
     (
         SHAPE,
         "kind: sphere, radius: 1e9",

@@ -188,6 +188,18 @@ REFUSED = {
         threemf('<item objectid="2"/>', DEEP + '<object id="16"><components/></object>'),
         "components within components without end",
     ),
+    "infinite.3mf": (
+        threemf('<item objectid="1" transform="1e999 0 0 0 1 0 0 0 1 0 0 0"/>'),
+        "a transform that is not 12 finite numbers",
+    ),
+    "overflowing.3mf": (
+        threemf(
+            '<item objectid="2" transform="1e300 1e300 0 -1e300 1 0 0 0 1 0 0 0"/>',
+            '<object id="2"><components><component objectid="1" transform="1e300 1e300 0 1e300 1e300 0 0 0 1 0 0 0"/>'
+            "</components></object>",
+        ),
+        "is not finite",
+    ),
     "lost.3mf": (threemf('<item objectid="9"/>'), "places object '9', which is not in its model"),
     "outside.gltf": (gltf("../box.bin")[0], "names a buffer outside its folder"),
     "absolute.gltf": (gltf("/etc/passwd")[0], "names a buffer outside its folder"),

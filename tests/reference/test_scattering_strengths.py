@@ -52,6 +52,16 @@ def test_backscattering_of_sediments_is_the_published_one(name: str) -> None:
     assert np.abs(found - PUBLISHED[name]).max() < 0.6
 
 
+def test_roughness_scatters_less_the_longer_the_wave_down_to_none(recwarn: pytest.WarningsRecorder) -> None:
+    """Aside of the mirror direction as k^(4 - 3.25); a band that begins at 1e-297 Hz divided by zero."""
+    angles = back(GRAZING[:1])
+    volume = sediment(angles, 1e-290, "sandy gravel")
+    rough = [float((sediment(angles, k, "sandy gravel") - volume)[0]) for k in (1e-3, 1e-2, 1e-1)]
+    assert np.log10(rough[1] / rough[0]) == pytest.approx(0.75, abs=0.01)
+    assert np.log10(rough[2] / rough[1]) == pytest.approx(0.75, abs=0.01)
+    assert np.isfinite(volume).all() and not recwarn.list
+
+
 def test_sediment_between_two_directions_is_the_published_one() -> None:
     sine = np.full(5, np.sin(np.deg2rad(20.0)))
     angles = Angles(sine, sine, np.cos(np.deg2rad([0.0, 45.0, 90.0, 135.0, 180.0])))

@@ -101,8 +101,8 @@ def sediment(angles: Angles, wavenumber: float, name: str) -> Floats:
     inner = [np.where(p.imag > 0.0, -p, p) for p in inner]
     both = np.abs(passes[0] * passes[1]) ** 2
     change = (1.0 / density - 1.0) * (angles.level - inner[0] * inner[1] / density) + 1.0 - index**2 / density
-    spectrum = rough.spectral_strength / (2.0 * k * (np.sqrt(level) + 1e-4)) ** EXPONENT
-    perturbed = 0.25 * k**4 * both * np.abs(change) ** 2 * spectrum
+    spectrum = rough.spectral_strength / (2.0 * (np.sqrt(level) + 1e-4)) ** EXPONENT  # times k to the EXPONENT
+    perturbed = 0.25 * k ** (4.0 - EXPONENT) * both * np.abs(change) ** 2 * spectrum
     faded = np.abs((inner[0] + inner[1]).imag) / 2.0
     volume = 5.0 * loss * rough.volume / (speed * np.log(10.0)) * both / (density**2 * np.maximum(faded, 1e-12))
     with np.errstate(divide="ignore"):

@@ -84,7 +84,8 @@ class _MovingBox:
 def draw(scene: Scene, seed: int, key: int | str, repeat: tuple[str, int]) -> DrawnBodies:
     """The bodies of the populations of a scene, that of the sequence of a key.
 
-    repeat: its grid point, and which repeat of that it is. Raises FieldError where a population has no room.
+    repeat: its grid point, and which repeat of that it is. Raises FieldError where a population has no room, or
+    a model no mesh.
     """
     sea = _Sea.of(scene, seed, key)
     bodies: list[Target] = []
@@ -185,7 +186,8 @@ class _Sea:
         if position is None:
             return None
         weights = np.cumsum([model.weight for model in population.models])
-        model = population.models[int(np.searchsorted(weights, draws[-1] * weights[-1], side="right"))]
+        number = int(np.searchsorted(weights, draws[-1] * weights[-1], side="right"))
+        model = population.models[number]
         smallest, largest = model.scale
         attitude = population.orientation.attitude(draws[3:6])
         motion = population.track.motion(position, attitude, self.span, draws[6 : 6 + DRAWS])
@@ -200,7 +202,11 @@ class _Sea:
             mesh_scale=largest,
         )
         law = model.scattering or self.scene.physics.scattering
-        mesh = target.base_mesh(law, self.scene.sonar.shortest_wavelength)
+        try:
+            mesh = target.base_mesh(law, self.scene.sonar.shortest_wavelength)
+        except (ValueError, OSError) as error:
+            at = ("scene", "world", "populations", self.scene.world.populations.index(population), "models", number)
+            raise FieldError((*at, "shape"), str(error)) from None
         hull = target.scale * hull_of(mesh)
         if population.on_bottom:
             places = pose(motion, self.span.middle).to_world(hull)

@@ -36,9 +36,10 @@ def read_3mf(data: bytes) -> Surface:
     faces: list[np.ndarray] = []
     placed: list[str] = []
     try:
-        for item in root.iter(f"{CORE}item"):
-            _refuse_other_parts(item)
-            _place(objects, item.get("objectid", ""), _matrix(item), vertices, faces, placed)
+        with np.errstate(over="ignore", invalid="ignore"):  # places that are not finite are refused of all files alike
+            for item in root.iter(f"{CORE}item"):
+                _refuse_other_parts(item)
+                _place(objects, item.get("objectid", ""), _matrix(item), vertices, faces, placed)
     except (ValueError, TypeError, KeyError) as error:
         if isinstance(error, MeshError):
             raise
@@ -96,6 +97,6 @@ def _refuse_other_parts(element: Element) -> None:
 def _matrix(element: Element) -> Floats:
     """Rows of a transform (4, 4): three of the axes, then the shift; a point is a row to their left."""
     numbers = [float(n) for n in element.get("transform", "1 0 0 0 1 0 0 0 1 0 0 0").split()]
-    if len(numbers) != 12:
-        raise MeshError("has a transform without 12 numbers")
+    if len(numbers) != 12 or not np.isfinite(numbers).all():
+        raise MeshError("has a transform that is not 12 finite numbers")
     return np.hstack([np.array(numbers).reshape(4, 3), [[0.0], [0.0], [0.0], [1.0]]])
