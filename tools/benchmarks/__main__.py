@@ -23,6 +23,7 @@ BENCHMARKS = (
     "growth",
     "ablation",
     "detectors",
+    "images",
 )
 """Modules beside this one; each has a function `bench`."""
 
