@@ -22,6 +22,7 @@ import typer
 import sonarsynth
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
+from tools.benchmarks.__main__ import BENCHMARKS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -133,13 +134,19 @@ def test_every_command_and_option_a_page_names_is_there(page: Path) -> None:
         name for command in commands.values() for one in command.params for name in one.opts + one.secondary_opts
     }
     text = page.read_text()
-    spans = [span for span in re.findall(r"`([^`\n]+)`", text) if not re.search(r"tools/(faults|pages)|dask", span)]
+    spans = [span for span in re.findall(r"`([^`\n]+)`", text) if not re.search(r"tools/(bench|faults|pages)|dask", span)]
     named = {word for span in spans for word in re.findall(r"(?<![\w-])--[a-z-]+", span)}
     assert (
         named - options - {"--arrivals", "--kills", "--nthreads", "--to", "--protocol", "--scheduler-file", "--help"}
         == set()
     )
     assert {span.split()[1] for span in spans if span.startswith("tools/sonarsynth ")} - commands.keys() <= {"COMMAND"}
+
+
+def test_every_marked_table_is_one_that_a_benchmark_writes() -> None:
+    """`tools/bench NAME --page` puts its table there."""
+    marks = re.findall(r"^<!-- tools/bench (\w+) -->\n\n\|", "\n".join(map(Path.read_text, PAGES)), re.MULTILINE)
+    assert len(marks) == len(set(marks)) >= 5 and set(marks) <= set(BENCHMARKS)
 
 
 def test_the_readme_is_short_and_names_rooms_and_recipes_that_are_there() -> None:
