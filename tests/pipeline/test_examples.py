@@ -134,7 +134,9 @@ def test_every_command_and_option_a_page_names_is_there(page: Path) -> None:
         name for command in commands.values() for one in command.params for name in one.opts + one.secondary_opts
     }
     text = page.read_text()
-    spans = [span for span in re.findall(r"`([^`\n]+)`", text) if not re.search(r"tools/(bench|faults|pages)|dask", span)]
+    spans = [
+        span for span in re.findall(r"`([^`\n]+)`", text) if not re.search(r"tools/(bench|faults|pages)|dask", span)
+    ]
     named = {word for span in spans for word in re.findall(r"(?<![\w-])--[a-z-]+", span)}
     assert (
         named - options - {"--arrivals", "--kills", "--nthreads", "--to", "--protocol", "--scheduler-file", "--help"}
