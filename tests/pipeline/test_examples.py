@@ -151,6 +151,16 @@ def test_every_marked_table_is_one_that_a_benchmark_writes() -> None:
     assert len(marks) == len(set(marks)) >= 5 and set(marks) <= set(BENCHMARKS)
 
 
+def test_the_readme_has_the_precision_of_detectors_that_their_page_has() -> None:
+    said = " ".join(PAGES[0].read_text().split())
+    pairs = re.findall(r"(0\.\d\d) and (?:CFAR )?(0\.\d\d) on `(\w+)\.yaml`", said)
+    table = (ROOT / "tools/docs/tutorials/train-and-evaluate.md").read_text().partition("tools/bench detectors -->")[2]
+    for peaks, cfar, recipe in pairs:
+        rows = table.partition(f"`{recipe}.yaml`")[2]
+        assert re.findall(r"`(?:peaks|cfar)` \| (0\.\d\d) \|", rows)[:2] == [peaks, cfar]
+    assert [recipe for *_, recipe in pairs] == ["reef", "survey"]
+
+
 def test_the_readme_is_short_and_names_rooms_and_recipes_that_are_there() -> None:
     text = PAGES[0].read_text()
     lines = text.splitlines()
