@@ -22,6 +22,7 @@ from tests.scenes import remus
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 DEEP_GRADIENT = "scene.world.environment.sound_speed={kind: tabulated, depth: [0 m, 300 m], speed: [1500, %s]}"
+DEEP_SOURCE = "scene.world.sources.0.position=[18, -9, -%d]"
 RECIPES = {
     "remus.yaml": (),
     "tank.yaml": ("scene.trajectory.frames=4",),
@@ -130,10 +131,12 @@ def test_more_accuracy_takes_more_work() -> None:
         assert fine.synthesis.tolerance < rough.synthesis.tolerance
 
 
-def test_bending_that_moves_nothing_is_left_out() -> None:
-    """A gradient of 1e-6 per second bends no ray by a thousandth of a wave; one of 1 does."""
+@pytest.mark.parametrize("depth", [160, 150])
+def test_bending_that_moves_nothing_is_left_out(depth: int) -> None:
+    """A gradient of 1e-6 per second bends no ray by a thousandth of a wave, nor one between ends of one depth, which
+    turns half way; one of 1 does."""
     even, bent = (
-        planning.plan(reading.load(CONFIGS / "deep.yaml", (DEEP_GRADIENT % speed,)), {"signals"})
+        planning.plan(reading.load(CONFIGS / "deep.yaml", (DEEP_GRADIENT % speed, DEEP_SOURCE % depth)), {"signals"})
         for speed in ("1500.0003", "1800")
     )
     assert (even.propagation.kind, bent.propagation.kind) == ("straight", "refracted")

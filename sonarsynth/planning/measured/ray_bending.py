@@ -87,11 +87,11 @@ def around(frame: Frame, bottom: float) -> Floats:
 
 
 def _alike(first: Paths, second: Paths) -> bool:
-    """Whether two models find the same paths: the same pairs, reflections and turns, none flagged."""
+    """Whether two models find the same paths: of the same pairs and reflections, none flagged or past a caustic."""
     if len(first.pair) != len(second.pair) or first.flag.any() or second.flag.any():
         return False
     same = (np.array_equal(getattr(first, name), getattr(second, name)) for name in ("pair", "surface", "bottom"))
-    return all(same) and not second.turning.any()
+    return all(same) and not second.caustics.any()
 
 
 def ranging_error(scene: Scene, profile: Profile, frames: Iterable[Frame], *, shape: bool = False) -> float:
