@@ -14,10 +14,9 @@ settings.load_profile("repeatable")
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Libraries and tests stay to the end: looking through them took a third of collecting, a tenth of compiling."""
+    """Libraries and tests stay to the end: looking through them for garbage took a third of collecting."""
     gc.disable()
     try:
         return (yield)
     finally:
-        gc.freeze()
         gc.enable()

@@ -86,7 +86,7 @@ class Ending(WorkerPlugin):
 @pytest.mark.long
 def test_a_worker_that_ends_as_it_is_given_the_plan_ends_no_build(tmp_path: Path) -> None:
     """The others have it, and the one in its place."""
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster) as client:
         register(client, Ending(tmp_path / "struck"))
         assert (tmp_path / "struck").exists()
         wait_until(lambda: len(client.scheduler_info()["workers"]) == 2)
