@@ -52,6 +52,11 @@ NOTED = 8
 
 SHARP, LEAST_SPAN = 0.5, 1e-3
 """Change of the gradient of the sound speed (1/s) that is called a kink; and over which depth (m) it is measured."""
+REFLECTED_SNAP = (
+    "reflections of the snap itself enter the image, and where they are far louder than echoes there are no points: "
+    "scene.processing.cancelling removes them"
+)
+"""Said where nothing removes them: in `remus.yaml` with two bounces, all peaks are lobes of one."""
 
 
 def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
@@ -76,7 +81,7 @@ def notes(plan: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         )
     cancelled = scene.processing.cancelling is not None
     if plan.propagation.bounces and not cancelled and plan.products & OF_BEAMS and plan.sizes["emission"]:
-        lines.append("reflections of the snap itself enter the image: processing.cancelling removes them")
+        lines.append(REFLECTED_SNAP)
     if plan.products & OF_BEAMS:
         lines += view_notes(noted(looks)) + steering_notes(noted(looks))
         lines += stretch_notes(noted(looks), recipe.accuracy.range_m)
