@@ -16,7 +16,7 @@ from typing import Any, TypeVar, cast, dataclass_transform
 from pydantic import ConfigDict, Discriminator, Field, ValidationError
 from pydantic.dataclasses import dataclass
 
-from sonarsynth.description.field_messages import unknown, wrong_fields
+from sonarsynth.description.field_messages import field_names, unknown, wrong_fields
 from sonarsynth.description.schemas import HelpText
 
 __all__ = ["BY_KIND", "ONE_OR_SEVERAL", "FieldError", "description", "unknown"]
@@ -69,7 +69,7 @@ def _in_one_line(init: Callable[..., None]) -> Callable[..., None]:
     @wraps(init)
     def checked(self: object, *args: Any, **fields: Any) -> None:
         if args:
-            raise TypeError(f"{type(self).__name__} takes its fields by name, as in {_by_name(type(self))}")
+            raise TypeError(f"{type(self).__name__} takes its fields by name: {', '.join(field_names(type(self)))}")
         try:
             init(self, **fields)
         except ValidationError as error:
@@ -78,9 +78,3 @@ def _in_one_line(init: Callable[..., None]) -> Callable[..., None]:
             raise ValueError(f"{type(self).__name__}: {'; '.join(lines)}") from None
 
     return checked
-
-
-def _by_name(cls: type) -> str:
-    """A class with one of its fields by name."""
-    name = next((name for name in getattr(cls, "__pydantic_fields__", {}) if name != "kind"), "")
-    return f"{cls.__name__}({name}=...)" if name else f"{cls.__name__}()"

@@ -16,8 +16,7 @@ from sonarsynth.conventions import UNITS
 NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,63}$"
 CATEGORY = r"^[A-Za-z][A-Za-z0-9_.+-]{0,63}$"
 ALLOWED = {NAME: "letters, digits, hyphens and underscores", CATEGORY: "letters, digits and _.+-"}
-"""What names may be made of."""
-
+"""Patterns of the names of targets and of their categories, and what these may be made of, in words."""
 
 SYNONYMS: Final = {"file": "path", "filename": "path"}
 """What people write for a field, and its name, which is not spelt alike."""
@@ -67,7 +66,7 @@ def _path(details: ErrorDetails, root: Any, data: Any) -> Where:
     """The path of an error in the file: pydantic's, without the parts that name members of unions."""
     path: list[str | int] = []
     loc = details["loc"]
-    if len(loc) == 1 and loc[0] in _fields(root):  # maybe one that was left out, and has a default that cannot be
+    if len(loc) == 1 and loc[0] in field_names(root):  # maybe one that was left out, and has a default that cannot be
         return loc
     for n, key in enumerate(loc):
         named = isinstance(data, dict) and key in data and data.get("kind") != key
@@ -88,7 +87,7 @@ def _message(details: ErrorDetails, keys: Where, root: Any, data: Any) -> tuple[
     if details["type"] == "union_tag_not_found":
         return keys, f"needs a kind: one of {', '.join(_kinds(_type_at(root, keys, data)))}"
     if details["type"] == "unexpected_keyword_argument":
-        return keys, unknown(str(keys[-1]), _fields(_class_at(root, keys[:-1], data)))
+        return keys, unknown(str(keys[-1]), field_names(_class_at(root, keys[:-1], data)))
     return keys, _text(details)
 
 
@@ -137,7 +136,8 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
-def _fields(cls: Any) -> list[str]:
+def field_names(cls: Any) -> list[str]:
+    """Names of the fields of a description; of anything else none."""
     return list(getattr(cls, "__pydantic_fields__", {}))
 
 
@@ -193,4 +193,4 @@ def _chosen(kind: Any, data: Any) -> Any:
         return tagged[0]
     fitting = [m for m in options if _tag(m) == tag and hasattr(m, "__pydantic_fields__")]
     names = set(data) if isinstance(data, dict) else set()
-    return max(fitting, key=lambda m: len(names & set(_fields(m))), default=None)
+    return max(fitting, key=lambda m: len(names & set(field_names(m))), default=None)

@@ -18,7 +18,7 @@ from sonarsynth.state import Emission
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
 SILENCE = 1e-12
-"""Ways of a snap and of its image that cancel to less than this share of what they are apart are none."""
+"""Sound of a snap and of its image that cancel to less than this share of what both are alone is left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +70,8 @@ class TransmitPaths(Columns):
         )
 
     def merged(self) -> TransmitPaths:
-        """The ways with those of the own image of a snap added to those that they coincide with, where the two sound
-        alike: what a rough bottom blurs stays apart from what it does not, as do pulses of a snap that rises."""
+        """The ways, with those of the own image of a snap added to the ways of the snap that they coincide with. Pulses
+        that differ stay apart: those that a rough bottom blurs, and those of a snap that moves up or down."""
         image = np.flatnonzero(self.bounces > self.counted)
         if not len(image):
             return self

@@ -49,11 +49,12 @@ def split(names: str) -> list[str]:
     return [name for name in names.split(",") if name]
 
 
-def test_a_brief_build_of_one_shard_is_predicted_in_the_process_itself(small_plan: Plan) -> None:
+def test_a_brief_build_of_one_shard_is_predicted_in_the_process_itself(small_plan: Plan, tmp_path: Path) -> None:
     """As it is built: the 4 s in which workers start are not in it."""
     one, two = (schedule.predict(small_plan, frames=frames) for frames in (8, 9))
-    assert (one.workers, two.workers) == (0, min(schedule.usable_cores(), 2))
-    assert one.core_seconds == one.frames * one.frame_seconds
+    built = schedule.build(small_plan, tmp_path / "s", frames=range(8))
+    assert (one.workers, two.workers) == (built.workers, min(schedule.usable_cores(), 2)) == (0, two.workers)
+    assert one.seconds < one.of(workers=1).seconds - 1.0
 
 
 @pytest.mark.parametrize("products", TASKS)

@@ -168,6 +168,7 @@ def by_structure(case: Case, random: np.random.Generator) -> Case:
 
 
 MOST_PLACES = 1_000_000
+"""Values of a recipe that is changed by its structure."""
 HOWS = ("value", "value", "scale", "scale", "scale", "elsewhere", "field", "repeat", "delete")
 
 
